@@ -23,7 +23,7 @@ from marey.models.hgm3.generate import Generator as HGM3Generator
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 
 FRAMES = 200
 SESSIONS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
@@ -51,7 +51,7 @@ def _one_session(generator: Generator) -> None:
     runs: dict[str, Callable[[], object]] = {}
     for name, guidance in (("recorded", 1.0), ("recorded, guidance", 3.0), ("step by step", 1.0)):
         inference = replace(generator.config.inference, guidance=guidance)
-        streams = Streams(generator.packed(1), 1, inference)
+        streams = StreamBatch(generator.packed(1), 1, inference)
         if name == "step by step":
             streams._draw = streams._next
         streams.prepare()

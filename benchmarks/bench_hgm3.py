@@ -22,7 +22,7 @@ import torch
 from benchmarks.harness import measure, table
 from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle
-from marey.models.hgm3.generate import Generator, Settings
+from marey.models.hgm3.generate import Generator, SamplingSettings
 from marey.text.features import TextFeatures
 from marey.text.graph import Edge, Node, SemanticGraph
 
@@ -42,7 +42,7 @@ def main() -> None:
         print(f"peak memory with batch 32: {_peak_mib():.0f} MiB (before loading: {before:.0f} MiB)\n")
         slow = Generator.load(bundle, device="cpu", threads=THREADS, dtype=torch.float32)
     peer = momask()
-    plain = Settings(skip_idle=False, trim_slots=False)
+    plain = SamplingSettings(skip_idle=False, trim_slots=False)
     for batch in BATCHES:
         asked = requests(batch)
         runs: dict[str, Callable[[], object]] = {

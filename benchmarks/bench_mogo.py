@@ -20,9 +20,9 @@ import torch
 
 from benchmarks.harness import measure, table
 from marey.models.mogo.bundle import random_bundle
-from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.generate import Generator, SamplingSettings
 from marey.models.mogo.live import LiveSessionPool
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph
 
@@ -122,9 +122,9 @@ def _memory(generator: Generator) -> None:
     print(f"Memory over {ENDLESS} frames: {before:.1f} → {_resident_mib():.1f} MiB resident\n")
 
 
-def _streams(generator: Generator, guidance: float, window: int) -> Streams:
-    inference = replace(Settings(guidance=guidance).inference(generator.config.inference), window=window)
-    return Streams(generator.packed(1), 1, inference)
+def _streams(generator: Generator, guidance: float, window: int) -> StreamBatch:
+    inference = replace(SamplingSettings(guidance=guidance).inference(generator.config.inference), window=window)
+    return StreamBatch(generator.packed(1), 1, inference)
 
 
 def sentence(generator: Generator) -> torch.Tensor:

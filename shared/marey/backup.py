@@ -17,7 +17,7 @@ from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among
 from marey.jobs import tables
 from marey.jobs.leases import AssetDigest
-from marey.jobs.states import ENDED, JobControl, Review, Stage
+from marey.jobs.states import ENDED, ItemStage, JobControl, Review
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
 
 CHUNK = 1000  # rows per statement
@@ -71,7 +71,7 @@ class ItemRecord(_Record):
     settings: dict[str, Any]
     tags: list[str]
     generate_batch_key: str
-    stage: Stage
+    stage: ItemStage
     state: Literal["succeeded", "failed", "dead", "cancelled"]
     reason: str | None
     attempts: int = Field(ge=0)
@@ -249,7 +249,7 @@ def _write_job(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:
 def _item_row(job: UUID, item: ItemRecord) -> dict[str, object]:
     """Return an item in the state ready. A backup holds no text features, so the item names none."""
     left = {"motion", "state", "reason", "attempts", "problem", "finished_at", "replaces", "stage"}
-    at_text = item.stage is Stage.TEXT
+    at_text = item.stage is ItemStage.TEXT
     return {
         **item.model_dump(exclude=left),
         "job_id": job,

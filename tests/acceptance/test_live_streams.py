@@ -15,7 +15,7 @@ from websockets.sync.client import ClientConnection
 
 from marey.db import create_engine
 from marey.motion.io.bvh import read_bvh
-from marey.streams import stream_acts
+from marey.streams import stream_actions
 from marey.streams.actions import ActionStart
 from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, serving, socket_of
@@ -37,9 +37,9 @@ def wait_for(what: Callable[[], object]) -> None:
         time.sleep(0.1)
 
 
-def acts_of(engine: sa.Engine, stream: str) -> list[ActionStart]:
+def actions_of(engine: sa.Engine, stream: str) -> list[ActionStart]:
     with engine.connect() as conn:
-        return stream_acts(conn, UUID(stream))
+        return stream_actions(conn, UUID(stream))
 
 
 def frames_until(socket: ClientConnection, enough: Callable[[list[Frame]], bool]) -> list[Frame]:
@@ -60,9 +60,9 @@ def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey)
             worker = server.children()["live"]
             engine = create_engine(worker.environ()["MAREY_DATABASE_URL"])
             before = frames_until(
-                socket, lambda found: len(found) % 20 == 0 and len(acts_of(engine, stream["id"])) == 2
+                socket, lambda found: len(found) % 20 == 0 and len(actions_of(engine, stream["id"])) == 2
             )
-            acts = acts_of(engine, stream["id"])
+            actions = actions_of(engine, stream["id"])
             worker.kill()
             socket.send(json.dumps({"kind": "steer", "prompt": "a person waves"}))
             after = frames_until(socket, lambda found: bool(found) and found[-1].prompt == 1)
@@ -74,7 +74,7 @@ def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey)
         ended = client.get(f"/v1/streams/{stream['id']}")
         assert ended["frames"] == len(shown)
         steered = next(frame.number for frame in after if frame.prompt == 1)
-        assert acts_of(engine, stream["id"]) == [*acts, ActionStart(steered, 0)]  # none began again
+        assert actions_of(engine, stream["id"]) == [*actions, ActionStart(steered, 0)]  # none began again
         engine.dispose()
         assert [prompt["prompt"] for prompt in ended["prompts"]] == [ACTS, "a person waves"]
         alone("jobs", "wait", ended["job"], "--timeout", 90, timeout=120).ok()

@@ -97,4 +97,4 @@ def test_the_product_alone_does_not_know_it(installed: Marey, offline: Marey, tm
     )
     (tmp_path / "a.pose").write_text("{}")
     offline("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "Known: .bvh, .npz.")
-    installed("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "is not a file of poses")
+    installed("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "not a file of poses")

@@ -75,7 +75,7 @@ def test_what_is_submitted_to_it_is_fetched(served: Marey, tmp_path: Path) -> No
 def test_a_setting_out_of_its_range_is_refused_by_the_server_with_the_line(served: Marey) -> None:
     table = "prompt,settings\na person stands,width=0.2\na person stands,beats=2.5\na person stands,steps=3\n"
     served("submit", "-f", "-", "--model", "sway", stdin=table).refused(
-        2, "line 3: settings: beats: is 2.5, not a whole number", "line 4: settings: 'steps' is not a setting of sway-"
+        2, "line 3: settings: beats: is 2.5, not a whole number", "line 4: settings: unknown setting 'steps' of sway-"
     )
 
 

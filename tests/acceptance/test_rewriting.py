@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 from marey.motion.clip import load_npz
-from tests.support.language_model import Asked, CompletionReply, LanguageModel
+from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.marey import Marey, serving
 
 STROLL, RUN, LOST = "he strolls to the left", "he is running", "he jumps"
 CAPTION = "A person strolls to the left."
 
 
-def answer(asked: Asked, before: int) -> CompletionReply:
+def answer(asked: ChatRequest, before: int) -> CompletionReply:
     said = {
         STROLL: CompletionReply(CAPTION),
         RUN: CompletionReply("A person bows."),

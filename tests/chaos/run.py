@@ -202,7 +202,7 @@ class Run:
             self.operator.release()
             self._wait(deadline, "every item ends", lambda: self._open() == 0)
             self._wait(deadline, "no lease is held", self._no_lease)
-            self._wait(deadline, "webhooks are told", self._told)
+            self._wait(deadline, "webhooks are told", self._is_hinted)
         finally:
             self._done.set()
             self.probe.close()
@@ -279,7 +279,7 @@ class Run:
         with transaction(self.cluster.engine) as conn:
             return conn.execute(sa.select(sa.func.count()).select_from(lease)).scalar_one() == 0
 
-    def _told(self) -> bool:
+    def _is_hinted(self) -> bool:
         query = "SELECT count(*) FROM webhook_delivery WHERE state = 'pending'"
         with transaction(self.cluster.engine) as conn:
             return conn.execute(sa.text(query)).scalar_one() == 0

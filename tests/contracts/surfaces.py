@@ -223,7 +223,7 @@ def files() -> Any:
     from marey.motion.clip import KEYS
     from marey.streams.frames import HEADER, MAGIC, VERSION
     from marey.training.checkpoint import TrainingState
-    from marey.training.parts import Part
+    from marey.training.parts import TrainedPart
 
     def fields(cls: Any) -> list[str]:
         names = cls.model_fields if hasattr(cls, "model_fields") else [field.name for field in dataclasses.fields(cls)]
@@ -243,7 +243,7 @@ def files() -> Any:
             "clip": fields(prepared.Clip),
             "measured": fields(prepared.Measured),
         },
-        "checkpoint": {"state": fields(TrainingState), "part": fields(Part)},
+        "checkpoint": {"state": fields(TrainingState), "part": fields(TrainedPart)},
     }
 
 

@@ -147,7 +147,7 @@ def test_a_run_that_failed_or_was_cancelled_is_6_and_a_timeout_7(place: Studio, 
     prompts.write_text("prompt\nrefuse to walk\nwalk\n")
     run = marey("eval", "run", "--bundle", GENERATOR, "--split", prompts).ok().out.strip()
     place.work()
-    marey("eval", "wait", run, "--fail-on-regression").refused(6, "1 of 2 motions were not made", "cannot be danced")
+    marey("eval", "wait", run, "--fail-on-regression").refused(6, "1 of 2 motions are missing", "cannot be danced")
 
 
 def test_bad_input_is_2_with_every_line_and_nothing_is_begun(marey: Marey, tmp_path: Path) -> None:

@@ -16,10 +16,10 @@ from marey.jobs import (
     Claim,
     Committed,
     ItemFailure,
+    ItemStage,
     ItemState,
     JobState,
     NewText,
-    Stage,
     begin_assets,
     cancel,
     commit_motions,
@@ -200,12 +200,12 @@ def test_a_commit_of_what_was_not_announced_is_a_bug_and_writes_nothing(engine: 
 def test_features_and_the_next_stage_are_committed_together(engine: sa.Engine) -> None:
     job = submit_items(engine, 2)
     claimed = claim_some(engine, "text")
-    assert claimed.stage is Stage.TEXT
+    assert claimed.stage is ItemStage.TEXT
     texts = [NewText(item.id, item.text_key, b"blob") for item in claimed.items]
     with transaction(engine) as conn:
         assert commit_texts(conn, claimed.lease_token, texts).items == tuple(ids(claimed))
     with transaction(engine) as conn:
-        assert {item.stage for item in list_items(conn, "default", job).rows} == {Stage.GENERATE}
+        assert {item.stage for item in list_items(conn, "default", job).rows} == {ItemStage.GENERATE}
         assert audit(conn) == []
     assert len(claim_some(engine).items) == 2
 

@@ -15,7 +15,7 @@ import redis
 import sqlalchemy as sa
 import torch
 
-from marey.core.settings import Settings as Configuration
+from marey.core.settings import Settings
 from marey.db import transaction
 from marey.generation.handler import GeneratorHandler
 from marey.jobs import get_job, list_items
@@ -28,9 +28,9 @@ from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.port import LiveFrame
 from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
-from marey.streams import StreamPrompt, StreamState, prompts_with_rewrites, stream_acts, stream_prompts
+from marey.streams import StreamPrompt, StreamState, prompts_with_rewrites, stream_actions, stream_prompts
 from marey.streams.actions import ActionStart
-from marey.streams.control import Control
+from marey.streams.control import StreamControl
 from marey.streams.frames import Frame
 from marey.streams.notifier import StreamNotifier
 from marey.streams.redis import LEASE_MS
@@ -105,10 +105,10 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     start()
     studio.until(lambda: studio.row(stream).frames > 0, "a record")
     assert studio.row(stream).state is StreamState.LIVE
-    studio.send(stream, Control("steer", "a person waves"))
+    studio.send(stream, StreamControl("steer", "a person waves"))
     studio.until(lambda: any(f.prompt == 1 for f in whole(studio, stream)), "the second prompt")
     studio.until(lambda: studio.shown(stream) >= generator.limits.min_frames, "frames enough for a clip")
-    studio.send(stream, Control("stop"))
+    studio.send(stream, StreamControl("stop"))
     studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
     frames = whole(studio, stream)
     assert [frame.last for frame in frames] == [False] * (len(frames) - 1) + [True]
@@ -119,7 +119,7 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     turned = next(frame.number for frame in frames if frame.prompt == 1)
     assert prompts == [(0, "a person walks"), (turned, "a person waves")]
     assert row.job is not None
-    handler = GeneratorHandler("mogo", lambda *_, **__: generator, 4, Configuration())
+    handler = GeneratorHandler("mogo", lambda *_, **__: generator, 4, Settings())
     loop = Loop(engine, folder_store, handler)
     try:
         loop.run()
@@ -149,11 +149,11 @@ def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, st
     stream = studio.begin("a person walks")
     first = start(parse=rewriting)
     studio.until(lambda: studio.row(stream).frames > 0, "a record")
-    studio.send(stream, Control("steer", "a person runs"))
+    studio.send(stream, StreamControl("steer", "a person runs"))
     studio.until(lambda: len(stream_prompts()) == 2, "the second prompt's record")
     first.kill()
     start(parse=refusing)
-    studio.send(stream, Control("steer", "a person bows"))
+    studio.send(stream, StreamControl("steer", "a person bows"))
     studio.until(lambda: len(stream_prompts()) == 3, "the third prompt's record")
     assert [each.read for each in stream_prompts()] == [
         PromptRewrite("a person walks ahead"),
@@ -166,11 +166,11 @@ def test_a_paused_stream_stands_still_and_goes_on_where_it_was(studio: Studio, s
     stream = studio.begin()
     start()
     studio.until(lambda: studio.shown(stream) > 5, "frames")
-    studio.send(stream, Control("pause"))
+    studio.send(stream, StreamControl("pause"))
     studio.until(lambda: studio.row(stream).state is StreamState.PAUSED, "the pause")
     shown = studio.shown(stream)
-    studio.send(stream, Control("steer", "a person bows"))
-    studio.send(stream, Control("resume"))
+    studio.send(stream, StreamControl("steer", "a person bows"))
+    studio.send(stream, StreamControl("resume"))
     studio.until(lambda: studio.shown(stream) > shown + 5, "more frames")
     frames = whole(studio, stream)
     assert [frame.prompt for frame in frames] == [0] * shown + [1] * (len(frames) - shown)
@@ -181,7 +181,7 @@ def test_another_worker_goes_on_behind_the_last_frame_after_a_kill(studio: Studi
     stream = studio.begin("a person walks")
     first = start()
     studio.until(lambda: studio.row(stream).frames > 0, "a record")
-    studio.send(stream, Control("steer", "a person runs"))
+    studio.send(stream, StreamControl("steer", "a person runs"))
     studio.until(lambda: studio.shown(stream) > 0 and whole(studio, stream)[-1].prompt == 1, "the second prompt")
     studio.until(lambda: len(prompts_of(studio, stream)) == 2, "its record")
     first.kill()
@@ -198,23 +198,23 @@ def test_another_worker_goes_on_behind_the_last_frame_after_a_kill(studio: Studi
 def test_after_a_kill_the_act_that_plays_goes_on_and_none_begins_again(studio: Studio, start: Start) -> None:
     stream = studio.begin("walk forward, then wave with the right hand")
     first = start()
-    studio.until(lambda: len(acts_of(studio, stream)) == 2, "the second act's record")
+    studio.until(lambda: len(actions_of(studio, stream)) == 2, "the second act's record")
     first.kill()
-    acts, recorded = acts_of(studio, stream), studio.row(stream).frames
-    assert [begun.act for begun in acts] == [0, 1]
-    assert acts[0].frame == 0 < acts[1].frame < recorded
+    actions, recorded = actions_of(studio, stream), studio.row(stream).frames
+    assert [start.action for start in actions] == [0, 1]
+    assert actions[0].frame == 0 < actions[1].frame < recorded
     second = start()
     studio.until(lambda: studio.row(stream).frames > recorded + 20, "records of the other worker")
-    assert acts_of(studio, stream) == acts
+    assert actions_of(studio, stream) == actions
     second.kill()
-    studio.send(stream, Control("steer", "bow, then sit down"))
+    studio.send(stream, StreamControl("steer", "bow, then sit down"))
     start()
     studio.until(lambda: len(prompts_of(studio, stream)) == 2, "the record of a steer that came during the outage")
     turned = prompts_of(studio, stream)[1][0]
-    studio.until(lambda: len(acts_of(studio, stream)) == 4, "the second act of that prompt")
-    found = acts_of(studio, stream)
-    assert found[:3] == [*acts, ActionStart(turned, 0)]
-    assert found[3].act == 1
+    studio.until(lambda: len(actions_of(studio, stream)) == 4, "the second act of that prompt")
+    found = actions_of(studio, stream)
+    assert found[:3] == [*actions, ActionStart(turned, 0)]
+    assert found[3].action == 1
     shown = whole(studio, stream)
     assert turned == next(frame.number for frame in shown if frame.prompt == 1)
 
@@ -231,7 +231,7 @@ def test_a_stream_of_a_worker_that_did_not_record_acts_goes_on_with_its_first(
     recorded = studio.row(stream).frames
     start()
     studio.until(lambda: studio.row(stream).frames > recorded, "records of the other worker")
-    assert acts_of(studio, stream)[0] == ActionStart(recorded, 0)
+    assert actions_of(studio, stream)[0] == ActionStart(recorded, 0)
 
 
 def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio: Studio, start: Start) -> None:
@@ -275,7 +275,7 @@ def test_streams_wait_while_every_slot_is_taken(studio: Studio, start: Start) ->
     studio.until(lambda: all(studio.shown(stream) > 0 for stream in streams[:2]), "frames of two")
     waiting = studio.row(streams[2])
     assert (waiting.state, waiting.position) == (StreamState.WAITING, 0)
-    studio.send(streams[0], Control("stop"))
+    studio.send(streams[0], StreamControl("stop"))
     studio.until(lambda: studio.shown(streams[2]) > 0, "frames of the third")
     assert studio.row(streams[0]).state is StreamState.ENDED
 
@@ -307,7 +307,7 @@ def test_a_stream_that_is_paused_for_too_long_ends_although_it_is_watched(studio
     paused, playing = studio.begin(), studio.begin(seed=2)
     start(paused_seconds=0.5)
     studio.until(lambda: studio.shown(paused) > 0 and studio.shown(playing) > 0, "frames of both")
-    studio.send(paused, Control("pause"))
+    studio.send(paused, StreamControl("pause"))
 
     def is_over() -> bool:
         for stream in (paused, playing):
@@ -358,8 +358,8 @@ def test_a_prompt_that_cannot_be_read_fails_its_stream(studio: Studio, start: St
     start()
     studio.until(lambda: studio.row(bad).state is StreamState.FAILED, "the failure")
     studio.until(lambda: studio.shown(good) > 0, "frames of the other")
-    studio.send(good, Control("steer", "refused"))
-    studio.send(good, Control("steer", "a person waves"))
+    studio.send(good, StreamControl("steer", "refused"))
+    studio.send(good, StreamControl("steer", "a person waves"))
     studio.until(lambda: whole(studio, good)[-1].prompt == 1, "the next prompt")
 
 
@@ -397,11 +397,11 @@ def test_a_prompt_that_is_read_for_long_holds_up_its_own_stream_alone(studio: St
     one, other = studio.begin(seed=1), studio.begin(seed=2)
     start(parse=rewriter.parse)
     studio.until(lambda: min(studio.shown(one), studio.shown(other)) > 0, "frames of both")
-    studio.send(one, Control("steer", "a person waves slowly"))
-    studio.send(one, Control("steer", "a person bows"))
+    studio.send(one, StreamControl("steer", "a person waves slowly"))
+    studio.send(one, StreamControl("steer", "a person bows"))
     studio.until(lambda: "a person waves slowly" in rewriter.asked, "the reading")
     recorded = studio.row(one).frames
-    studio.send(other, Control("steer", "a person jumps"))
+    studio.send(other, StreamControl("steer", "a person jumps"))
     studio.until(lambda: whole(studio, other)[-1].prompt == 1, "the other stream's prompt")
     studio.until(lambda: studio.row(one).frames > recorded, "records meanwhile")
     assert {frame.prompt for frame in whole(studio, one)} == {0}
@@ -415,8 +415,8 @@ def test_a_stop_does_not_wait_for_a_prompt_that_is_being_read(studio: Studio, st
     stream = studio.begin()
     start(parse=rewriter.parse)
     studio.until(lambda: studio.shown(stream) > 0, "frames")
-    studio.send(stream, Control("steer", "a person waves slowly"))
-    studio.send(stream, Control("stop"))
+    studio.send(stream, StreamControl("steer", "a person waves slowly"))
+    studio.send(stream, StreamControl("stop"))
     studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
     rewriter.go.set()
 
@@ -450,9 +450,9 @@ def move(engine: sa.Engine, stream: UUID, state: StreamState) -> None:
         conn.execute(query, {"state": state, "id": stream})
 
 
-def acts_of(studio: Studio, stream: UUID) -> list[ActionStart]:
+def actions_of(studio: Studio, stream: UUID) -> list[ActionStart]:
     with transaction(studio.engine) as conn:
-        return stream_acts(conn, stream)
+        return stream_actions(conn, stream)
 
 
 def prompts_of(studio: Studio, stream: UUID) -> list[tuple[int, str]]:

@@ -11,7 +11,7 @@ import pytest
 import sqlalchemy as sa
 
 from marey.api import rates
-from marey.api.rates import Rates
+from marey.api.rates import RateLimiter
 from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy
@@ -34,11 +34,11 @@ def new_key(engine: sa.Engine) -> Callable[..., ApiKey]:
     return new
 
 
-def counter(queue_url: str | None, limits: dict[str, str] = LIMITS) -> Rates:
-    return Rates(Settings.model_validate({"queue_url": queue_url, "rates": limits}))
+def counter(queue_url: str | None, limits: dict[str, str] = LIMITS) -> RateLimiter:
+    return RateLimiter(Settings.model_validate({"queue_url": queue_url, "rates": limits}))
 
 
-def taken(count: Rates, key: ApiKey, kind: str = "read", tries: int = 10) -> int:
+def taken(count: RateLimiter, key: ApiKey, kind: str = "read", tries: int = 10) -> int:
     """How many requests pass."""
     passed = 0
     for _ in range(tries):

@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from marey.api import readiness
-from marey.api.readiness import Check, Readiness
+from marey.api.readiness import DependencyCheck, Readiness
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
 from marey.embedded import EmbeddedServer
@@ -29,12 +29,12 @@ def hanging() -> Iterator[threading.Event]:
     go.set()
 
 
-def of(**checks: Check) -> Readiness:
+def of(**checks: DependencyCheck) -> Readiness:
     return Readiness(checks, interval=0.02)
 
 
 def test_nothing_is_ready_before_its_first_round(hanging: threading.Event) -> None:
-    found = of(slow=Check(lambda: hanging.wait(30), "slow"), fast=Check(lambda: None, "fast"))
+    found = of(slow=DependencyCheck(lambda: hanging.wait(30), "slow"), fast=DependencyCheck(lambda: None, "fast"))
     assert not any(result.ok for result in found.results().values())
     found.start()
     wait_until(lambda: found.results()["fast"].ok)
@@ -50,8 +50,8 @@ def test_a_check_that_hangs_becomes_a_failure_and_holds_up_no_other(
     monkeypatch.setattr(readiness, "STALE_SECONDS", 0.3)
     hangs = threading.Event()
     found = of(
-        odd=Check(lambda: hanging.wait(30) if hangs.is_set() else None, "odd is down"),
-        even=Check(lambda: None, "even is down"),
+        odd=DependencyCheck(lambda: hanging.wait(30) if hangs.is_set() else None, "odd is down"),
+        even=DependencyCheck(lambda: None, "even is down"),
     )
     found.start()
     wait_until(lambda: all(result.ok for result in found.results().values()))
@@ -71,7 +71,7 @@ def test_a_check_with_a_bug_fails_and_goes_on() -> None:
         rounds.append(None)
         raise ZeroDivisionError
 
-    found = of(buggy=Check(buggy, "buggy is down"))
+    found = of(buggy=DependencyCheck(buggy, "buggy is down"))
     found.start()
     wait_until(lambda: len(rounds) > 2)
     assert not found.results()["buggy"].ok

@@ -347,7 +347,7 @@ def test_a_bucket_at_its_byte_limit_takes_nothing_says_so_and_goes_on_when_there
     swift.limit(store.options.bucket, 1500)
     store.put(key_of(b"a" * 1000), b"a" * 1000)
     more = [NewObject(key_of(content), content) for content in (b"b" * 1000, b"c" * 1000)]
-    with pytest.raises(Unreachable, match=r"quota.*\n.*room left"):
+    with pytest.raises(Unreachable, match=r"quota.*\n.*free space"):
         list(store.put_all(more))
     assert list(store.keys()) == [key_of(b"a" * 1000)]
     swift.limit(store.options.bucket, None)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from marey.core.errors import Conflict, InvalidInput, Unreachable
 from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
-from marey.streams.control import START, Control, ControlQueue
+from marey.streams.control import START, ControlQueue, StreamControl
 from marey.streams.frames import Frame, decode_frame
 from marey.streams.notifier import StreamNotifier
 from marey.streams.redis import LEASE_MS, FrameStream, Gap, Lease, LeaseLost, StoredFrame
@@ -217,7 +217,7 @@ def test_a_stream_is_gone_after_it_was_idle_and_when_it_is_dropped(client: redis
     client.pexpire(stream.frames_key, 50)
     other = new_stream(client)
     other.write(taken(other), frames(0, 1))
-    ControlQueue(client, other.stream).send(Control("stop"))
+    ControlQueue(client, other.stream).send(StreamControl("stop"))
     assert 3_500_000 < client.pttl(other.frames_key) <= 3_600_000
     other.drop()
     time.sleep(0.08)
@@ -346,8 +346,8 @@ def test_both_protocols_of_redis_are_read(queue_url: str, protocol: int) -> None
         assert stream.reader().read(block_ms=10) == []
         stream.write(lease, frames(0, 2))
         assert numbers(stream.reader().read()) == [0, 1]
-        identity = queue.send(Control("stop"))
-        assert queue.read() == [(identity, Control("stop"))]
+        identity = queue.send(StreamControl("stop"))
+        assert queue.read() == [(identity, StreamControl("stop"))]
 
 
 def test_frames_before_the_first_are_refused(client: redis.Redis) -> None:
@@ -360,7 +360,12 @@ def test_frames_before_the_first_are_refused(client: redis.Redis) -> None:
 
 def test_messages_arrive_in_order_and_the_next_worker_reads_on(client: redis.Redis) -> None:
     queue = ControlQueue(client, "c1")
-    sent = [Control("pause"), Control("resume"), Control("steer", "a person jumps, später"), Control("stop")]
+    sent = [
+        StreamControl("pause"),
+        StreamControl("resume"),
+        StreamControl("steer", "a person jumps, später"),
+        StreamControl("stop"),
+    ]
     ids = [queue.send(control) for control in sent]
     assert queue.read() == list(zip(ids, sent, strict=True))
     assert [control for _, control in ControlQueue(client, "c1").read(ids[1])] == sent[2:]
@@ -380,17 +385,17 @@ def test_a_message_of_another_release_is_told_and_stops_nothing(client: redis.Re
     ):
         client.xadd(queue.key, {"m": foreign})
     client.xadd(queue.key, {"other": b"x"})
-    queue.send(Control("stop"))
+    queue.send(StreamControl("stop"))
     found = [message for _, message in queue.read(START)]
     assert len(found) == 8
     assert all(isinstance(message, InvalidInput) for message in found[:-1])
-    assert found[-1] == Control("stop")
+    assert found[-1] == StreamControl("stop")
 
 
 @pytest.mark.parametrize(("kind", "prompt"), [("steer", None), ("steer", ""), ("pause", "a walk"), ("fly", None)])
 def test_a_message_that_makes_no_sense_cannot_be_made(kind: str, prompt: str | None) -> None:
     with pytest.raises(InvalidInput):
-        Control(kind, prompt)  # type: ignore[arg-type]
+        StreamControl(kind, prompt)  # type: ignore[arg-type]
 
 
 # -- outages -------------------------------------------------------------------------------------------------------
@@ -411,7 +416,7 @@ def test_a_redis_that_is_gone_is_unreachable(short_home: Path) -> None:
             stream.reader().read,
             stream.drop,
             queue.read,
-            lambda: queue.send(Control("stop")),
+            lambda: queue.send(StreamControl("stop")),
         ):
             with pytest.raises(Unreachable, match="Redis failed"):
                 call()

@@ -1,7 +1,8 @@
-"""Check of the words in code: `python -m tests.lint.words`.
+"""Check of the words in code and documents: `python -m tests.lint.words`.
 
 A docstring begins with an imperative or a noun phrase. Names and words that were replaced by standard ones
-do not come back. Only Python files that git tracks are read.
+do not come back: in names, comments, docstrings, messages and Markdown. One class name has one meaning. Only
+files that git tracks are read.
 """
 
 from __future__ import annotations
@@ -12,23 +13,27 @@ import re
 import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
 SKIPPED = (
-    "migrations/",
     "services/marey/cli/",
     "services/marey/client/",
-    "shared/marey/generation/",
-    "tests/integration/test_live_loop.py",
-    "tests/plugins/",
-    "workers/marey/generation/",
-    "workers/marey/models/",
 )
 """Folders that are not checked yet."""
+
+DIARY = "docs/research/"
+"""Records of past work: dated reports, and a log that quotes old names. Their words are not checked."""
+
+OTHER_NAMES = ("tests/", "benchmarks/", "services/marey/cli/", "services/marey/client/")
+"""Folders whose class names are their own: the client's types mirror those of the API."""
+
+TO_TELL_APART = {"Body", "Gait", "Row"}
+"""Class names with two meanings that wait for a better one: in viz, referee, checks, data and the report."""
 
 FIRST_WORDS = ("Whether", "What", "Nothing", "Who", "Whoever", "Whose")
 
@@ -78,6 +83,19 @@ NAMES = {
     "lower": "prepare_inference",
     "Configuration": "Settings",
     "Answer": "HeartbeatReply",
+    "Reading": "PromptParsing",
+    "Opening": "StartingStream",
+    "Made": "BundleFacts",
+    "Asked": "ParsedEvaluation",
+    "Patience": "BodyDeadline",
+    "Messages": "ControlMessages",
+    "Control": "StreamControl, GenerationControl",
+    "offer": "capabilities",
+    "offers": "list_generators",
+    "obey": "forward, apply",
+    "heard": "received",
+    "_told": "a verb: _describe, _as_line",
+    "ExpectedAct": "ExpectedAction",
 }
 """Names of classes and functions that were replaced, and the standard ones. Methods of other libraries that
 are called so are no definitions, and pass."""
@@ -95,7 +113,24 @@ MODULES = {
     "offers": "generators",
     "body_room": "body_budget",
     "practice": "self_training",
+    "reading": "parsing",
 }
+
+ONE_CONCEPT = {
+    "ConditionConfig",
+    "Decoder",
+    "Encoder",
+    "Frame",
+    "Generated",
+    "Generator",
+    "InferenceConfig",
+    "SamplingSettings",
+    "Tokenizer",
+    "TokenizerConfig",
+    "TransformerConfig",
+}
+"""Class names with one meaning in several places: each model has its own, some with a protocol. `Frame` is the field's
+word in both places: a pose of a motion, and a predicate with its roles (PropBank)."""
 
 WORDS = {
     r"tailers?": "broadcaster",
@@ -109,10 +144,29 @@ WORDS = {
     r"somebody": "a client, another worker",
     r"in company": "in a batch",
     r"good-bye": "stop",
+    r"allotments?": "quota",
+    r"parted": "split",
+    r"tak(?:e|en|es|ing) apart": "split, unpack",
+    r"(?:an|one|two|three|several|each|single|these|those) acts?": "action",
 }
-"""Words of docstrings and comments that were replaced (regular expressions), and the standard ones."""
+"""Words that were replaced (regular expressions), and the standard ones."""
+
+PHRASES = {
+    r"is no (?!longer|more|less|better|worse)\w+ of": "unknown …, not a …",
+    r"may not be told": "the cause, and how to allow it",
+}
+"""Turns of messages that were replaced, and the standard ones."""
 
 _WORD = re.compile(r"\b(" + "|".join(WORDS) + r")\b", re.IGNORECASE)
+_PHRASE = re.compile(r"\b(" + "|".join([*WORDS, *PHRASES]) + r")\b", re.IGNORECASE)
+
+_LOGGING = {"debug", "info", "warning", "error", "exception", "critical"}
+_TEXTS = {"hint", "help", "description", "message", "public", "reason", "epilog", "short_help"}
+"""Keywords of calls whose strings users read."""
+
+_CODE = re.compile(r"(`+)(.*?)\1", re.DOTALL)
+_FENCE = re.compile(r"^( *)(```+|~~~+).*?^\1\2 *$", re.DOTALL | re.MULTILINE)
+_LINK = re.compile(r"\]\([^)]*\)")
 
 
 @dataclass(frozen=True)
@@ -131,6 +185,8 @@ def check_source(source: str, path: Path) -> list[Finding]:
     """Return the findings of one file, by line."""
     tree = ast.parse(source)
     found = [*_check_docstrings(tree, path), *_check_names(tree, path), *_check_comments(source, path)]
+    if not path.is_relative_to("tests"):
+        found += _check_messages(tree, path)
     if path.stem in MODULES:
         found.append(Finding(path, 1, f"module {path.stem!r}: use {MODULES[path.stem]!r}"))
     return sorted(found, key=lambda finding: finding.line)
@@ -179,21 +235,103 @@ def _check_comments(source: str, path: Path) -> Iterator[Finding]:
                 yield Finding(path, token.start[0], _replaced(word.group()))
 
 
+def _check_messages(tree: ast.Module, path: Path) -> Iterator[Finding]:
+    """Check strings that users read: of errors, log lines, options and fields."""
+    lines: dict[tuple[int, int], ast.Constant] = {}
+    for node in ast.walk(tree):
+        for text in _read_by_users(node):
+            for part in ast.walk(text):
+                if isinstance(part, ast.Constant) and isinstance(part.value, str):
+                    lines[part.lineno, part.col_offset] = part
+    for (line, _), part in sorted(lines.items()):
+        for word in _PHRASE.finditer(str(part.value)):
+            yield Finding(path, line, _replaced(word.group()))
+
+
+def _read_by_users(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the expressions of a node whose strings users read."""
+    if isinstance(node, ast.Raise) and node.exc is not None:
+        yield node.exc
+    elif isinstance(node, ast.Call):
+        if isinstance(node.func, ast.Attribute) and node.func.attr in _LOGGING:
+            yield from node.args
+        name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+        if name[:1].isupper():  # an error that is made here and raised elsewhere, an option, a metric
+            yield from node.args
+        yield from (keyword.value for keyword in node.keywords if keyword.arg in _TEXTS)
+
+
+def check_markdown(text: str, path: Path) -> list[Finding]:
+    """Return the findings of one document, by line: its prose, and replaced class names in its code."""
+
+    def blank(found: re.Match[str]) -> str:
+        return re.sub(r"[^\n]", " ", found.group())
+
+    text = _FENCE.sub(blank, text)
+    found = [(code.start(2), f"name {name!r}: use {NAMES[name]}") for code, name in _names_in_code(text)]
+    prose = _LINK.sub(blank, _CODE.sub(blank, text))
+    found += [(word.start(), _replaced(word.group())) for word in _WORD.finditer(prose)]
+    if re.search(r"\bacts?\b", path.stem.replace("-", " ")):
+        found.append((0, "file name: use 'action'"))
+    return [Finding(path, text.count("\n", 0, place) + 1, message) for place, message in sorted(found)]
+
+
+def _names_in_code(text: str) -> Iterator[tuple[re.Match[str], str]]:
+    for code in _CODE.finditer(text):
+        name = code[2].strip("()").rpartition(".")[2]
+        if name in NAMES and re.search(r"[a-z][A-Z]|[a-z]_[a-z]", name):
+            yield code, name
+
+
+def check_meanings(sources: Mapping[Path, str]) -> list[Finding]:
+    """Return the class names that several product files define, unless they are one concept (`ONE_CONCEPT`)."""
+    defined: dict[str, list[tuple[Path, int]]] = defaultdict(list)
+    for path, source in sources.items():
+        if not str(path).startswith(OTHER_NAMES):
+            for node in ast.walk(ast.parse(source)):
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    defined[node.name].append((path, node.lineno))
+    return [
+        Finding(path, line, f"class {name!r} exists in {others[0][0]}: name their difference")
+        for name, others in sorted(defined.items())
+        if name not in ONE_CONCEPT | TO_TELL_APART
+        for path, line in others[1:]
+    ]
+
+
 def _replaced(word: str) -> str:
-    standard = next(new for old, new in WORDS.items() if re.fullmatch(old, word, re.IGNORECASE))
+    known = {**WORDS, **PHRASES}
+    standard = next(new for old, new in known.items() if re.fullmatch(old, word, re.IGNORECASE))
     return f"word {word!r}: use {standard}"
 
 
 def tracked_files(root: Path = ROOT) -> list[Path]:
     """List the Python files that git tracks and that are checked, relative to the root."""
-    listing = subprocess.run(["git", "ls-files", "*.py"], cwd=root, capture_output=True, text=True, check=True)
-    paths = listing.stdout.splitlines()
-    return [Path(path) for path in paths if not path.startswith(SKIPPED) and (root / path).is_file()]
+    return [path for path in _tracked("*.py", root) if not str(path).startswith(SKIPPED)]
+
+
+def tracked_documents(root: Path = ROOT) -> list[Path]:
+    """List the Markdown files that git tracks and that are checked, relative to the root."""
+    return [path for path in _tracked("*.md", root) if not str(path).startswith(DIARY)]
+
+
+def _tracked(pattern: str, root: Path) -> list[Path]:
+    listing = subprocess.run(["git", "ls-files", pattern], cwd=root, capture_output=True, text=True, check=True)
+    return [Path(path) for path in listing.stdout.splitlines() if (root / path).is_file()]
+
+
+def findings_of_all() -> list[Finding]:
+    """Return the findings of all checked files."""
+    sources = {path: (ROOT / path).read_text("utf-8") for path in tracked_files()}
+    found = [finding for path, source in sources.items() for finding in check_source(source, path)]
+    for path in tracked_documents():
+        found += check_markdown((ROOT / path).read_text("utf-8"), path)
+    return [*found, *check_meanings(sources)]
 
 
 def main() -> int:
     """Print the findings of all checked files; return 1 if there are any."""
-    findings = [f for path in tracked_files() for f in check_source((ROOT / path).read_text(), path)]
+    findings = findings_of_all()
     for finding in findings:
         print(finding)
     return 1 if findings else 0

@@ -12,11 +12,11 @@ from marey.db import transaction
 from marey.jobs import (
     AssetDigest,
     Claim,
+    FailureReason,
     NewItem,
     NewJob,
     NewMotion,
     NewText,
-    Problem,
     begin_assets,
     claim,
     commit_motions,
@@ -26,7 +26,7 @@ from marey.jobs import (
 from marey.tenants import Quotas, create_tenant
 
 MODEL = "hgm3"
-PROBLEM = Problem("test", "it does not work", hint="Try another.")
+PROBLEM = FailureReason("test", "it does not work", hint="Try another.")
 
 
 def new_item(index: int, prompt: str | None = None, **changes: object) -> NewItem:

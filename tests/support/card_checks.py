@@ -28,7 +28,7 @@ from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.train import train_stage as train_mogo
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
@@ -96,7 +96,7 @@ def training(folder: Path) -> None:
 
 def _step_never_waits(config: MOGOConfig) -> None:
     packed = PackedModel(RQHCTransformer(config).to(CARD), dtype=torch.bfloat16)
-    streams = Streams(packed, 3)
+    streams = StreamBatch(packed, 3)
     for seed in range(2):
         streams.start(torch.randn(config.condition.text_width).to(CARD), seed)
     waits.clear()

@@ -33,7 +33,7 @@ from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, ClaimedItem, tables
 from marey.measures.scores import SCHEMA, VERSION, MotionScore
 from marey.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
 from marey.runtime.scoring import ScoreInput
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.tenants import DEFAULT_TENANT
 from tests.support import toy
 from tests.support.runtime import Loop
@@ -225,7 +225,9 @@ def work(loop: Loop) -> None:
         pass
 
 
-def bring_to(scheduler: Evaluations, loop: Loop, engine: sa.Engine, evaluation: UUID, state: EvaluationState) -> None:
+def bring_to(
+    scheduler: EvaluationScheduler, loop: Loop, engine: sa.Engine, evaluation: UUID, state: EvaluationState
+) -> None:
     """Take an evaluation to a state by what the scheduler and workers do."""
     for _ in range(6):
         if state_of(engine, evaluation) is state:
@@ -236,7 +238,7 @@ def bring_to(scheduler: Evaluations, loop: Loop, engine: sa.Engine, evaluation: 
     assert state_of(engine, evaluation) is state
 
 
-def finish(scheduler: Evaluations, loop: Loop, engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
+def finish(scheduler: EvaluationScheduler, loop: Loop, engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
     """Let everybody work until it is over."""
     for _ in range(3):
         scheduler.round()

@@ -29,7 +29,7 @@ class CompletionReply:
 
 
 @dataclass
-class Asked:
+class ChatRequest:
     """One request."""
 
     path: str
@@ -44,10 +44,10 @@ class Asked:
 class LanguageModel:
     """Use as a context; `answer` may be replaced at any time."""
 
-    def __init__(self, answer: Callable[[Asked, int], CompletionReply]) -> None:
+    def __init__(self, answer: Callable[[ChatRequest, int], CompletionReply]) -> None:
         """`answer` gets the request and how many came before it."""
         self.answer = answer
-        self.asked: list[Asked] = []
+        self.asked: list[ChatRequest] = []
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._http = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
@@ -63,7 +63,7 @@ class LanguageModel:
         self._http.shutdown()
         self._http.server_close()
 
-    def take(self, asked: Asked) -> CompletionReply:
+    def take(self, asked: ChatRequest) -> CompletionReply:
         with self._lock:
             self.asked.append(asked)
             return self.answer(asked, len(self.asked) - 1)
@@ -76,7 +76,7 @@ def _handler(model: LanguageModel) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             question = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-            answer = model.take(Asked(self.path, self.headers.get("Authorization"), question))
+            answer = model.take(ChatRequest(self.path, self.headers.get("Authorization"), question))
             body = answer.bytes()
             try:
                 self.send_response(answer.status)

@@ -27,10 +27,10 @@ from marey.core.settings import Settings
 from marey.db import create_engine, transaction
 from marey.jobs import (
     AssetDigest,
+    FailureReason,
     ItemFailure,
     NewMotion,
     NewText,
-    Problem,
     asset_key,
     begin_assets,
     claim,
@@ -91,7 +91,7 @@ class LiveApi:
                     return
                 begin_assets(conn, found.lease_token, [digest])
             time.sleep(pause)
-            problem = Problem("invalid-input", "this cannot be danced", None, "Walk.")
+            problem = FailureReason("invalid-input", "this cannot be danced", None, "Walk.")
             failures = [ItemFailure(item.id, problem, False) for item in found.items if item.prompt in fail]
             motions = [
                 NewMotion(item.id, {"npz": digest, "bvh": digest}, 40, 20.0, "MIT", 0.5, {"prompt": item.prompt})

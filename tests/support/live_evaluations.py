@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from marey.core.settings import Settings
 from marey.db import transaction
 from marey.evaluations import tables as evaluation_tables
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.tenants import create_key
 from marey.tenants import tables as tenant_tables
 from tests.support.evaluations import ToyEvaluator, ToyTexts, write_evaluator, write_generator
@@ -30,7 +30,7 @@ class Studio:
     api: LiveApi
     config: Settings
     judge: ToyEvaluator
-    scheduler: Evaluations
+    scheduler: EvaluationScheduler
     loop: Loop
 
     def work(self) -> None:
@@ -74,6 +74,6 @@ def studio(home: Path, database_url: str, queue_url: str) -> Iterator[Studio]:
     with running_api(config, database_url) as api:
         loop = Loop(api.engine, api.store, ToyTexts(), ToyHandler(), judge)
         try:
-            yield Studio(api, config, judge, Evaluations(api.engine, config), loop)
+            yield Studio(api, config, judge, EvaluationScheduler(api.engine, config), loop)
         finally:
             loop.close()

@@ -21,7 +21,7 @@ from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import Parse, SessionPool
 from marey.runtime.live.supervisor import QUEUE, StreamSupervisor
 from marey.streams import NewStream, StreamRow, create_stream, get_stream
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.frames import Frame, decode_frame
 from marey.streams.presence import ViewerPresence
 from marey.streams.redis import FrameStream, Gap
@@ -98,7 +98,7 @@ class Studio:
         with transaction(self.engine) as conn:
             return get_stream(conn, self.key.tenant, stream)
 
-    def send(self, stream: UUID, control: Control) -> None:
+    def send(self, stream: UUID, control: StreamControl) -> None:
         """A message."""
         ControlQueue(self.client, str(stream)).send(control)
 

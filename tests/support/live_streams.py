@@ -22,7 +22,7 @@ from marey.core.settings import Settings
 from marey.db import transaction
 from marey.models.mogo.bundle import random_bundle
 from marey.streams import StreamChunk, StreamState, add_chunk, end_stream, take_stream
-from marey.streams.control import START, Control, ControlQueue
+from marey.streams.control import START, ControlQueue, StreamControl
 from marey.streams.frames import Frame, encode_frame
 from marey.streams.redis import FrameStream
 from marey.streams.rewrites import PromptRewrite
@@ -80,14 +80,14 @@ class Hand:
         with transaction(self.engine) as conn:
             assert end_stream(conn, self.stream, self.lease.fence, reason)
 
-    def heard(self) -> list[Control]:
+    def received(self) -> list[StreamControl]:
         """Requests since the last call; wait for the next one if there are none."""
-        found: list[tuple[str, Control | InvalidInput]] = []
+        found: list[tuple[str, StreamControl | InvalidInput]] = []
         until = time.monotonic() + 5.0
         while not found and time.monotonic() < until:
             found = self._queue.read(self._read, block_ms=1000)
         self._read = found[-1][0] if found else self._read
-        return [control for _, control in found if isinstance(control, Control)]
+        return [control for _, control in found if isinstance(control, StreamControl)]
 
 
 @dataclass

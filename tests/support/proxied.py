@@ -45,11 +45,11 @@ def watch_a_stream(url: str, api: LiveApi, hand: Hand) -> None:
             assert time.monotonic() < deadline
             seen += [message for message in link.receive(0.1) if isinstance(message, bytes)]
         assert link.send({"kind": "steer", "prompt": "a person waves"})
-        while not (heard := hand.heard()):
+        while not (received := hand.received()):
             assert time.monotonic() < deadline
             time.sleep(0.05)
     assert seen == shown
-    assert heard
+    assert received
 
 
 def receive_until_refused(link: Link) -> None:

@@ -160,7 +160,7 @@ class StreamServer:
             threading.Thread(target=self._work, daemon=True).start()
             return self.view()
 
-    def obey(self, message: dict[str, Any]) -> None:
+    def apply(self, message: dict[str, Any]) -> None:
         with self.changed:
             self.messages.append(message)
             if message["kind"] == "steer":
@@ -223,7 +223,7 @@ class StreamServer:
     def _listen(self, connection: Connection) -> None:
         try:
             for message in connection:
-                self.obey(json.loads(message))
+                self.apply(json.loads(message))
         except ConnectionClosed:
             pass
 

@@ -25,7 +25,7 @@ from marey.data.pack import JointsPack
 from marey.data.prepared import read_manifest
 from marey.measures.scores import read_scores
 from marey.motion.clip import parse_npz as parse_clip
-from marey.streams.recording import Recording
+from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
 from marey.training.parts import load_part
 
@@ -157,7 +157,7 @@ READERS: dict[str, Callable[[Path, bytes], object]] = {
     "a clip": lambda _, data: parse_clip(data),
     "safetensors": lambda _, data: parse_safetensors(data, "x"),
     "text features": lambda _, data: TextFeatures.from_blob(data),
-    "a recording": lambda _, data: Recording.from_blob(data),
+    "a recording": lambda _, data: StreamRecording.from_blob(data),
     "scores": lambda _, data: read_scores(data, "x"),
     "server.json": in_folder(read_server, "server.json"),
     "the manifest of prepared data": in_folder(read_manifest, "manifest.json"),

@@ -28,7 +28,7 @@ def test_a_word_that_merely_begins_so_passes() -> None:
     assert found('"""Whatever follows."""\n\n\ndef whole() -> None:\n    """Wholly fine."""\n') == []
 
 
-def test_strings_that_are_no_docstrings_pass() -> None:
+def test_strings_that_are_not_docstrings_pass() -> None:
     assert found('def f() -> str:\n    """Return a text."""\n    return "What nobody tells"\n') == []
 
 
@@ -61,6 +61,68 @@ def test_words_in_comments_and_docstrings_are_found_with_their_line() -> None:
         (3, "word 'whoever': use the client, the worker"),
         (6, "word 'nobody': use no client, no worker"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("source", "word"),
+    [
+        ('raise InvalidInput("nobody asked")', "nobody"),
+        ('raise InvalidInput(f"{name} is no parameter of this route")', "is no parameter of"),
+        ('log.warning("lost in company", item=1)', "in company"),
+        ('option(help="Wait for whoever comes.")', "whoever"),
+        ('error = Refused("the address", hint="It may not be told.")', "may not be told"),
+        ('return NotFound("two acts are missing")', "two acts"),
+    ],
+)
+def test_messages_are_checked(source: str, word: str) -> None:
+    (message,) = found(f"def f() -> None:\n    {source}\n")
+    assert message.startswith(f"word {word!r}: use ")
+
+
+def test_messages_of_tests_and_other_strings_pass() -> None:
+    source = 'raise ValueError("nobody")\n'
+    assert found(source, Path("tests/unit/example.py")) == []
+    assert found('prompts = ("nobody walks",)\nopen_file("nobody")\n') == []
+
+
+def found_in(text: str, path: Path = Path("docs/example.md")) -> list[tuple[int, str]]:
+    """Line and message of all findings in a document."""
+    return [(finding.line, finding.message) for finding in words.check_markdown(text, path)]
+
+
+def test_prose_of_documents_is_checked_by_line() -> None:
+    assert found_in("# A title\n\nA prompt is\nparted into several acts.\n") == [
+        (4, "word 'parted': use split"),
+        (4, "word 'several acts': use action"),
+    ]
+
+
+def test_code_and_link_targets_of_documents_pass() -> None:
+    text = "Run `nobody` or\n\n```console\n$ whoever\n```\n\nas [this page](nobody.md) says.\n"
+    assert found_in(text) == []
+
+
+def test_replaced_class_names_in_code_of_documents_are_found() -> None:
+    assert found_in("Import `port.ReadAs` and\n`create_show()`, not `Room`.\n") == [
+        (1, "name 'ReadAs': use PromptRewrite"),
+        (2, "name 'create_show': use create_live_model"),
+    ]
+
+
+def test_names_of_documents_are_checked() -> None:
+    assert found_in("", Path("docs/two-acts.md")) == [(1, "file name: use 'action'")]
+
+
+def test_a_class_name_has_one_meaning() -> None:
+    one, two = Path("shared/marey/one.py"), Path("workers/marey/two.py")
+    sources = {
+        one: "class Batch:\n    pass\n\n\nclass Generator:\n    pass\n",
+        two: "X = 1\n\n\nclass Batch:\n    pass\n\n\nclass Generator:\n    pass\n",
+        Path("tests/unit/three.py"): "class Batch:\n    pass\n",
+    }
+    (finding,) = words.check_meanings(sources)
+    assert (finding.path, finding.line) == (two, 4)
+    assert finding.message == "class 'Batch' exists in shared/marey/one.py: name their difference"
 
 
 def test_the_code_is_checked_by_make_lint() -> None:

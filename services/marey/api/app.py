@@ -29,7 +29,7 @@ from marey.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
 from marey.api.jobs.routes import router as jobs_router
 from marey.api.live.routes import router as live_router
 from marey.api.models.routes import router as models_router
-from marey.api.rates import Rates
+from marey.api.rates import RateLimiter
 from marey.api.readiness import Readiness
 from marey.api.reference import build_reference
 from marey.api.references.routes import router as references_router
@@ -47,7 +47,7 @@ from marey.core.errors import InvalidInput
 from marey.core.settings import Settings, settings
 from marey.db import check_listening, create_engine
 from marey.http import problems
-from marey.http.bodies import BodyGuard, Patience
+from marey.http.bodies import BodyDeadline, BodyGuard
 from marey.http.connections import connection_options
 from marey.http.guards import HostGuard, UpgradeGuard
 from marey.http.origins import OriginGuard
@@ -86,7 +86,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         app.include_router(router)
     app.add_middleware(UpgradeGuard)
     app.add_middleware(HostGuard, allowed=config.allowed_hosts, origins=config.cors_origins)
-    app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
+    app.add_middleware(BodyGuard, deadline=BodyDeadline(config.body_seconds, config.body_pause_seconds))
     if config.cors_origins:
         app.add_middleware(OriginGuard, origins=config.cors_origins)
     app.add_middleware(Trace)
@@ -116,7 +116,9 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     texts = TextService(config)
     store = open_store(config)
     readiness = Readiness(readiness_checks(config, engine, store))
-    shared = Context(config, engine, store, app.state.catalogue, broadcaster, Rates(config), texts, readiness, hub)
+    shared = Context(
+        config, engine, store, app.state.catalogue, broadcaster, RateLimiter(config), texts, readiness, hub
+    )
     app.state.context = shared
     broadcaster.start()
     readiness.start()

@@ -205,10 +205,10 @@ class EventBroadcaster:
             follower.seq = events[-1].seq
 
 
-def _tell(told: Iterable[tuple[Subscription, EventBatch | None]]) -> None:
+def _tell(deliveries: Iterable[tuple[Subscription, EventBatch | None]]) -> None:
     """Pass batches to the loops of the streams; each loop is woken once, however many of its streams get one."""
     by_loop: dict[asyncio.AbstractEventLoop, list[tuple[Subscription, EventBatch | None]]] = defaultdict(list)
-    for subscription, batch in told:
+    for subscription, batch in deliveries:
         by_loop[subscription.loop].append((subscription, batch))
     for loop, pairs in by_loop.items():
         with contextlib.suppress(RuntimeError):  # the loop is closed, and its streams with it

@@ -18,7 +18,7 @@ class Catalogue:
 
     def __init__(self, config: Settings) -> None:
         self._config = config
-        self._offers: dict[str, tuple[float, GeneratorCapabilities]] = {}
+        self._cache: dict[str, tuple[float, GeneratorCapabilities]] = {}
         self._lock = threading.Lock()
 
     @property
@@ -26,7 +26,7 @@ class Catalogue:
         """The model of live streams that name none."""
         return self._config.live_model
 
-    def offer(self, name: str | None) -> GeneratorCapabilities:
+    def capabilities(self, name: str | None) -> GeneratorCapabilities:
         """Return the capabilities of a model (`hgm3`), a bundle or an exact bundle; None = the default model.
 
         Raises:
@@ -34,8 +34,8 @@ class Catalogue:
         """
         wanted = name or self._config.default_model
         with self._lock:
-            made, offer = self._offers.get(wanted, (0.0, None))
-            if offer is None or time.monotonic() - made > FRESH_SECONDS:
-                offer = capabilities_of(choose_bundle(wanted, config=self._config, verify=False), self._config)
-                self._offers[wanted] = (time.monotonic(), offer)
-        return offer
+            made, generator = self._cache.get(wanted, (0.0, None))
+            if generator is None or time.monotonic() - made > FRESH_SECONDS:
+                generator = capabilities_of(choose_bundle(wanted, config=self._config, verify=False), self._config)
+                self._cache[wanted] = (time.monotonic(), generator)
+        return generator

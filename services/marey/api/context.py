@@ -13,7 +13,7 @@ from starlette.requests import HTTPConnection
 
 from marey.api.broadcaster import EventBroadcaster
 from marey.api.catalogue import Catalogue
-from marey.api.rates import Rates
+from marey.api.rates import RateLimiter
 from marey.api.readiness import Readiness
 from marey.api.stream_hub import Hub
 from marey.api.text_client import TextService
@@ -38,7 +38,7 @@ class Context:
     store: AssetStore
     catalogue: Catalogue
     broadcaster: EventBroadcaster
-    rates: Rates
+    rates: RateLimiter
     texts: TextService
     readiness: Readiness
     """Cached checks of `/readyz`."""

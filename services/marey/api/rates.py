@@ -14,7 +14,7 @@ from limits.storage import RedisStorage
 from limits.strategies import SlidingWindowCounterRateLimiter
 
 from marey.core.errors import Busy
-from marey.core.rates import Rate, read_rate
+from marey.core.rates import RateLimit, read_rate
 from marey.core.settings import Settings
 from marey.runtime.queue import redis_client
 from marey.tenants import ApiKey
@@ -28,7 +28,7 @@ PREFIX = "marey:rate"
 log = structlog.get_logger(__name__)
 
 
-class Rates:
+class RateLimiter:
     """Rate limiter, one per process; connects lazily.
 
     While Redis is down requests are served uncounted, with a log line: rate limits only keep a looping script from
@@ -80,7 +80,7 @@ class Rates:
         if self._client is not None:
             self._client.close()
 
-    def _rate(self, key: ApiKey, kind: str) -> Rate | None:
+    def _rate(self, key: ApiKey, kind: str) -> RateLimit | None:
         own = key.rates.get(kind)
         return self._rates.get(kind) if own is None else read_rate(own, where=kind)
 

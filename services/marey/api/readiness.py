@@ -25,7 +25,7 @@ log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True)
-class Result:
+class CheckResult:
     """Result of a check.
 
     Attributes:
@@ -39,7 +39,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Check:
+class DependencyCheck:
     """A dependency that must work.
 
     Attributes:
@@ -53,15 +53,15 @@ class Check:
     required: bool = True
 
 
-UNCHECKED = Result(False, "not checked yet")
+UNCHECKED = CheckResult(False, "not checked yet")
 
 
 class Readiness:
     """Runs checks periodically, and stores the last result of each."""
 
-    def __init__(self, checks: Mapping[str, Check], *, interval: float = INTERVAL_SECONDS) -> None:
+    def __init__(self, checks: Mapping[str, DependencyCheck], *, interval: float = INTERVAL_SECONDS) -> None:
         self._checks, self._interval = checks, interval
-        self._results: dict[str, tuple[float, Result]] = {}
+        self._results: dict[str, tuple[float, CheckResult]] = {}
         self._stopping = threading.Event()
 
     def start(self) -> None:
@@ -73,17 +73,17 @@ class Readiness:
         """Start no other round. A hanging check is left alone: its thread ends with the process."""
         self._stopping.set()
 
-    def results(self) -> dict[str, Result]:
+    def results(self) -> dict[str, CheckResult]:
         """Return the current result of each check. Never waits."""
         oldest = time.monotonic() - STALE_SECONDS
-        found: dict[str, Result] = {}
+        found: dict[str, CheckResult] = {}
         for name, check in self._checks.items():
             at, result = self._results.get(name, (float("inf"), UNCHECKED))
-            current = Result(False, check.message) if at < oldest else result
+            current = CheckResult(False, check.message) if at < oldest else result
             found[name] = replace(current, required=check.required)
         return found
 
-    def _repeat(self, name: str, check: Check) -> None:
+    def _repeat(self, name: str, check: DependencyCheck) -> None:
         while not self._stopping.is_set():
             result, error = self._run(check)
             before = self._results.get(name, (0.0, UNCHECKED))[1]
@@ -95,9 +95,9 @@ class Readiness:
                 log.info("ready", check=name)
             self._stopping.wait(self._interval)
 
-    def _run(self, check: Check) -> tuple[Result, Exception | None]:
+    def _run(self, check: DependencyCheck) -> tuple[CheckResult, Exception | None]:
         try:
             check.run()
         except Exception as error:
-            return Result(False, check.message), error
-        return Result(True), None
+            return CheckResult(False, check.message), error
+        return CheckResult(True), None

@@ -75,7 +75,7 @@ def _valkey() -> Path:
     return get_binary_path()
 
 
-def _say(socket_path: Path, command: bytes) -> bytes:
+def _send(socket_path: Path, command: bytes) -> bytes:
     """Send one command and return the answer; `b""` if no server listens or it disconnects. (redis-py would retry for
     seconds.)"""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
@@ -89,13 +89,13 @@ def _say(socket_path: Path, command: bytes) -> bytes:
 
 
 def _answers(socket_path: Path) -> bool:
-    return _say(socket_path, b"PING").startswith(b"+PONG")
+    return _send(socket_path, b"PING").startswith(b"+PONG")
 
 
 def _shut_down_leftover(socket_path: Path) -> None:
     """Stop a server whose owner was killed; the append-only file is flushed."""
     deadline = time.monotonic() + STOP_SECONDS
-    while _say(socket_path, b"SHUTDOWN") or _answers(socket_path):
+    while _send(socket_path, b"SHUTDOWN") or _answers(socket_path):
         if time.monotonic() > deadline:
             raise Conflict("an old Valkey of this folder does not stop", where=str(socket_path))
         time.sleep(0.05)

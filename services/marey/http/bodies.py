@@ -43,7 +43,7 @@ the answer with the reason."""
 
 
 @dataclass(frozen=True)
-class Patience:
+class BodyDeadline:
     """Time limits of a body.
 
     Attributes:
@@ -62,11 +62,11 @@ class Patience:
 class Incoming:
     """The body of one request while it is received: counts bytes, and raises when it is too slow."""
 
-    def __init__(self, scope: Scope, receive: Receive, patience: Patience) -> None:
+    def __init__(self, scope: Scope, receive: Receive, deadline: BodyDeadline) -> None:
         headers = Headers(scope=scope)
         self.whole = headers.get("content-length", "0") == "0" and "transfer-encoding" not in headers
         self._receive = receive
-        self._patience = patience
+        self._deadline = deadline
         self._began = time.monotonic()
         self._received = 0
 
@@ -78,13 +78,13 @@ class Incoming:
         """
         if self.whole:
             return await self._receive()
-        left = self._patience.until(self._began, self._received) - time.monotonic()
+        left = self._deadline.until(self._began, self._received) - time.monotonic()
         try:
             async with asyncio.timeout(left):
                 return self._seen(await self._receive())
         except TimeoutError:
             raise TooSlow(
-                f"the body did not come within {self._patience.seconds:g} s, or at {MIN_RATE} bytes a second "
+                f"the body did not come within {self._deadline.seconds:g} s, or at {MIN_RATE} bytes a second "
                 f"({self._received} bytes did)",
                 where="body",
                 hint="Send it again, in parts if the line is slow.",
@@ -122,9 +122,9 @@ class BodyGuard:
     client sends.
     """
 
-    def __init__(self, app: ASGIApp, patience: Patience) -> None:
+    def __init__(self, app: ASGIApp, deadline: BodyDeadline) -> None:
         self.app = app
-        self.patience = patience
+        self.deadline = deadline
         self.room = BodyBudget(OTHER_BODIES, OTHER_BODIES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -132,7 +132,7 @@ class BodyGuard:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        incoming = Incoming(scope, receive, self.patience)
+        incoming = Incoming(scope, receive, self.deadline)
         answer = _Answer(incoming, send)
         if _holds_prompts(scope):
             scope[INCOMING] = incoming

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic.config import JsonDict
 
 from marey.core.characters import LINE_PATTERN
-from marey.items.expected import ACTS, JOIN, MAX_ACTS, SIDED, STRAIGHT
+from marey.items.expected import ACTIONS, JOIN, MAX_ACTIONS, SIDED, STRAIGHT
 from marey.items.item import (
     MAX_NAME,
     MAX_OUTPUT_FPS,
@@ -43,8 +43,8 @@ TAG_PATTERN = rf"^(?=.*[^ ]){LINE_PATTERN.removeprefix('^')}"
 """Not blank."""
 TAGS: JsonDict = {"items": {"type": "string", "minLength": 1, "maxLength": MAX_TAG_LENGTH, "pattern": TAG_PATTERN}}
 _MORE = "|".join(sorted({STRAIGHT, *(side for sides in SIDED.values() for side in sides)}))
-_ACT = rf"({'|'.join(ACTS)})( ({_MORE})){{0,2}}"
-EXPECTED: JsonDict = {"pattern": rf"^{_ACT}( {JOIN} {_ACT}){{0,{MAX_ACTS - 1}}}$"}
+_ACTION = rf"({'|'.join(ACTIONS)})( ({_MORE})){{0,2}}"
+EXPECTED: JsonDict = {"pattern": rf"^{_ACTION}( {JOIN} {_ACTION}){{0,{MAX_ACTIONS - 1}}}$"}
 
 
 SAMPLING: dict[str, Any] = {

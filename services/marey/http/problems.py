@@ -95,9 +95,9 @@ def public_error(error: MareyError) -> MareyError:
     if isinstance(error, Overloaded):
         return error
     if isinstance(error, Unreachable):
-        told = error.public or "a dependency of this server does not answer"
+        public = error.public or "a dependency of this server does not answer"
         where = error.where if error.where in OF_THE_REQUEST else None
-        return Unreachable(told, where=where, hint="Try again in a moment; the server's log says more.")
+        return Unreachable(public, where=where, hint="Try again in a moment; the server's log says more.")
     return MareyError("an internal error; the server's log says more")
 
 

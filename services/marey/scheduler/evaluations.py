@@ -36,7 +36,7 @@ log = logger(__name__)
 FAILED = (ItemState.FAILED, ItemState.DEAD)
 
 
-class Evaluations:
+class EvaluationScheduler:
     """The scheduler's work on evaluations, once per round."""
 
     def __init__(self, engine: sa.Engine, config: Settings) -> None:
@@ -100,7 +100,7 @@ class Evaluations:
                 raise
             if isinstance(error, QuotaUsedUp) and error.asked <= error.limit:
                 return  # it fits once other jobs of the tenant are done
-            _end(conn, row, EvaluationState.FAILED, f"it cannot start: {_told(error)}")
+            _end(conn, row, EvaluationState.FAILED, f"it cannot start: {_as_line(error)}")
             return
         move_evaluation(
             conn,
@@ -149,12 +149,12 @@ def _end(conn: sa.Connection, row: EvaluationRow, state: EvaluationState, reason
 
 
 def _too_few(conn: sa.Connection, row: EvaluationRow, job: EvaluationJob, missing: int) -> str:
-    share = f"{missing} of {job.total} motions were not made, {missing / job.total:.1%} where {MAX_MISSING:.0%} may be"
+    share = f"{missing} of {job.total} motions are missing, {missing / job.total:.1%}; the limit is {MAX_MISSING:.0%}"
     why = _first_problem(conn, row.tenant, job.id)
     return f"{share} (job {job.id})" + (f"; the first: {why}" if why else "")
 
 
-def _told(error: MareyError) -> str:
+def _as_line(error: MareyError) -> str:
     """Return an error as one line."""
     if isinstance(error, InvalidItems):
         return f"{error.total} prompts cannot be made; the first: {error.problems[0]}"

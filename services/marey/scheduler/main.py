@@ -18,7 +18,7 @@ from marey.core.settings import Settings
 from marey.core.tls import trusting_context
 from marey.db import check_listening, create_engine, outages, transaction
 from marey.evaluations import remove_unused_prompts
-from marey.jobs import Problem, make_due, record_scheduler_heartbeat, retire, sweep
+from marey.jobs import FailureReason, make_due, record_scheduler_heartbeat, retire, sweep
 from marey.runtime.app import create_app
 from marey.runtime.exposition import expose
 from marey.runtime.logs import configure_logging, logger
@@ -27,7 +27,7 @@ from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import StatusReporter
 from marey.scheduler import components
 from marey.scheduler.components import EXIT_STALLED, SchedulerComponent, end_stalled, note_progress, watch
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
 from marey.scheduler.sending import Sender
@@ -40,7 +40,7 @@ from marey.webhooks.vault import Vault
 
 log = logger(__name__)
 
-NOBODY = Problem(
+NO_WORKER = FailureReason(
     "unreachable", "no worker served this stream for 15 minutes", hint="Check that a worker of its model runs."
 )
 STALE_ASSETS_SECONDS = 600.0  # assets of a dead worker wait an hour anyway
@@ -152,7 +152,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
     assert chosen.queue_url is not None  # validated by the caller
     queue_url = chosen.queue_url.get_secret_value()
     store = open_store(chosen)
-    evaluations = Evaluations(engine, chosen)
+    evaluations = EvaluationScheduler(engine, chosen)
 
     def probe() -> None:
         with transaction(engine):
@@ -178,7 +178,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
     def end_abandoned() -> None:
         with transaction(engine) as conn:
             for stream in abandoned_streams(conn, ABANDONED_SECONDS):
-                end_stream(conn, stream, None, NOBODY.message, problem=NOBODY)
+                end_stream(conn, stream, None, NO_WORKER.message, problem=NO_WORKER)
                 log.warning("stream_abandoned", stream=str(stream))
 
     def retain() -> None:

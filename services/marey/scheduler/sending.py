@@ -35,8 +35,8 @@ class Sender:
     ) -> None:
         """
         Args:
-            tls: whom to trust; None = what the machine trusts, or SSL_CERT_FILE.
-            seconds: of a try.
+            tls: trusted authorities; None = the machine's, or those of SSL_CERT_FILE.
+            seconds: limit of an attempt.
         """
         self._allowed = allowed
         self._tls = tls or httpx2.create_ssl_context()
@@ -55,7 +55,7 @@ class Sender:
         except MareyError as refused:
             error = refused.message
         except (httpx2.HTTPError, httpx2.InvalidURL, ssl.SSLError, OSError) as failure:
-            error = _told(failure)
+            error = _describe(failure)
         return Attempt(status, time.monotonic() - began, error, wait)
 
     async def _post(self, url: httpx2.URL, headers: Mapping[str, str], body: bytes) -> tuple[int, float]:
@@ -127,7 +127,7 @@ def _refusal(status: int) -> str:
     return f"answered {status}" + (", and redirects are not followed" if 300 <= status < 400 else "")
 
 
-def _told(error: Exception) -> str:
+def _describe(error: Exception) -> str:
     """Describe a failure in a line, without addresses: tenants read this log, and the network is internal."""
     what = type(error).__name__
     cause: BaseException | None = error

@@ -125,7 +125,7 @@ def text_router(config: Settings) -> APIRouter:
     async def parse_texts(body: ParseBody) -> GraphsView:
         """Parse each prompt into its semantic graph."""
         ticket = limit.take(body.prompts)
-        work = _Work(body, ticket)
+        work = _ParseTask(body, ticket)
         try:
             with anyio.fail_after(config.text_seconds):
                 return await to_thread.run_sync(work, limiter=threads, abandon_on_cancel=True)
@@ -137,7 +137,7 @@ def text_router(config: Settings) -> APIRouter:
     return router
 
 
-class _Work:
+class _ParseTask:
     """One request in a thread. It counts as in flight until the thread is done, even after the client disconnected."""
 
     def __init__(self, body: ParseBody, ticket: Ticket) -> None:

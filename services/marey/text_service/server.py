@@ -22,7 +22,7 @@ from marey.bundles import list_bundles
 from marey.core.errors import InvalidInput, MareyError
 from marey.core.settings import Settings, settings
 from marey.http import problems
-from marey.http.bodies import BodyGuard, Patience
+from marey.http.bodies import BodyDeadline, BodyGuard
 from marey.http.connections import connection_options
 from marey.http.process import prepare_process
 from marey.http.traces import Trace
@@ -65,7 +65,7 @@ def create_text_app(config: Settings, *, preload: bool = True) -> FastAPI:
         ready = loaded.is_set()
         return PlainTextResponse("ready" if ready else "loading", 200 if ready else 503)
 
-    app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
+    app.add_middleware(BodyGuard, deadline=BodyDeadline(config.body_seconds, config.body_pause_seconds))
     app.add_middleware(Trace)
     return app
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.bundles.manifest import DESCRIPTIVE, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
+from marey.bundles.manifest import DESCRIPTIVE, MANIFEST_NAME, BundleFile, BundleManifest, parse_manifest
 from marey.core.arrays import parse_safetensors
 from marey.core.documents import parse_json, read_bytes
 from marey.core.errors import InvalidBundle, NotFound
@@ -25,7 +25,7 @@ Tensors = dict[str, NDArray[np.generic]]
 
 
 class Bundle:
-    """A verified bundle on disk. Make one with `Bundle.open` or `find_bundle`."""
+    """A verified bundle on disk. Open one with `Bundle.open` or `find_bundle`."""
 
     def __init__(self, path: Path, manifest: BundleManifest) -> None:
         self.path = path
@@ -57,10 +57,10 @@ class Bundle:
 
     @cached_property
     def weights_sha256(self) -> str:
-        """A hash of everything that determines the generated motion: equal hashes mean equal motions.
+        """Hash of everything that determines the generated motion: equal hashes mean equal motions.
 
-        Format 1 covers the files alone. Format 2 covers the whole manifest but for what only describes it
-        (`DESCRIPTIVE`), as it was written: a field that a later version adds leaves the hash as it is.
+        Format 1 covers the files alone. Format 2 covers the whole manifest as written, except for descriptive fields
+        (`DESCRIPTIVE`): a field that a later version adds does not change the hash.
         """
         if self.manifest.format == 1:
             lines = "\n".join(f"{name} {entry.sha256}" for name, entry in sorted(self.manifest.files.items()))
@@ -75,14 +75,14 @@ class Bundle:
         return f"{self.manifest.name}@{self.weights_sha256[:12]}"
 
     def tensors(self, part: str, *, dtype: type[np.floating] | None = np.float32) -> Tensors:
-        """The tensors of one part, from all of its shards, whose hashes are checked.
+        """Return the tensors of one part, from all of its shards, whose hashes are checked.
 
         Args:
             part: `tokenizer`, `masked`, …
             dtype: floating tensors are cast to this; None leaves them as stored (fp16).
 
         Raises:
-            InvalidBundle: no such part, or a shard is changed, not safetensors, or holds numbers that are not finite.
+            InvalidBundle: unknown part, or a shard is changed, not safetensors, or holds numbers that are not finite.
         """
         shards = self.manifest.parts.get(part)
         if shards is None:
@@ -99,10 +99,10 @@ class Bundle:
         return tensors
 
     def statistics(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Mean and standard deviation (D,) used to normalise the features in training.
+        """Return mean and standard deviation (D,) that normalised the features in training.
 
         Raises:
-            InvalidBundle: as `tensors`, or they are something else.
+            InvalidBundle: as `tensors`, or the tensors have other names or shapes.
         """
         tensors = self.tensors(STATISTICS)
         mean, std = tensors.get("mean"), tensors.get("std")
@@ -111,7 +111,7 @@ class Bundle:
         return mean.astype(np.float32), std.astype(np.float32)
 
     def read_json(self, name: str) -> Any:
-        """Read what `BundleWriter.add_json` wrote.
+        """Read a file of `BundleWriter.add_json`.
 
         Raises:
             InvalidBundle: no such file, changed, or not JSON.
@@ -150,7 +150,7 @@ def read_manifest(path: Path) -> BundleManifest:
     """Read the manifest of a bundle's folder.
 
     Raises:
-        InvalidBundle: there is none, or not one that this version reads.
+        InvalidBundle: it is missing, or this version cannot read it.
     """
     file = path / MANIFEST_NAME
     try:
@@ -160,7 +160,7 @@ def read_manifest(path: Path) -> BundleManifest:
     return parse_manifest(data, str(file), hint=HINT)
 
 
-def _check_size(file: Path, size: int, entry: FileEntry) -> None:
+def _check_size(file: Path, size: int, entry: BundleFile) -> None:
     if size != entry.bytes:
         raise _broken(file, f"has {size} bytes, the manifest says {entry.bytes}: truncated?")
 

@@ -14,13 +14,13 @@ from marey.core.settings import Settings, settings
 
 
 def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:
-    """The generator bundle for a model (`hgm3`), a bundle's name, exact reference or path.
+    """Return the generator bundle of a model (`hgm3`), a bundle's name, exact reference or path.
 
-    A model's own bundle is `<model>-starter` where there is one; else the first, by name, that was trained; else the
-    first with random weights.
+    A model's own bundle is `<model>-starter` if it exists; else the first trained one by name; else the first with
+    random weights.
 
     Raises:
-        NotFound: neither a bundle nor a model of that name.
+        NotFound: unknown bundle and unknown model.
         InvalidBundle, Refused: as `find_bundle`.
     """
     config = config or settings()
@@ -50,14 +50,14 @@ def named_by(field: str) -> Generator[None]:
 
 
 def choose_evaluator(name: str | None, *, generator: Bundle | None = None, config: Settings | None = None) -> Bundle:
-    """The evaluator's bundle of this name or exact reference, hashes not checked; None = the installed one.
+    """Return the evaluator's bundle of this name or exact reference, hashes not checked; None = the installed one.
 
-    Of several, that is the first, by name, that was trained; else the first with random weights. Those that measure
-    other motions than the generator makes come last.
+    Of several, that is the first trained one by name; else the first with random weights. Bundles that measure other
+    motions than the generator's come last.
 
     Raises:
         NotFound: there is none.
-        InvalidBundle, Refused: as `find_bundle`; or it is no evaluator.
+        InvalidBundle, Refused: as `find_bundle`; or it is not an evaluator.
     """
     config = config or settings()
     if name is None:
@@ -65,7 +65,7 @@ def choose_evaluator(name: str | None, *, generator: Bundle | None = None, confi
         if not found:
             raise NotFound(
                 "no evaluator bundle is installed",
-                hint="`marey train evaluator` makes one; MAREY_MODELS names its folder. "
+                hint="`marey train evaluator` trains one; MAREY_MODELS names its folder. "
                 f"A trained one comes with `pip install {STARTER}`.",
             )
         name = min(
@@ -79,7 +79,8 @@ def choose_evaluator(name: str | None, *, generator: Bundle | None = None, confi
 
 
 def unlike(generator: BundleManifest, evaluator: BundleManifest) -> tuple[str, object, object] | None:
-    """The first property in which two bundles describe different motion: (property, evaluator's, generator's)."""
+    """Return the first property in which two bundles describe different motion: (property, evaluator's,
+    generator's)."""
     for what, made, measured in (
         ("skeleton", generator.skeleton, evaluator.skeleton),
         ("feature layout", generator.layout, evaluator.layout),

@@ -29,7 +29,7 @@ class BrokenBundle:
     """A folder of bundles that cannot be used."""
 
     name: str
-    """Of the folder."""
+    """Name of the folder."""
     reason: str
     """Without a path: clients of the server see it."""
     error: MareyError
@@ -57,12 +57,12 @@ def _shown(text: str) -> str:
 
 
 def find_bundle(reference: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:
-    """A bundle by name (`hgm3-starter`), exact reference (`hgm3-starter@0123456789ab`) or path.
+    """Return a bundle by name (`hgm3-starter`), exact reference (`hgm3-starter@0123456789ab`) or path.
 
     Raises:
         NotFound: no folder of bundles has it.
-        InvalidBundle: it is there, but broken, or its exact weights are not those asked for.
-        Refused: `MAREY_REQUIRE_LICENCE=commercial` and its terms are non-commercial.
+        InvalidBundle: it is broken, or its weights differ from the exact reference.
+        Refused: `MAREY_REQUIRE_LICENCE=commercial`, and its terms are non-commercial.
     """
     config = config or settings()
     name, _, exact = reference.partition("@")
@@ -83,9 +83,9 @@ def find_bundle(reference: str, *, config: Settings | None = None, verify: bool 
 
 
 def list_bundles(*, config: Settings | None = None, kind: Kind | None = None) -> Iterator[Bundle]:
-    """Every bundle that can be read, by folder, hashes not checked (use `find_bundle` for that).
+    """Return every readable bundle by folder, hashes not checked (use `find_bundle` for that).
 
-    Broken ones are logged, each reason once, and left out; `scan_bundles` gives them too.
+    Broken ones are logged, each reason once, and left out; `scan_bundles` returns them too.
     """
     yield from scan_bundles(config=config, kind=kind).found
 
@@ -120,12 +120,12 @@ def log_broken(broken: BrokenBundle) -> None:
     key = (broken.name, str(broken.error))
     if key not in _logged and len(_logged) < MAX_LOGGED:
         _logged.add(key)
-        where, message = escape(str(broken.error.where)), escape(broken.error.message)  # names of files are any bytes
+        where, message = escape(str(broken.error.where)), escape(broken.error.message)  # file names may hold any bytes
         log.warning("the bundle %r is left out: %s: %s", broken.name, where, message)
 
 
 def _bundle_folders(folder: Path) -> list[Path]:
-    """Folders that hold a manifest or would if they could be read, by name; hidden ones are of a `BundleWriter`."""
+    """Yield folders that hold a manifest, and unreadable ones, by name; hidden folders belong to a `BundleWriter`."""
     try:
         paths = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except FileNotFoundError:

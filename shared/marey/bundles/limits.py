@@ -17,16 +17,16 @@ MAX_FRAMES = 2**53
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
-    """The shortest and longest motion of a generator, in seconds.
+    """Return the shortest and longest motion of a generator, in seconds.
 
     Raises:
-        InvalidBundle: its manifest does not say.
+        InvalidBundle: its manifest lacks them.
     """
     manifest = bundle.manifest
     fps = manifest.fps or 20.0
     low, high = (_frames(bundle, name) / fps for name in ("min_frames", "max_frames"))
     if not 0 < low <= high < math.inf:
-        raise InvalidBundle(f"makes motions of {low:g} to {high:g} seconds", where=str(bundle.path))
+        raise InvalidBundle(f"has an invalid range of lengths: {low:g} to {high:g} seconds", where=str(bundle.path))
     return low, high
 
 
@@ -41,7 +41,7 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
     """Validate the length of a motion against the model's limits.
 
     Raises:
-        InvalidInput: it cannot.
+        InvalidInput: out of range.
     """
     low, high = seconds_of(bundle)
     if seconds is not None and not low <= seconds <= high:
@@ -49,12 +49,12 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
 
 
 def settings_of(bundle: Bundle) -> tuple[Setting, ...]:
-    """The settings of sampling that a generator has, with the defaults of this bundle.
+    """Return the sampling settings of a generator, with the defaults of this bundle.
 
-    Those of a model that is not installed here are what its manifest holds; their ranges are not known.
+    For a model that is not installed here they come from the manifest, and their ranges are unknown.
 
     Raises:
-        InvalidBundle: its manifest says something else of them.
+        InvalidBundle: the manifest holds invalid settings.
     """
     own: Any = bundle.manifest.parameters.get("inference") or {}
     if not isinstance(own, dict):
@@ -78,5 +78,5 @@ def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, flo
     for name in values:
         if name != OUTPUT_FPS and name not in known:
             names = ", ".join([*known, OUTPUT_FPS])
-            raise InvalidInput(f"{name!r} is not a setting of {bundle.manifest.name}; known are {names}")
+            raise InvalidInput(f"unknown setting {name!r} of {bundle.manifest.name}; known: {names}")
     return {name: value if name == OUTPUT_FPS else known[name].check(value) for name, value in values.items()}

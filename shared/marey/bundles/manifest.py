@@ -11,7 +11,7 @@ from marey.core.documents import parse_json
 from marey.core.errors import InvalidBundle
 
 FORMAT = 2
-"""The format of new bundles. Format 1, whose hash covers the files alone, is read with the same hash as ever."""
+"""Format of new bundles. Format 1, whose hash covers the files alone, is still read with the same hash."""
 MANIFEST_NAME = "manifest.json"
 DESCRIPTIVE = {"name", "version", "metrics", "training"}
 """Fields that only describe a bundle: format 2 hashes all others."""
@@ -32,7 +32,7 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class FileEntry(_Frozen):
+class BundleFile(_Frozen):
     """One file of the bundle."""
 
     sha256: Sha256
@@ -64,8 +64,8 @@ class TextSpec(_Frozen):
     max_actions: int = Field(default=8, ge=1)
     max_specifics: int = Field(default=16, ge=1)
     in_order: bool = False
-    """Ours: a prompt of several actions is read as these actions, one after the other ("before bowing, she walks" as
-    "she walks, and then a person is bowing")."""
+    """Ours: a prompt of several actions is read as its actions in order ("before bowing, she walks" as "she walks, and
+    then a person is bowing")."""
 
 
 class BundleManifest(_Frozen):
@@ -76,13 +76,13 @@ class BundleManifest(_Frozen):
     version: str
     kind: Literal["generator", "labeller", "evaluator"]
     model: str
-    """Which network reads it: `hgm3`, `mogo`, `momaskpp`, `light`, …"""
+    """Model that reads it: `hgm3`, `mogo`, `momaskpp`, `light`, …"""
     config: str
     """Name of the configuration: `paper`, `starter`, `tiny`, …"""
     parameters: dict[str, Any]
-    """The configuration itself, whole: the network is built from this, not from the name."""
+    """The complete configuration: the network is built from it, not from the name."""
     random: bool = False
-    """Weights were never trained; such a bundle only exercises the machinery."""
+    """True = weights were never trained; such a bundle is for tests and demos."""
     skeleton: str | None = None
     layout: str | None = None
     fps: float | None = None
@@ -92,14 +92,14 @@ class BundleManifest(_Frozen):
     """Terms of the weights (SPDX)."""
     metrics: dict[str, float] = {}
     training: dict[str, Any] = {}
-    """Commit, commands, budgets and data hash: what made it."""
+    """Provenance: commit, commands, budgets and data hash."""
     parts: dict[PlainName, tuple[PlainName, ...]]
     """Shards of each part, in order."""
-    files: dict[PlainName, FileEntry]
+    files: dict[PlainName, BundleFile]
 
     @field_validator("files")
     @classmethod
-    def _only_data_files(cls, files: dict[str, FileEntry]) -> dict[str, FileEntry]:
+    def _only_data_files(cls, files: dict[str, BundleFile]) -> dict[str, BundleFile]:
         foreign = [name for name in files if not name.endswith((".safetensors", ".json", ".md"))]
         if foreign:
             raise ValueError(f"a bundle holds safetensors, JSON and Markdown only, not {', '.join(foreign)}")
@@ -107,7 +107,7 @@ class BundleManifest(_Frozen):
 
     @model_validator(mode="after")
     def _hashed_parts(self) -> BundleManifest:
-        """Every shard is a file with a hash; format 2 leaves no room for two readings of a name."""
+        """Check that every shard is a file with a hash, and that format 2 has no ambiguous names."""
         shards = [shard for part in self.parts.values() for shard in part]
         missing = sorted({shard for shard in shards if shard not in self.files})
         if missing:
@@ -136,7 +136,7 @@ def parse_manifest(data: bytes, where: str, *, hint: str | None = None) -> Bundl
     """Read the manifest of a bundle.
 
     Raises:
-        InvalidBundle: no JSON, or not a manifest that this version reads.
+        InvalidBundle: not JSON, or not a manifest that this version reads.
     """
     document = parse_json(data, where, error=InvalidBundle, hint=hint)
     try:

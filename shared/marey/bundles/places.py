@@ -18,13 +18,13 @@ from marey.core.settings import Settings
 GROUP = "marey.bundles"
 OPEN, STARTER = "marey-bundles-open", "marey-bundles-starter"
 DISTRIBUTIONS = {"srl-light": OPEN, "hgm3-starter": STARTER, "mogo-starter": STARTER, "evaluator-starter": STARTER}
-"""The distribution on the package index that brings each bundle of this release."""
+"""Distribution on the package index that provides each bundle of this release."""
 
 log = logging.getLogger(__name__)
 
 
 def folders(config: Settings) -> tuple[Path, ...]:
-    """Folders of bundles; the first one that has a name wins.
+    """Return the folders of bundles; of several bundles with one name the first folder's is used.
 
     `MAREY_MODELS`, `models` of the home, `models` of the checkout unless `MAREY_MODELS` replaces it, installed
     distributions.
@@ -37,7 +37,7 @@ def folders(config: Settings) -> tuple[Path, ...]:
 
 @lru_cache(maxsize=1)
 def installed() -> tuple[Path, ...]:
-    """Folders of the installed distributions of bundles, by entry-point name."""
+    """Return the folders of the installed distributions of bundles, by entry-point name."""
     found: list[Path] = []
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         try:
@@ -52,6 +52,6 @@ def installed() -> tuple[Path, ...]:
 
 
 def how_to_get(name: str) -> str:
-    """The sentence that names the distribution of a bundle, or of a model's own bundle; empty for other names."""
+    """Return a sentence that names the distribution of a bundle, or of a model's own bundle; empty for other names."""
     distribution = DISTRIBUTIONS.get(name) or DISTRIBUTIONS.get(f"{name}-starter")
     return f" It comes with `pip install {distribution}`." if distribution else ""

@@ -15,13 +15,13 @@ FILE, PART = "reference.json", "reference"
 
 
 def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...]:
-    """One prompt a clip of a split, in the order of the file, as long as the clip.
+    """Return one prompt per clip of a split, in the order of the file, as long as the clip.
 
-    A clip has several captions; clip n gives its n-th, counted round, so that all ways of saying things come about.
+    A clip has several captions; clip n gives its n-th, modulo their number, so that all phrasings occur.
 
     Raises:
-        InvalidBundle: it carries no such prompts, broken ones, some without the embedding of their motion, too few, or
-            too many for an evaluation.
+        InvalidBundle: it holds no such prompts, broken ones, prompts without the embedding of their motion, or too few
+            or too many for an evaluation.
     """
     if FILE not in bundle.manifest.files:
         raise InvalidBundle(
@@ -50,7 +50,7 @@ def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...
 
 
 def _check_motions(bundle: Bundle, split: str, clips: int) -> None:
-    """Refuse captions whose motions the bundle does not know, before anything is generated for them."""
+    """Refuse captions whose motions have no embedding in the bundle, before anything is generated for them."""
     if PART not in bundle.manifest.parts:
         return  # reported when the network is loaded
     known = bundle.tensors(PART, dtype=None).get(split)
@@ -75,13 +75,12 @@ def _row(clip: Mapping[str, Any], number: int, fps: float) -> dict[str, Any]:
 
 
 def _why(error: Exception) -> str:
-    """The reason of an error whose type alone does not say it."""
+    """Return the reason of an error whose type alone does not state it."""
     return str(error) if isinstance(error, ValueError | TypeError) else repr(error)
 
 
 def expected_of(acts: Sequence[str], sides: Sequence[str]) -> str | None:
-    """The actions that a clip shows, as expectations for the checker; None for content without a check (a dance
-    step)."""
+    """Return the actions of a clip as expectations for the checker; None for content without a check (a dance step)."""
     text = " then ".join(" ".join(filter(None, pair)) for pair in zip(acts, sides, strict=True))
     try:
         read_expected(text)

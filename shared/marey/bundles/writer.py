@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from safetensors.numpy import save as save_safetensors
 
 from marey.bundles.bundle import STATISTICS, Bundle, Tensors
-from marey.bundles.manifest import FORMAT, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
+from marey.bundles.manifest import FORMAT, MANIFEST_NAME, BundleFile, BundleManifest, parse_manifest
 from marey.core.errors import Conflict, InvalidInput
 
 MAX_SHARD_BYTES = 15 * 2**20
-"""Under the size at which hosts of git repositories begin to refuse or warn."""
+"""Shard size below the limit at which hosts of git repositories refuse files or warn."""
 
 
 class BundleWriter:
@@ -40,7 +40,7 @@ class BundleWriter:
         self.path = path
         self.max_shard_bytes = max_shard_bytes
         self._parts: dict[str, tuple[str, ...]] = {}
-        self._files: dict[str, FileEntry] = {}
+        self._files: dict[str, BundleFile] = {}
 
     def __enter__(self) -> BundleWriter:
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ class BundleWriter:
         self._parts[part] = tuple(names)
 
     def add_statistics(self, mean: NDArray[np.float32], std: NDArray[np.float32]) -> None:
-        """Mean and standard deviation (D,), kept in float32."""
+        """Add mean and standard deviation (D,), stored in float32."""
         self.add_part(STATISTICS, {"mean": mean, "std": std}, dtype=np.float32)
 
     def add_json(self, name: str, value: Any) -> None:
@@ -102,7 +102,7 @@ class BundleWriter:
 
     def _add_file(self, name: str, content: bytes) -> None:
         (self._folder / name).write_bytes(content)
-        self._files[name] = FileEntry(sha256=hashlib.sha256(content).hexdigest(), bytes=len(content))
+        self._files[name] = BundleFile(sha256=hashlib.sha256(content).hexdigest(), bytes=len(content))
 
 
 def _convert(part: str, name: str, value: NDArray[Any], dtype: type[np.floating] | None) -> NDArray[Any]:
@@ -115,7 +115,7 @@ def _convert(part: str, name: str, value: NDArray[Any], dtype: type[np.floating]
 
 
 def _shards(tensors: Tensors, limit: int) -> Iterator[Tensors]:
-    """Cut `tensors` into groups of at most `limit` bytes, in order (a larger single tensor stands alone)."""
+    """Cut `tensors` into groups of at most `limit` bytes, in order (a larger single tensor has a group of its own)."""
     shard: Tensors = {}
     size = 0
     for name, value in tensors.items():

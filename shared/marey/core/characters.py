@@ -58,7 +58,7 @@ def check_text(text: str, *, allowed: str = "", subject: str = "it", where: str 
 
 def find_forbidden(text: str, allowed: str = "") -> str | None:
     """Return the first character that free text may not hold; None if there is none."""
-    if text.isascii() and text.isprintable():  # nearly all text: 100,000 prompts at once are checked
+    if text.isascii() and text.isprintable():  # nearly all text: a request may hold 100,000 prompts
         return None
     return next((match.group() for match in FORBIDDEN.finditer(text) if match.group() not in allowed), None)
 

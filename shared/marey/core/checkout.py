@@ -1,4 +1,4 @@
-"""The source checkout that the code runs from, if it does."""
+"""The source checkout that the code runs from, if any."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def named(configs: Mapping[str, T], name: str) -> T:
         InvalidInput: the name is unknown.
     """
     if name not in configs:
-        raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(configs)}.")
+        raise InvalidInput(f"unknown configuration {name!r}", hint=f"Known: {', '.join(configs)}.")
     return configs[name]
 
 

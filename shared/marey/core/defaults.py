@@ -1,4 +1,4 @@
-"""Defaults of settings that code without pydantic needs too: the client's, and those that stand in the reference."""
+"""Defaults of settings that code without pydantic needs too: the client, and the reference documentation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The home of a server, closed to other users: database, assets, logs, keys and `server.json` lie in it.
+"""The home of a server, closed to other users: it holds the database, assets, logs, keys and `server.json`.
 
 Standard library only.
 """
@@ -19,7 +19,7 @@ OPEN_TO_OTHERS = 0o077
 UMASK = 0o077
 """Umask of all server processes: their files are private to the user."""
 CLOSED_FROM_ABOVE = frozenset({"assets", "models", "postgres", "valkey"})
-"""Folders of the home that are closed but not walked: they may hold a million files."""
+"""Folders of the home that are closed but not searched: they may hold a million files."""
 
 
 def make_private(home: Path) -> list[str]:
@@ -36,13 +36,13 @@ def make_private(home: Path) -> list[str]:
         found = home.stat()
         if found.st_uid != os.geteuid():
             raise InvalidInput(
-                f"belongs to the user {found.st_uid}, not to {os.geteuid()}, who runs this",
+                f"belongs to the user {found.st_uid}, not to {os.geteuid()}, the user of this process",
                 where=str(home),
                 hint="Give it to this user with chown, or set MAREY_HOME to another folder.",
             )
         with tempfile.TemporaryFile(dir=home):
             pass
-        closed = [_told(path, mode) for path, mode in _close_all(home.resolve())]
+        closed = [_warning(path, mode) for path, mode in _close_all(home.resolve())]
     except OSError as error:
         raise InvalidInput(
             f"the folder of the embedded servers cannot be written ({error.strerror or error})",
@@ -64,7 +64,7 @@ def open_private(path: Path, mode: str, **options: Any) -> IO[Any]:
 
 
 def is_open(folder: Path) -> bool:
-    """Return True if other users may look into a folder that is there."""
+    """Return True if other users may read an existing folder."""
     return folder.exists() and bool(folder.stat().st_mode & OPEN_TO_OTHERS)
 
 
@@ -95,5 +95,5 @@ def _close(path: Path) -> Iterator[tuple[Path, int]]:
         return
 
 
-def _told(path: Path, mode: int) -> str:
+def _warning(path: Path, mode: int) -> str:
     return f"{path} was open to other users (mode {mode:04o}); it is closed now"

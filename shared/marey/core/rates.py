@@ -18,7 +18,7 @@ FORM = re.compile(r"([1-9][0-9]{0,8})/(second|minute|hour|day)")
 
 
 @dataclass(frozen=True)
-class Rate:
+class RateLimit:
     """A number of requests in a number of seconds."""
 
     amount: int
@@ -29,7 +29,7 @@ class Rate:
         return f"{self.amount}/{unit}"
 
 
-def read_rate(text: str, *, where: str) -> Rate:
+def read_rate(text: str, *, where: str) -> RateLimit:
     """Parse a rate limit.
 
     Raises:
@@ -37,8 +37,9 @@ def read_rate(text: str, *, where: str) -> Rate:
     """
     form = FORM.fullmatch(text)
     if form is None:
-        raise InvalidInput(f"{text[:40]!r} is not a rate", where=where, hint="Write 600/minute; or second, hour, day.")
-    return Rate(int(form[1]), UNITS[form[2]])
+        hint = "Write 600/minute; or second, hour, day."
+        raise InvalidInput(f"{text[:40]!r} is not a rate limit", where=where, hint=hint)
+    return RateLimit(int(form[1]), UNITS[form[2]])
 
 
 def check_rates(rates: Mapping[str, str], *, where: str) -> dict[str, str]:

@@ -336,7 +336,7 @@ def settings() -> Settings:
     try:
         return Settings()
     except ValidationError as error:
-        raise _told(error) from None  # pydantic's messages quote secrets
+        raise _describe(error) from None  # pydantic's messages quote secrets
 
 
 def _secret_of(path: Path, variable: str) -> str:
@@ -348,7 +348,7 @@ def _secret_of(path: Path, variable: str) -> str:
         raise InvalidInput(f"{str(path)!r} cannot be read: {reason}", where=variable, hint=hint) from error
 
 
-def _told(error: ValidationError) -> InvalidInput:
+def _describe(error: ValidationError) -> InvalidInput:
     """Describe the first error: the variable, its value and the allowed values. A secret's value is left out."""
     first = error.errors(include_url=False)[0]
     name = str(first["loc"][0])

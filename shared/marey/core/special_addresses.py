@@ -1,8 +1,8 @@
 """Addresses outside the public internet: IANA's special-purpose registries, and those that clouds reserve.
 
-The tables stand here, since `ipaddress.is_global` differs between patch versions of Python (192.0.0.0/24 is global for
-3.11.7, where a cloud's metadata service answers). Blocks that IANA calls globally reachable but that serve a protocol
-instead of a machine (AS112, AMT, anycast of PCP and TURN) are in them too: no receiver of webhooks is there.
+The tables are here because `ipaddress.is_global` differs between patch versions of Python (192.0.0.0/24 is global for
+3.11.7, where a cloud's metadata service answers). They also list blocks that IANA calls globally reachable but that
+serve a protocol instead of a machine (AS112, AMT, anycast of PCP and TURN): no receiver of webhooks is there.
 
 Sources: IANA IPv4 and IPv6 Special-Purpose Address Registries (RFC 6890 and later), IPv4 and IPv6 address space.
 """
@@ -51,7 +51,7 @@ SPECIAL_6: dict[IPv6Network, str] = {
         ("2001:db8::/32", "documentation (RFC 3849)"),
         ("2002::/16", "6to4: an IPv4 address inside (RFC 3056)"),
         ("2620:4f:8000::/48", "AS112 (RFC 7534)"),
-        ("3ffe::/16", "6bone, given back (RFC 3701)"),
+        ("3ffe::/16", "6bone, returned (RFC 3701)"),
         ("3fff::/20", "documentation (RFC 9637)"),
         ("5f00::/16", "segment routing (RFC 9602)"),
         ("fc00::/7", "unique local (RFC 4193)"),
@@ -69,4 +69,4 @@ def purpose_of(address: IPv4Address | IPv6Address) -> str | None:
     for block, purpose in SPECIAL_6.items():
         if address in block:
             return purpose
-    return None if address in UNICAST_6 else "not given out by IANA"
+    return None if address in UNICAST_6 else "not allocated by IANA"

@@ -1,4 +1,4 @@
-"""Bytes on their way in or out of a process, kept in a file above a size so that memory does not grow."""
+"""Bytes sent or received by a process, kept in a file above a size so that memory does not grow."""
 
 from __future__ import annotations
 

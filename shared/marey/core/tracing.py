@@ -59,8 +59,8 @@ class Span:
         if self._inner is not None:
             from opentelemetry.trace import Status, StatusCode
 
-            told = error.message if isinstance(error, MareyError) else type(error).__name__
-            self._inner.set_status(Status(StatusCode.ERROR, told))
+            description = error.message if isinstance(error, MareyError) else type(error).__name__
+            self._inner.set_status(Status(StatusCode.ERROR, description))
 
     def end(self) -> None:
         """End the span."""

@@ -54,7 +54,7 @@ END_SESSIONS = """
 
 
 @dataclass(frozen=True)
-class Session:
+class ServerSession:
     """A backend process of the server; its number may be reused by one that starts later than `seen`."""
 
     pid: int
@@ -77,7 +77,7 @@ class ConnectionGroup:
         self._lock = threading.Lock()
         self._connections: weakref.WeakSet[DeadlineConnection] = weakref.WeakSet()
         self._probing = threading.Lock()
-        self._lost: set[Session] = set()
+        self._lost: set[ServerSession] = set()
         self.silent = False
         """A deadline was missed, and no answer came since."""
         self.misses = 0
@@ -104,7 +104,7 @@ class ConnectionGroup:
             one.shut_down()
         log.warning("database_silent", seconds=seconds, connections_closed=len(silent))
 
-    def lose(self, session: Session | None) -> None:
+    def lose(self, session: ServerSession | None) -> None:
         """Note that a connection broke: a middlebox that cut it may not have told the server."""
         if session is not None:
             with self._lock:
@@ -117,7 +117,7 @@ class ConnectionGroup:
         timeout of Postgres applies), and its share of `max_connections` until the network gives it up.
         """
         with self._lock:
-            lost, self._lost = self._lost, set[Session]()
+            lost, self._lost = self._lost, set[ServerSession]()
         if not lost:
             return
         values = ([one.pid for one in lost], [one.seen for one in lost])
@@ -173,7 +173,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
     """Seconds of silence after which a call fails."""
     deadline: Deadline = ORDINARY
     """Limits that the server's session was set up with."""
-    session: Session | None = None
+    session: ServerSession | None = None
     """Session on the server; None if a pooler hides it."""
     pooled: bool = False
     """True behind a pooler (PgBouncer): the session's state is shared."""
@@ -206,7 +206,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         if self.pooled:
             self.prepare_threshold = None
         else:
-            self.session = Session(self.pgconn.backend_pid, now)
+            self.session = ServerSession(self.pgconn.backend_pid, now)
 
     def heard_lately(self) -> bool:
         """Return True if the server answered on this connection within the last `HEARD_LATELY` seconds."""

@@ -243,8 +243,8 @@ def move_evaluation(
     _note(conn, row.id, state, reason)
     if state not in OPEN_EVALUATIONS:
         regressed = values.get("regressed")
-        told = None if regressed is None else bool(regressed)
-        enqueue_evaluation_event(conn, row.tenant, row.id, state, schedule=row.schedule, regressed=told)
+        has_regressed = None if regressed is None else bool(regressed)
+        enqueue_evaluation_event(conn, row.tenant, row.id, state, schedule=row.schedule, regressed=has_regressed)
 
 
 def cancel_evaluation(

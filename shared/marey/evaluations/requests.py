@@ -23,18 +23,18 @@ BACKGROUND = -PRIORITY_LIMIT
 
 
 @dataclass(frozen=True)
-class Plan:
+class EvaluationPlan:
     """An evaluation that can run."""
 
     request: EvaluationRequest
     """With exact bundles and the model."""
-    offer: GeneratorCapabilities
+    generator: GeneratorCapabilities
     prompts: tuple[EvaluationPrompt, ...]
 
     def generation(self, row: EvaluationRow) -> NewJob:
         """Return the job that generates its motions."""
         return NewJob(
-            items=new_items((item, self.offer) for item in self._items()),
+            items=new_items((item, self.generator) for item in self._items()),
             tenant=row.tenant,
             name=f"evaluation {row.label}",
             comment=f"motions of evaluation {row.id}",
@@ -44,7 +44,7 @@ class Plan:
 
     def _items(self) -> Iterator[Item]:
         request = self.request
-        low, high = self.offer.min_seconds, self.offer.max_seconds
+        low, high = self.generator.min_seconds, self.generator.max_seconds
         for number, prompt in enumerate(self.prompts):
             seconds = prompt.seconds
             if seconds is not None and request.splits:
@@ -58,7 +58,9 @@ class Plan:
             )
 
 
-def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt, ...] | None, config: Settings) -> Plan:
+def plan_evaluation(
+    request: EvaluationRequest, prompts: tuple[EvaluationPrompt, ...] | None, config: Settings
+) -> EvaluationPlan:
     """Resolve the bundles of a request, and validate that it can run. Loads no model.
 
     Args:
@@ -70,25 +72,25 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
         InvalidInput: a setting that the model lacks, too many motions, a seed that is too high.
     """
     with named_by("bundle"):
-        offer = capabilities_of(choose_bundle(request.bundle, config=config, verify=False), config)
+        generator = capabilities_of(choose_bundle(request.bundle, config=config, verify=False), config)
     with named_by("evaluator"):
-        evaluator = choose_evaluator(request.evaluator, generator=offer.bundle, config=config)
-        _check_layout(offer.bundle, evaluator)
+        evaluator = choose_evaluator(request.evaluator, generator=generator.bundle, config=config)
+        _check_layout(generator.bundle, evaluator)
         # Custom prompts are compared with real motion too: check that it exists before any motion is made.
         captions = tuple(p for split in request.splits or (TEST_SPLIT,) for p in reference_prompts(evaluator, split))
     prompts = captions if prompts is None else prompts
-    settings = offer.check_settings(request.settings)
+    settings = generator.check_settings(request.settings)
     if not request.splits:
-        _check_seconds(prompts, offer)
+        _check_seconds(prompts, generator)
     _check_size(request, len(prompts))
     exact = replace(
         request,
-        bundle=offer.bundle.reference,
-        model=offer.bundle.manifest.model,
+        bundle=generator.bundle.reference,
+        model=generator.bundle.manifest.model,
         evaluator=evaluator.reference,
         settings=settings,
     )
-    return Plan(exact, offer, prompts)
+    return EvaluationPlan(exact, generator, prompts)
 
 
 def scoring_job(row: EvaluationRow) -> NewJob:
@@ -128,11 +130,11 @@ def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
         )
 
 
-def _check_seconds(prompts: tuple[EvaluationPrompt, ...], offer: GeneratorCapabilities) -> None:
+def _check_seconds(prompts: tuple[EvaluationPrompt, ...], generator: GeneratorCapabilities) -> None:
     problems: list[Problem] = []
     for line, prompt in enumerate(prompts, 1):
         try:
-            offer.check_seconds(prompt.seconds)
+            generator.check_seconds(prompt.seconds)
         except InvalidInput as error:
             problems.append(Problem(line, "seconds", error.message))
     if problems:

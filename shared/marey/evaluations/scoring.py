@@ -27,7 +27,7 @@ from marey.jobs.leased import LeasedItems, document, drop_empty_lease, end_items
 from marey.jobs.leases import AssetDigest, Committed
 from marey.jobs.results import store_assets
 from marey.jobs.states import Cause, ItemState
-from marey.jobs.types import Problem
+from marey.jobs.types import FailureReason
 
 OWN = ("index", "variant", "prompt", "seconds", "seed", "frames", "fps", "elapsed", "licence")
 HISTORY = 20
@@ -95,7 +95,7 @@ def _check(score: NewScore) -> None:
 
 
 def _refuse(conn: sa.Connection, leased: LeasedItems, item: UUID) -> None:
-    problem = document(Problem("conflict", "the evaluation had ended before this item was scored"))
+    problem = document(FailureReason("conflict", "the evaluation had ended before this item was scored"))
     end_items(conn, [item], ItemState.FAILED, Cause.ERROR, problem=problem)
     event = NewEvent("item_failed", str(problem["message"]), item, {"problem": problem})
     record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.FAILED): 1})
@@ -144,7 +144,7 @@ def _made_item(row: sa.RowMapping, expected: Sequence[str | None]) -> MadeItem:
     return MadeItem(
         expected=expected[int(row["index"])],
         state=ItemState(row["state"]),
-        problem=None if row["problem"] is None else Problem(**row["problem"]),
+        problem=None if row["problem"] is None else FailureReason(**row["problem"]),
         npz=None if row["sha256"] is None else AssetDigest(row["sha256"], row["size"], row["media_type"]),
         **own,
     )

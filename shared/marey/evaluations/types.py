@@ -12,7 +12,7 @@ from marey.db.ids import new_id
 from marey.evaluations.states import EvaluationState
 from marey.jobs.leases import AssetDigest
 from marey.jobs.states import ItemState, JobState
-from marey.jobs.types import Problem
+from marey.jobs.types import FailureReason
 
 REPORT_FORMATS = ("html", "json", "md")
 TEST_SPLIT, COMPOSITIONAL = "test", "compositional"
@@ -177,7 +177,7 @@ class MadeItem:
     seconds: float | None
     seed: int
     state: ItemState
-    problem: Problem | None
+    problem: FailureReason | None
     frames: int | None
     fps: float | None
     elapsed: float | None

@@ -1,4 +1,4 @@
-"""Conversion between motion files, with another rate, unit or axis if wanted: `marey convert` calls it."""
+"""Conversion between motion files, with another rate, unit or axis on request: `marey convert` calls it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def convert(
         Notes on oddities of a BVH source.
 
     Raises:
-        InvalidInput: a format that is not known or only written, or a rate out of bounds.
+        InvalidInput: a format that is unknown or write-only, or a rate out of bounds.
         Conflict: the target exists.
         NotFound, InvalidFile, TooLarge: from reading.
     """
@@ -67,7 +67,7 @@ def read_motion(path: Path, coordinates: Coordinates) -> MotionClip:
         coordinates: unit and axis of a file whose format leaves them open.
 
     Raises:
-        InvalidInput: a format that is not known or only written.
+        InvalidInput: a format that is unknown or write-only.
         NotFound, InvalidFile, TooLarge: from reading.
     """
     clip = _decode(_exporter_for(path), path, coordinates)
@@ -85,5 +85,5 @@ def _exporter_for(path: Path) -> Exporter[Any]:
 
 def _decode(reader: Exporter[Any], path: Path, coordinates: Coordinates) -> MotionClip | BvhClip:
     if reader.decode is None:
-        raise InvalidInput(f"{reader.format} files are only written, not read", where=str(path))
+        raise InvalidInput(f"{reader.format} files can be written, but not read", where=str(path))
     return reader.decode(read_limited(path, MAX_UNPACKED), str(path), coordinates)

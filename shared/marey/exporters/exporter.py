@@ -1,4 +1,4 @@
-"""The shape of an export format."""
+"""Interface of an export format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _EXTENSION = re.compile(r"[a-z0-9]{1,9}")
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Unit of length and upward axis of a file whose format leaves them open, such as BVH; others ignore them."""
+    """Unit of length and upward axis of a file whose format does not state them, such as BVH; other formats ignore
+    them."""
 
     unit: Unit = "cm"
     up: Up = "y"
@@ -31,15 +32,16 @@ class Exporter(Generic[Decoded]):
     """A file format that motions are written in.
 
     Attributes:
-        format: its name in routes, in the database and after `--format`: `[a-z0-9]{1,16}`. It stays as it is for good.
+        format: its name in routes, in the database and after `--format`: `[a-z0-9]{1,16}`. It never changes.
         media_type: the `Content-Type` of downloads.
         extension: the ending of file names, without the dot.
         holds_prompt: files hold the clip's manifest, which has the prompt. When a prompt is erased, stored files are
-            decoded and encoded again with what is left of the manifest; so such a format needs `decode`, which then
-            gives a `MotionClip` with the manifest.
-        encode: write a clip, or what `decode` gave. Equal clips give equal bytes: files are stored under their sha256.
+            decoded and encoded again with the remaining manifest; such a format needs a `decode` that returns a
+            `MotionClip` with the manifest.
+        encode: write a clip, or a result of `decode`. Equal clips give equal bytes: files are stored under their
+            sha256.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
-            written. Raises `InvalidFile` for a file that is broken or of another format.
+            written. Raises `InvalidFile` if the file is broken or of another format.
     """
 
     format: str

@@ -1,4 +1,4 @@
-"""Expected content of a motion, as a person writes it: `walk`, `wave left`, `walk straight then bow`.
+"""Expected actions of a motion in text form: `walk`, `wave left`, `walk straight then bow`.
 
 Actions are in the order in which they must occur, joined by `then`. Standard library only: the small client and the
 API read files of prompts with it. The evaluator defines what an action means for a motion.
@@ -19,22 +19,22 @@ SIDED: dict[str, tuple[str, ...]] = {
     "raise": ("left", "right", "both"),
 }
 """Actions that may name a side: the direction of a turn, the hand that waves or is raised."""
-ACTS = (*TRAVELS, *SIDED, "bow", "kick", "punch", "slash", "dance")
+ACTIONS = (*TRAVELS, *SIDED, "bow", "kick", "punch", "slash", "dance")
 STRAIGHT = "straight"
 JOIN = "then"
-MAX_ACTS = 4
+MAX_ACTIONS = 4
 
 
 @dataclass(frozen=True)
-class ExpectedAct:
+class ExpectedAction:
     """One action. `side` is empty if none is named."""
 
-    act: str
+    action: str
     side: str = ""
     straight: bool = False
 
 
-def read_expected(text: str) -> tuple[ExpectedAct, ...]:
+def read_expected(text: str) -> tuple[ExpectedAction, ...]:
     """Parse the actions of a text such as `walk straight then wave left`.
 
     Raises:
@@ -46,23 +46,23 @@ def read_expected(text: str) -> tuple[ExpectedAct, ...]:
             parts.append([])
         else:
             parts[-1].append(word)
-    if len(parts) > MAX_ACTS:
-        raise InvalidInput(f"{len(parts)} actions are over the limit of {MAX_ACTS}")
-    return tuple(_act(words) for words in parts)
+    if len(parts) > MAX_ACTIONS:
+        raise InvalidInput(f"{len(parts)} actions are over the limit of {MAX_ACTIONS}")
+    return tuple(_action(words) for words in parts)
 
 
-def format_expected(acts: tuple[ExpectedAct, ...]) -> str:
+def format_expected(actions: tuple[ExpectedAction, ...]) -> str:
     """Format actions as text that `read_expected` reads."""
-    words = [" ".join(filter(None, (a.act, a.side, STRAIGHT if a.straight else ""))) for a in acts]
+    words = [" ".join(filter(None, (a.action, a.side, STRAIGHT if a.straight else ""))) for a in actions]
     return f" {JOIN} ".join(words)
 
 
-def _act(words: list[str]) -> ExpectedAct:
+def _action(words: list[str]) -> ExpectedAction:
     if not words:
         raise InvalidInput(f'an action is missing: write "walk", or "walk {JOIN} wave left"')
     name, *rest = words
-    if name not in ACTS:
-        raise InvalidInput(f"{name[:40]!r} is not an action; known: {', '.join(ACTS)}")
+    if name not in ACTIONS:
+        raise InvalidInput(f"{name[:40]!r} is not an action; known: {', '.join(ACTIONS)}")
     side, straight = "", False
     for word in rest:
         if word == STRAIGHT and name in TRAVELS and not straight:
@@ -73,7 +73,7 @@ def _act(words: list[str]) -> ExpectedAct:
             raise InvalidInput(f"{word[:40]!r} does not belong to {name!r}; {_allowed(name)}")
     if name == TURN and not side:
         raise InvalidInput(f'a turn needs its side: "{TURN} left" or "{TURN} right"')
-    return ExpectedAct(name, side, straight)
+    return ExpectedAction(name, side, straight)
 
 
 def _allowed(name: str) -> str:

@@ -37,11 +37,11 @@ OUTPUT_FPS = "fps"
 """The only setting of an item that is not the network's: the frame rate of its files."""
 MIN_OUTPUT_FPS, MAX_OUTPUT_FPS = 1.0, 240.0
 SETTING = re.compile(r"[a-z][a-z0-9_]{0,39}")
-"""Names of settings. Which a model has, and their ranges, its spec says (`marey.registry`): they are checked where the
-model is known."""
+"""Names of settings. The spec of a model (`marey.registry`) defines its settings and their ranges: they are checked
+where the model is known."""
 MAX_SETTINGS = 32
 MAX_SETTING = 1e9
-"""Of the value of any setting, and of its negative."""
+"""Limit on the absolute value of any setting."""
 SETTINGS_SEPARATOR = ";"
 
 MAX_NAME = 100

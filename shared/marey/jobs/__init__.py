@@ -42,7 +42,7 @@ from marey.jobs.motions import get_motion, motions_of
 from marey.jobs.operate import cancel, pause, resume, retry, set_comment, set_fail_early, set_priority
 from marey.jobs.policy import Policy, policy
 from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
-from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
 from marey.jobs.submit import submit
 from marey.jobs.sweep import make_due, sweep
 from marey.jobs.types import (
@@ -53,13 +53,13 @@ from marey.jobs.types import (
     SEED_LIMIT,
     TEXT_QUEUE,
     EventRow,
+    FailureReason,
     ItemRow,
     JobRow,
     MotionFile,
     MotionRow,
     NewItem,
     NewJob,
-    Problem,
     SubmittedJob,
 )
 from marey.jobs.workers import beat, list_schedulers, list_workers, live_workers, record_scheduler_heartbeat, retire
@@ -77,10 +77,12 @@ __all__ = [
     "Committed",
     "Estimate",
     "EventRow",
+    "FailureReason",
     "HeartbeatReply",
     "IdempotencyMismatch",
     "ItemFailure",
     "ItemRow",
+    "ItemStage",
     "ItemState",
     "JobControl",
     "JobRow",
@@ -93,13 +95,11 @@ __all__ = [
     "NewText",
     "Outbox",
     "Policy",
-    "Problem",
     "QueueDepth",
     "QueuePlace",
     "Review",
     "SchedulerRow",
     "Speed",
-    "Stage",
     "SubmittedJob",
     "SweepReport",
     "WorkerHeartbeat",

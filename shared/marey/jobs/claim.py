@@ -15,7 +15,7 @@ from marey.jobs import tables
 from marey.jobs.journal import LockedJob, lock_job, record
 from marey.jobs.leases import Claim, ClaimedItem, HeartbeatReply
 from marey.jobs.policy import Policy, policy
-from marey.jobs.states import ItemState, JobControl, Stage
+from marey.jobs.states import ItemStage, ItemState, JobControl
 from marey.tenants.quotas import runnable_items
 
 LANES_TRIED = 8  # lanes tried in a claim; a worker that finds all of them emptied by others claims again
@@ -254,7 +254,7 @@ def _take(
         return None
     record(conn, job, moved={(ItemState.READY, ItemState.LEASED): len(rows)})
     items = sorted((_claimed(row) for row in rows), key=lambda item: item.position)
-    stage = Stage(rows[0]["stage"])
+    stage = ItemStage(rows[0]["stage"])
     bundle = items[0].bundle
     return Claim(token, job.tenant, job.id, queue, stage, batch_key, bundle, solo, tuple(items), job.traceparent)
 

@@ -46,7 +46,7 @@ class GeneratorList:
     """Broken bundles of any kind, since a broken manifest does not reveal its kind."""
 
 
-def offers(config: Settings) -> GeneratorList:
+def list_generators(config: Settings) -> GeneratorList:
     """List every generator bundle of this machine, by folder; a broken one is logged and does not hide others."""
     bundles = scan_bundles(config=config, kind="generator")
     found: list[GeneratorCapabilities] = []
@@ -80,9 +80,9 @@ def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
 def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[NewItem]:
     """Yield one row per motion: prompt times variant, with a drawn seed where none was given."""
     batch_keys: dict[tuple[str, str], str] = {}
-    for index, (item, offer) in enumerate(items):
-        reference = offer.bundle.reference
-        values = offer.check_settings(item.settings) if item.settings else {}
+    for index, (item, generator) in enumerate(items):
+        reference = generator.bundle.reference
+        values = generator.check_settings(item.settings) if item.settings else {}
         settings = json.dumps(values, sort_keys=True)
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
@@ -90,11 +90,11 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
             yield NewItem(
                 **item.spec(),
                 index=index,
-                model=offer.bundle.manifest.model,
+                model=generator.bundle.manifest.model,
                 bundle=reference,
                 batch_key=batch_key,
-                text_key=feature_key(item.prompt, offer.text),
-                text_batch_key=_sha256(offer.text.model_dump_json()),
+                text_key=feature_key(item.prompt, generator.text),
+                text_batch_key=_sha256(generator.text.model_dump_json()),
                 seed=seed + variant,
                 variant=variant,
                 settings=dict(values),

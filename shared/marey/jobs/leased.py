@@ -13,7 +13,7 @@ from marey.jobs import tables
 from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, returned
 from marey.jobs.leases import Committed
 from marey.jobs.states import Cause, ItemState
-from marey.jobs.types import Problem
+from marey.jobs.types import FailureReason
 
 LEASED_JOB = sa.text("SELECT job_id FROM lease WHERE token = :token")
 
@@ -75,7 +75,7 @@ def give_back(
     change_lanes(conn, job.id, returned((item.queue, item.batch_key, item.solo or solo) for item in items))
 
 
-def end_dead(conn: sa.Connection, item: LeasedItem, problem: Problem) -> NewEvent:
+def end_dead(conn: sa.Connection, item: LeasedItem, problem: FailureReason) -> NewEvent:
     """End a leased item that has no attempts left."""
     attempts = item.attempts + 1
     end_items(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=document(problem), attempts=attempts)
@@ -116,6 +116,6 @@ def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, caus
     conn.execute(sa.update(tables.item).where(among(tables.item.c.id, items)).values(values))
 
 
-def document(problem: Problem) -> dict[str, object]:
+def document(problem: FailureReason) -> dict[str, object]:
     """Return a problem as its row stores it."""
     return asdict(problem)

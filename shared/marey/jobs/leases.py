@@ -8,8 +8,8 @@ from datetime import datetime
 from uuid import UUID
 
 from marey.items.item import ItemSpec
-from marey.jobs.states import ItemState, Stage
-from marey.jobs.types import JsonObject, Problem
+from marey.jobs.states import ItemStage, ItemState
+from marey.jobs.types import FailureReason, JsonObject
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class Claim:
     tenant: str
     job: UUID
     queue: str
-    stage: Stage
+    stage: ItemStage
     batch_key: str
     bundle: str
     solo: bool
@@ -143,7 +143,7 @@ class ItemFailure:
     """An item that failed."""
 
     item: UUID
-    problem: Problem
+    problem: FailureReason
     retryable: bool
 
 

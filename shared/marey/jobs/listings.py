@@ -14,8 +14,8 @@ from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import no_such_job
 from marey.jobs.motions import read_motions
-from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
-from marey.jobs.types import EventRow, ItemRow, JobRow, MotionRow, Problem
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
+from marey.jobs.types import EventRow, FailureReason, ItemRow, JobRow, MotionRow
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
@@ -72,8 +72,8 @@ def list_items(
         query = query.where(table.state.in_([str(state) for state in states]))
     if reviews:
         motion = tables.motion.c
-        said = motion.review.in_([str(review) for review in reviews])
-        query = query.join(tables.motion, (motion.item_id == table.id) & said)
+        reviewed = motion.review.in_([str(review) for review in reviews])
+        query = query.join(tables.motion, (motion.item_id == table.id) & reviewed)
     if cursor is not None:
         query = query.where(table.position > read_cursor(cursor, int))
     rows = conn.execute(query.order_by(table.position).limit(page_limit(limit) + 1)).mappings().all()
@@ -152,10 +152,10 @@ def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
     values: dict[str, Any] = dict(row)
     problem = row["problem"]
     values.update(
-        stage=Stage(row["stage"]),
+        stage=ItemStage(row["stage"]),
         state=ItemState(row["state"]),
         tags=tuple(row["tags"]),
-        problem=None if problem is None else Problem(**problem),
+        problem=None if problem is None else FailureReason(**problem),
         motion=motion,
     )
     return ItemRow(**values)

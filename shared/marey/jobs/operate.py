@@ -133,8 +133,10 @@ def set_fail_early(
     check_share(share)
     locked = replace(lock_job_of(conn, tenant, job), fail_early=share)
     conn.execute(sa.update(tables.job).where(tables.job.c.id == job).values(fail_early=share))
-    told = "never fails early" if share is None else f"fails early above a share of {share:g}"
-    cancel_if_failing(conn, record(conn, locked, [NewEvent("fail_early", f"{told}: {reason}", data={"share": share})]))
+    summary = "never fails early" if share is None else f"fails early above a share of {share:g}"
+    cancel_if_failing(
+        conn, record(conn, locked, [NewEvent("fail_early", f"{summary}: {reason}", data={"share": share})])
+    )
     return get_job(conn, tenant, job)
 
 

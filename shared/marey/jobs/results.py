@@ -19,7 +19,7 @@ from marey.jobs.leased import LeasedItem, document, drop_empty_lease, end_dead, 
 from marey.jobs.leases import AssetDigest, Committed, ItemFailure, NewMotion, NewText
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
-from marey.jobs.states import Cause, ItemState, Stage
+from marey.jobs.states import Cause, ItemStage, ItemState
 
 # The lease stays until the announcement is committed; heartbeats may continue.
 HOLD_LEASE = sa.text("""
@@ -233,7 +233,7 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
     waiting = (
         (table.c.job_id == job.id)
         & (table.c.state == ItemState.READY)
-        & (table.c.stage == Stage.TEXT)
+        & (table.c.stage == ItemStage.TEXT)
         & among(table.c.text_key, keys)
     )
     siblings = conn.execute(
@@ -247,7 +247,7 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
         sa.update(table)
         .where(among(table.c.id, [*items, *(row.id for row in siblings)]))
         .values(
-            stage=Stage.GENERATE,
+            stage=ItemStage.GENERATE,
             queue=table.c.model,
             batch_key=table.c.generate_batch_key,
             state=ItemState.READY,
@@ -265,11 +265,11 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
 
 
 def _fail(conn: sa.Connection, item: LeasedItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:
-    told = document(failure.problem)
+    stored_problem = document(failure.problem)
     message = failure.problem.message
     if not failure.retryable:
-        end_items(conn, [item.id], ItemState.FAILED, Cause.ERROR, problem=told)
-        return ItemState.FAILED, NewEvent("item_failed", message, item.id, {"problem": told})
+        end_items(conn, [item.id], ItemState.FAILED, Cause.ERROR, problem=stored_problem)
+        return ItemState.FAILED, NewEvent("item_failed", message, item.id, {"problem": stored_problem})
     attempts = item.attempts + 1
     if attempts >= rules.max_attempts:
         return ItemState.DEAD, end_dead(conn, item, failure.problem)
@@ -283,8 +283,8 @@ def _fail(conn: sa.Connection, item: LeasedItem, failure: ItemFailure, rules: Po
             attempts=attempts,
             run_after=CLOCK + interval(delay),
             reason=f"{Cause.ERROR}: {message}",
-            problem=told,
+            problem=stored_problem,
         )
     )
-    data = {"attempts": attempts, "delay": delay, "problem": told}
+    data = {"attempts": attempts, "delay": delay, "problem": stored_problem}
     return ItemState.READY, NewEvent("item_retried", f"again in {delay:g} s: {message}", item.id, data)

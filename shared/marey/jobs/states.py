@@ -23,7 +23,7 @@ class ItemState(StrEnum):
     CANCELLED = "cancelled"
 
 
-class Stage(StrEnum):
+class ItemStage(StrEnum):
     """Next processing stage of an item."""
 
     TEXT = "text"

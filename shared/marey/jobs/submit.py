@@ -21,7 +21,7 @@ from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.idempotency import take_key
 from marey.jobs.journal import Lane, LaneChange, NewEvent, change_lanes, lock_job, record
-from marey.jobs.states import JobState, Stage
+from marey.jobs.states import ItemStage, JobState
 from marey.jobs.types import (
     MAX_KEEP_DAYS,
     NO_TEXT,
@@ -123,8 +123,8 @@ def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, fir
         with connection.cursor() as cursor, cursor.copy(COPY) as copy:
             for item, position in zip(chunk, positions, strict=False):
                 _check_item(item)
-                stage = Stage.GENERATE if item.text_key in known else Stage.TEXT
-                lane = (TEXT_QUEUE, item.text_batch_key) if stage is Stage.TEXT else (item.model, item.batch_key)
+                stage = ItemStage.GENERATE if item.text_key in known else ItemStage.TEXT
+                lane = (TEXT_QUEUE, item.text_batch_key) if stage is ItemStage.TEXT else (item.model, item.batch_key)
                 lanes[lane] += 1
                 copy.write_row(_row(item, job, position, stage, lane))
     return lanes
@@ -140,7 +140,7 @@ def _as_column(value: object) -> object:
     return list(cast("tuple[object, ...]", value)) if isinstance(value, tuple) else value
 
 
-def _row(item: NewItem, job: UUID, position: int, stage: Stage, lane: Lane) -> tuple[object, ...]:
+def _row(item: NewItem, job: UUID, position: int, stage: ItemStage, lane: Lane) -> tuple[object, ...]:
     return (
         *(new_id(), job, position, item.index, item.variant, item.model, item.bundle, item.seed),
         *(json.dumps(dict(item.settings)), item.text_key, item.batch_key, str(stage), *lane, item.replaces),

@@ -17,7 +17,7 @@ from marey.jobs.leases import SweepReport
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemState
-from marey.jobs.types import Problem
+from marey.jobs.types import FailureReason
 from marey.tenants import tables as tenant_tables
 from marey.webhooks.deliveries import forget_events
 
@@ -92,7 +92,7 @@ def _lose(
     if back:
         give_back(conn, job, back, Cause.LEASE_LOST, reason, solo=True, attempts=1 if solo else 0)
     for item in dead:
-        problem = Problem(
+        problem = FailureReason(
             "worker-lost",
             f"the worker was lost {item.attempts + 1} times while it ran this item alone",
             where=f"position {item.position}",

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB, TSVECTOR
 
 from marey.db.tables import NOW, Id, Time, metadata, one_of, short_id
-from marey.jobs.states import ItemState, JobControl, Review, Stage
+from marey.jobs.states import ItemStage, ItemState, JobControl, Review
 
 # The rule of `states.job_state`.
 JOB_STATE = """CASE
@@ -106,7 +106,7 @@ item = sa.Table(
     # Replaced motion of a re-roll.
     sa.Column("replaces", Id, sa.ForeignKey("motion.id", ondelete="SET NULL", use_alter=True)),
     sa.CheckConstraint(one_of("state", list(ItemState)), name="state"),
-    sa.CheckConstraint(one_of("stage", list(Stage)), name="stage"),
+    sa.CheckConstraint(one_of("stage", list(ItemStage)), name="stage"),
     sa.CheckConstraint("(state = 'leased') = (lease_token IS NOT NULL)", name="lease"),
     sa.CheckConstraint("run_after IS NULL OR state = 'ready'", name="run_after"),
     sa.CheckConstraint("(finished_at IS NULL) = (state IN ('ready', 'leased'))", name="finished"),

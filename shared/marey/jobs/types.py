@@ -10,7 +10,7 @@ from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.items.item import ItemSpec
-from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
 from marey.tenants.types import DEFAULT_TENANT
 
 TEXT_QUEUE = "text"
@@ -30,7 +30,7 @@ Row = TypeVar("Row")
 
 
 @dataclass(frozen=True)
-class Problem:
+class FailureReason:
     """Reason of an item's failure, for users: the fields of `marey.core.errors.MareyError`."""
 
     type: str
@@ -39,7 +39,7 @@ class Problem:
     hint: str | None = None
 
     @classmethod
-    def of(cls, error: MareyError) -> Problem:
+    def of(cls, error: MareyError) -> FailureReason:
         """Convert an expected error."""
         return cls(error.problem_type, error.message, error.where, error.hint)
 
@@ -200,14 +200,14 @@ class ItemRow(ItemSpec):
     bundle: str
     seed: int
     settings: JsonObject
-    stage: Stage
+    stage: ItemStage
     state: ItemState
     attempts: int
     solo: bool
     run_after: datetime | None
     reason: str | None
     """Reason of the current state."""
-    problem: Problem | None
+    problem: FailureReason | None
     created: datetime
     finished: datetime | None
     replaces: UUID | None

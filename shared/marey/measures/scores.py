@@ -43,10 +43,10 @@ def check_document(document: object, where: str) -> dict[str, Any]:
         InvalidFile: not a report, or of another version.
     """
     if not isinstance(document, dict) or cast("dict[str, Any]", document).get("schema") != SCHEMA:
-        raise InvalidFile("is no report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
+        raise InvalidFile("is not a report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
     fields = dict(cast("dict[str, Any]", document))
     if fields.get("version") != VERSION:
-        raise InvalidFile(f"has version {fields.get('version')}; this reads version {VERSION}", where=where)
+        raise InvalidFile(f"has version {fields.get('version')}; this Marey reads version {VERSION}", where=where)
     return {name: value for name, value in fields.items() if name not in ("schema", "version")}
 
 

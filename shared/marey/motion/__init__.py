@@ -4,8 +4,8 @@
 
     write_bvh("wave.bvh", load_npz("wave.npz"))
 
-What `__all__` names is public and documented in `docs/reference/python-api.md`; the modules of this package are not.
-Names are imported when they are first used, so that importing a module of this package costs nothing more.
+Names in `__all__` are public and documented in `docs/reference/python-api.md`; the modules of this package are not.
+A name is imported when it is first used, so importing one module of this package does not import the others.
 """
 
 from __future__ import annotations

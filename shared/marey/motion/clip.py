@@ -1,7 +1,7 @@
 """A finished motion, and the npz file that holds it.
 
 The file opens with `numpy.load(path, allow_pickle=False)`; it is always in metres, Y up, facing +Z in frame 0. Its keys
-are a contract: joints, rotations, root, offsets, parents, names, fps, contacts, features, features_fps, manifest.
+are stable: joints, rotations, root, offsets, parents, names, fps, contacts, features, features_fps, manifest.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ class MotionClip:
         skeleton: the tree with this body's offsets.
         rotations: (T, J, 4) local quaternions `w x y z`.
         root: (T, 3) position of the root.
-        joints: (T, J, 3) what forward kinematics of the above gives.
-        contacts: (T, 4) L ankle, L toe, R ankle, R toe stand on the floor.
+        joints: (T, J, 3) metres, the forward kinematics of skeleton, rotations and root.
+        contacts: (T, 4) bool, True where L ankle, L toe, R ankle, R toe touch the floor.
         fps: frames a second.
-        features: (Tf, D) as generated, before clean-up and resampling; (0, 0) for a motion that no model made.
+        features: (Tf, D) as generated, before clean-up and resampling; (0, 0) for a motion without a model.
         features_fps: their rate; 0 without features.
-        manifest: where the motion comes from; JSON.
+        manifest: provenance of the motion; JSON.
     """
 
     skeleton: Skeleton
@@ -90,7 +90,7 @@ class MotionClip:
         features_fps: float = 0.0,
         manifest: Mapping[str, Any] | None = None,
     ) -> MotionClip:
-        """A clip whose joints are computed from its rotations."""
+        """Create a clip; its joints are computed from the rotations by forward kinematics."""
         rotations, root = np.asarray(rotations, np.float32), np.asarray(root, np.float32)
         return cls(
             skeleton=skeleton,
@@ -106,7 +106,7 @@ class MotionClip:
 
     @property
     def offsets(self) -> Float32:
-        """(J, 3) rest pose: the T-pose with this body's proportions."""
+        """(J, 3) rest pose in metres: the T-pose with this body's proportions."""
         return self.skeleton.offsets
 
     @property
@@ -164,7 +164,7 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         return check_array(arrays[key], key, where, kinds=kinds, shape=shape)
 
     def floats(key: str, *shape: int | None) -> Float32:
-        with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite, and is refused
+        with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite and is refused
             array = need(key, "f", *shape).astype(np.float32, copy=False)
         return check_array(array, key, where, kinds="f", shape=shape)
 

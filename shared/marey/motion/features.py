@@ -2,14 +2,14 @@
 
 A layout is a parameter everywhere. `HeadingLayout` is HumanML3D's representation (Guo et al. 2022, section 4.1), with
 263 numbers a frame on 22 joints and 251 on KIT's 21: root yaw rate, root velocity and height, joint positions and
-velocities in the frame of the heading, 6D rotations, foot contacts. Its traps, all of which the code below minds:
+velocities in the frame of the heading, 6D rotations, foot contacts. Its pitfalls, all handled below:
 
 - The yaw rate is HALF the yaw step (the angle inside the quaternion); the heading in the world turns by -2 x the sum.
 - The root velocity of step t is turned by the heading of t + 1, the joint velocities by the heading of t.
 - Joint positions lose the root's X and Z, but keep their height over the floor.
 - The 6D block turns raw bone directions, not a T-pose, and every chain starts again from the root: it is not a set of
   local rotations of any rig, and no decoder here reads it. Poses come from positions (`pose.py`).
-- T poses make T - 1 feature frames.
+- T poses give T - 1 feature frames.
 
 HumanML3D's own script takes the yaw step from the sine of half quaternions kept at w >= 0, which has the wrong sign
 at the frame where the body passes facing -Z; here the angle is unwrapped, so decoding gives back the joints there too.
@@ -59,28 +59,28 @@ class FeatureLayout(Protocol):
 
     @property
     def slices(self) -> Mapping[str, slice]:
-        """The groups of the vector, in order; statistics are averaged within a group."""
+        """Groups of the vector, in order; statistics are averaged within a group."""
         ...
 
     def encode(self, joints: Array) -> Float32:
-        """(T, J, 3) metres to (T - 1, D); the motion is put into canonical place first."""
+        """Encode joints (T, J, 3) in metres, Y up, as features (T - 1, D); the motion is canonicalized first."""
         ...
 
     def decode(self, features: Array) -> Float32:
-        """(..., Tf, D) to joints (..., Tf, J, 3) in metres."""
+        """Decode features (..., Tf, D) to joints (..., Tf, J, 3) in metres, Y up, facing +Z in frame 0."""
         ...
 
     def contacts(self, features: Array) -> NDArray[np.bool_]:
-        """(..., Tf, D) to foot contacts (..., Tf, 4): L ankle, L toe, R ankle, R toe."""
+        """Return foot contacts (..., Tf, 4) of features (..., Tf, D): L ankle, L toe, R ankle, R toe."""
         ...
 
     def mirror_joints(self, joints: Array) -> Array:
-        """The motion in a mirror: left and right exchanged, (..., J, 3)."""
+        """Mirror a motion (..., J, 3): exchange left and right."""
         ...
 
 
 def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
-    """Move and turn a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
+    """Canonicalize a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
 
     Args:
         joints: (T, J, 3) metres, Y up.
@@ -95,7 +95,7 @@ def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
 
 
 def mirror_joints(joints: Array, skeleton: Skeleton) -> Array:
-    """Left and right exchanged: x changes sign, and each joint takes the other side's place. (..., J, 3)."""
+    """Mirror joints (..., J, 3): x changes sign, and each joint takes the other side's place."""
     return joints[..., list(skeleton.mirror), :] * np.array([-1, 1, 1], joints.dtype)
 
 
@@ -107,7 +107,7 @@ class HeadingLayout:
         name, fps, skeleton: see `FeatureLayout`.
         directions: (J, 3) raw direction of the bone from the parent, for the 6D block alone.
         contact_threshold: squared displacement a frame, in units squared, under which a foot stands.
-        facing_sigma: frames of Gaussian smoothing of the facing; 0 leaves it as measured.
+        facing_sigma: standard deviation in frames of the Gaussian smoothing of the facing; 0 = none.
         facing_hips: weight of the hips beside the shoulders in the smoothed facing. The published vectors have -1: the
             script that made them unpacks (r_hip, l_hip) as (l_hip, r_hip) there, though not where it places frame 0.
         facing_start: which facing is +Z in frame 0. The published vectors take the measured one and then call the
@@ -131,7 +131,7 @@ class HeadingLayout:
 
     @property
     def dim(self) -> int:
-        """D."""
+        """D, the numbers of a frame."""
         return 12 * len(self.skeleton) - 1
 
     @property
@@ -158,16 +158,16 @@ class HeadingLayout:
         start: Literal["measured", "smoothed"] = "smoothed",
         held: bool = False,
     ) -> HeadingLayout:
-        """The same layout with the heading found in another way; decoding is the same."""
+        """Return the same layout with another method to find the heading; decoding does not change."""
         return replace(self, facing_sigma=sigma, facing_hips=hips, facing_start=start, facing_held=held)
 
     def canonicalize(self, joints: Array) -> Array:
-        """The motion (T, J, 3) in the place that `encode` gives it: see `canonicalize` and `facing_start`."""
+        """Return the motion (T, J, 3) in the place that `encode` gives it: see `canonicalize` and `facing_start`."""
         return self._place(joints)[0]
 
     def _place(self, joints: Array) -> tuple[Array, Array]:
-        """Joints (T, J, 3) in canonical place, and half the yaw (T,) that turns the smoothed facing to +Z: unwrapped,
-        zero in frame 0."""
+        """Return canonical joints (T, J, 3), and half the yaw (T,) that turns the smoothed facing to +Z: radians,
+        unwrapped, zero in frame 0."""
         places = canonicalize(joints, self.skeleton)
         right = across(places, self.skeleton, hips=self.facing_hips)
         if self.facing_held:
@@ -181,7 +181,7 @@ class HeadingLayout:
         return places, half_yaw
 
     def encode(self, joints: Array) -> Float32:
-        """Features of a motion.
+        """Encode a motion as features (Guo et al. 2022, section 4.1).
 
         Args:
             joints: (T, J, 3) metres, Y up, at `fps`, anywhere and facing anywhere; T at least 2.
@@ -221,12 +221,12 @@ class HeadingLayout:
         ).astype(np.float32)
 
     def _bone_rotations(self, places: Array, heading: Array) -> Array:
-        """(T, J, 4) rotation of each bone from its raw direction, relative to the bone before it in its chain; chains
-        begin at the root's children and wherever a joint branches off, each again from the root rotation."""
+        """Return the rotation (T, J, 4) of each bone from its raw direction, relative to the bone before it in its
+        chain; chains begin at the root's children and at every branch, each again from the root rotation."""
         skeleton = self.skeleton
         parents = np.array([max(p, 0) for p in skeleton.parents])
         directions = np.array(self.directions, np.float64)
-        directions[0] = [0, 0, 1]  # any: the root has no bone
+        directions[0] = [0, 0, 1]  # arbitrary: the root has no bone
         bones = places - places[:, parents]
         bones[:, 0] = [0, 0, 1]
         world = between(directions, bones)
@@ -236,7 +236,8 @@ class HeadingLayout:
         return multiply(conjugate(before), world)
 
     def root_trajectory(self, features: Array) -> tuple[Array, Array]:
-        """Half yaw (..., Tf) and root position (..., Tf, 3) in metres, by summing up the first four numbers."""
+        """Return half yaw (..., Tf) in radians and root position (..., Tf, 3) in metres, by summing the first four
+        numbers."""
         values = np.asarray(features[..., :4], np.float64)
         half_yaw = np.zeros(values.shape[:-1])
         half_yaw[..., 1:] = np.cumsum(values[..., :-1, 0], axis=-1)
@@ -247,7 +248,7 @@ class HeadingLayout:
         return half_yaw, root * self.unit
 
     def decode(self, features: Array) -> Float32:
-        """Joints of features, from the root's motion and the positions.
+        """Decode features to joints, from the root's motion and the positions.
 
         Args:
             features: (..., Tf, D), not normalized.
@@ -263,7 +264,7 @@ class HeadingLayout:
         return self.place_joints(features, *self.root_trajectory(features))
 
     def place_joints(self, features: Array, half_yaw: Array, root: Array) -> Float32:
-        """Joints (..., J, 3) of features (..., D), given half yaw (...) and root position (..., 3) in metres."""
+        """Decode features (..., D) to joints (..., J, 3), given half yaw (...) and root position (..., 3) in metres."""
         local = np.asarray(features[..., self.slices["positions"]], np.float64)
         local = local.reshape(*local.shape[:-1], -1, 3) * self.unit
         joints = np.empty((*local.shape[:-2], len(self.skeleton), 3), np.float32)
@@ -274,7 +275,7 @@ class HeadingLayout:
         return joints
 
     def contacts(self, features: Array) -> NDArray[np.bool_]:
-        """(..., Tf, 4) L ankle, L toe, R ankle, R toe."""
+        """Return contacts (..., Tf, 4): L ankle, L toe, R ankle, R toe."""
         return features[..., self.slices["contacts"]] > 0.5
 
     def mirror_joints(self, joints: Array) -> Array:
@@ -306,14 +307,14 @@ def held_across(right: Array, joints: Array, skeleton: Skeleton) -> Array:
 
 
 def to_world(half_yaw: Array, flat: Array) -> Array:
-    """X and Z of vectors (..., 2) from the frame of a heading to the world: turned about Y by -2 half_yaw."""
+    """Turn X and Z of vectors (..., 2) from the frame of a heading to the world: about Y by -2 half_yaw."""
     cos, sin = np.cos(2 * half_yaw), -np.sin(2 * half_yaw)
     x, z = flat[..., 0], flat[..., 1]
     return np.stack([cos * x + sin * z, cos * z - sin * x], axis=-1)
 
 
 def _directions(rows: str) -> Array:
-    """One letter a joint: x y z for +, X Y Z for -, o for the root."""
+    """One letter per joint: x y z for +, X Y Z for -, o for the root."""
     axes = {"o": (0, 0, 0), "x": (1, 0, 0), "X": (-1, 0, 0), "y": (0, 1, 0), "Y": (0, -1, 0), "z": (0, 0, 1)}
     return normalize(np.array([axes[letter] for letter in rows], np.float64))
 
@@ -341,12 +342,12 @@ LAYOUTS: Mapping[str, FeatureLayout] = {each.name: each for each in (HUMANML3D_2
 
 
 def layout(name: str) -> FeatureLayout:
-    """A layout by its name.
+    """Return a layout by its name.
 
     Raises:
-        NotFound: no such layout here.
+        NotFound: the name is unknown.
     """
     try:
         return LAYOUTS[name]
     except KeyError:
-        raise NotFound(f"no feature layout `{name}`", hint=f"known: {', '.join(LAYOUTS)}") from None
+        raise NotFound(f"unknown feature layout `{name}`", hint=f"Known: {', '.join(LAYOUTS)}.") from None

@@ -1,12 +1,12 @@
 """Foot contacts and foot locking.
 
-Generated feet slide a little while they stand, and sink into the floor or float. Here each stretch in which a toe
-stands gets one place (lock); what that moves the foot by is spread over the swings before and after it by Hermite
-curves, which meet value and speed at both ends (blend), so nothing pops. The legs follow by two-bone inverse
-kinematics in closed form (`legs.py`).
+Generated feet slide a little while they stand, and sink into the floor or float. `clean_feet` gives each stretch in
+which a toe stands one place (lock); the displacement is spread over the swings before and after it by Hermite curves,
+which are continuous in value and speed at both ends (blend). The legs follow by closed-form two-bone inverse kinematics
+(`legs.py`).
 
-The idea of locking and blending is MoMask's (EricGuo5513/momask-codes, visualization/remove_fs.py, MIT, after Holden's
-write-up); thresholds here are in metres and seconds, so they hold for any frame rate.
+Locking and blending follow MoMask (EricGuo5513/momask-codes, visualization/remove_fs.py, MIT, after Holden's write-up);
+thresholds here are in metres and seconds, so they hold at any frame rate.
 """
 
 from __future__ import annotations
@@ -33,33 +33,33 @@ class ContactRule:
     leave_speed: float = 0.60
     toe_height: float = 0.04
     ankle_height: float = 0.05
-    shortest: float = 0.10  # a shorter stand is a touch in passing
-    gap: float = 0.10  # a shorter lift is noise
-    slide: float = 0.15  # a foot that goes farther than this within one stand is meant to slide
+    shortest: float = 0.10  # a shorter stand is ignored
+    gap: float = 0.10  # a shorter lift is ignored
+    slide: float = 0.15  # a foot that moves farther within one stand slides on purpose
 
 
 RULE = ContactRule()
-LONG_SWING = 0.8  # seconds; over a longer one the correction is taken back to zero in between
-RELEASE = 0.35  # seconds that this takes
-FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint lies inside the foot, so it stands at up to 3 cm
-PRESS = 0.002  # metres that a foot may sink, so that touching the floor is no kick
-STILL = 0.015  # metres that an ankle, or a toe in height, may stray for noise; more is a heel or a foot that rolls
+LONG_SWING = 0.8  # seconds; in a longer swing the correction returns to zero in between
+RELEASE = 0.35  # seconds of that return
+FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint is inside the foot, so it stands at up to 3 cm
+PRESS = 0.002  # metres that a foot may sink, so that it meets the floor without a jerk
+STILL = 0.015  # metres of noise of an ankle, or of a toe's height; a larger movement is a heel or foot that rolls
 
 
 def clean_feet(
     joints: Array, skeleton: Skeleton, fps: float, *, contacts: Bool | None = None, rule: ContactRule = RULE
 ) -> tuple[Array, Bool]:
-    """Put the floor at y = 0, keep feet where they stand, and out of the floor.
+    """Put the floor at y = 0, lock standing feet, and lift feet out of the floor.
 
     Args:
         joints: (T, J, 3) metres, Y up.
-        skeleton: knows its feet, hips and legs.
+        skeleton: must have feet, hips and legs.
         fps: frames a second.
-        contacts: (T, 4) when they are known; otherwise they are found.
-        rule: thresholds.
+        contacts: (T, 4) bool; None = detect them.
+        rule: thresholds in metres and seconds.
 
     Returns:
-        (T, J, 3) float64 with every bone as long as before, and contacts (T, 4).
+        (T, J, 3) float64 in metres, with the bone lengths of `joints`; and contacts (T, 4) bool.
 
     Raises:
         InvalidInput: the skeleton has no feet.
@@ -78,13 +78,14 @@ def clean_feet(
 
 
 def need_feet(skeleton: Skeleton) -> None:
-    """Raise InvalidInput if the feet or hips of the skeleton are unknown."""
+    """Check that the skeleton has feet and hips; raise InvalidInput otherwise."""
     if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
-        raise InvalidInput("this skeleton's feet or hips are not known", where=skeleton.name)
+        raise InvalidInput("this skeleton's feet or hips are unknown", where=skeleton.name)
 
 
 def floor_height(joints: Array, skeleton: Skeleton) -> float:
-    """Offset of the floor from y = 0 in metres; zero while toes stand within `FLOOR_BAND`, and for a body in the air.
+    """Return the height of the floor over y = 0 in metres; zero while toes stand within `FLOOR_BAND`, and for a body in
+    the air.
 
     The height at which toes stand is the tenth percentile of the lowest toe's: bouncing and tiptoe do not lift it.
     """
@@ -93,13 +94,13 @@ def floor_height(joints: Array, skeleton: Skeleton) -> float:
 
 
 def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: ContactRule = RULE) -> Bool:
-    """(T, 4) foot contacts: L ankle, L toe, R ankle, R toe.
+    """Detect foot contacts (T, 4): L ankle, L toe, R ankle, R toe.
 
-    A foot begins to stand when it is low and slow, and stands until it is high or clearly fast. Low is relative to the
-    tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
+    A foot begins to stand when it is low and slow, and stands until it is high or clearly moving. Low is relative to
+    the tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
     """
     if len(skeleton.feet) != 4:
-        raise InvalidInput("this skeleton's feet are not known", where=skeleton.name)
+        raise InvalidInput("this skeleton's feet are unknown", where=skeleton.name)
     places = joints[:, list(skeleton.feet)]
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps if len(joints) > 1 else np.zeros((1, 4))
     ground = np.quantile(places[..., 1], 0.1, axis=0)
@@ -123,13 +124,13 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
 
 
 def runs(mask: Bool) -> list[tuple[int, int]]:
-    """(begin, end) of each stretch of True, end exclusive."""
+    """Return (begin, end) of each stretch of True, end exclusive."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(b), int(e)) for b, e in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def skate(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> float:
-    """Mean horizontal speed in m/s of toes between two frames in which they stand; 0 when they never do."""
+    """Return the mean horizontal speed in m/s of toes between two frames in which they stand; 0 if they never do."""
     toes = list(skeleton.feet[1::2])
     speed = np.linalg.norm(np.diff(joints[:, toes], axis=0)[..., [0, 2]], axis=-1) * fps
     both = contacts[1:, 1::2] & contacts[:-1, 1::2]
@@ -137,7 +138,7 @@ def skate(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> floa
 
 
 def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:
-    """Frames of contacts that are slides: the toe strays too far from its mean position."""
+    """Return the frames of contacts that are slides: the toe moves too far from its mean position."""
     mask = np.zeros(len(toe), bool)
     for begin, end in runs(stands):
         stray = np.linalg.norm((toe[begin:end] - toe[begin:end].mean(axis=0))[:, [0, 2]], axis=1).max()
@@ -146,7 +147,7 @@ def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:
 
 
 def _plant(joints: Array, skeleton: Skeleton, foot: tuple[int, int], stands: Bool, fps: float) -> None:
-    """Move one foot, in place: the toe to its locks, the ankle with it and to its own where both stand."""
+    """Move one foot, in place: the toe to its locks, the ankle with it, and to its own locks where both stand."""
     ankle, toe = foot
     chain = foot_chain(skeleton, toe)
     lengths = [np.linalg.norm(joints[:, a] - joints[:, b], axis=-1, keepdims=True) for a, b in _pairs(chain)]
@@ -180,7 +181,7 @@ def _pairs(chain: list[int]) -> list[tuple[int, int]]:
 
 
 def _fill(values: Array, known: Bool, fps: float) -> Array:
-    """Values of the known stretches, and between them cubic Hermite curves that meet value and slope at both ends.
+    """Return the known stretches' values, joined by cubic Hermite curves that meet value and slope at both ends.
 
     Over gaps longer than `LONG_SWING`, and before the first and after the last stretch, the curve runs to zero within
     `RELEASE` seconds.
@@ -222,5 +223,5 @@ def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: 
 
 
 def over_floor(height: Array) -> Array:
-    """Heights below zero compressed smoothly to at most `PRESS` below the floor; heights above are unchanged."""
+    """Compress heights below zero smoothly to at most `PRESS` below the floor; heights above are unchanged."""
     return np.where(height < 0, PRESS * np.expm1(np.minimum(height, 0.0) / PRESS), height)

@@ -1,4 +1,4 @@
-"""Reading files up to a limit, and writing them whole or not at all."""
+"""Reading files up to a limit, and writing them atomically."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def read_limited(path: Path, limit: int) -> bytes:
     """Read a file.
 
     Args:
-        limit: the most bytes it may have.
+        limit: maximum size in bytes.
 
     Raises:
         NotFound: no such file.

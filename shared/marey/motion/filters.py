@@ -24,7 +24,7 @@ def smooth(values: Array, sigma: float, *, cut: float = 3.0) -> Array:
 
 
 def smooth_above(values: Array, sigma: float) -> Array:
-    """A smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
+    """Return a smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
     radius = int(3 * sigma + 0.5)
     if radius < 1 or not values.any():
         return values

@@ -25,15 +25,15 @@ def finish_motion(
 ) -> MotionClip:
     """Finish a generated motion: fixed bone lengths, and joints that equal the forward kinematics of the rotations.
 
-    Feet are cleaned at the rate of the output, after resampling, so that they stand still there too; by then bones have
-    their final lengths, so the second solution is exact.
+    Feet are cleaned at the rate of the output, after resampling, so that they stand still there too; bones have their
+    final lengths by then, so the second solution is exact.
 
     Args:
         features: (Tf, D) as generated, not normalized.
-        layout: what they mean.
+        layout: layout of the features.
         fps: rate of the clip; the layout's own by default.
         clean: lock the feet.
-        manifest: what the clip's npz says about its origin.
+        manifest: provenance, for the clip's npz.
 
     Raises:
         InvalidInput: features of another shape, or a rate out of bounds.

@@ -11,7 +11,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def global_rotations(skeleton: Skeleton, rotations: Array) -> Array:
-    """Local quaternions (T, J, 4) to world ones, a level of the tree at a time."""
+    """Convert local quaternions (T, J, 4) to world ones, one level of the tree at a time."""
     world = np.array(rotations, np.float64)
     parents = np.array(skeleton.parents)
     for level in skeleton.levels[1:]:
@@ -22,17 +22,17 @@ def global_rotations(skeleton: Skeleton, rotations: Array) -> Array:
 def forward_kinematics(
     skeleton: Skeleton, rotations: Array, root: Array, *, positions: Array | None = None, world: Array | None = None
 ) -> Array:
-    """Joint positions of a pose.
+    """Compute joint positions of a pose (forward kinematics).
 
     Args:
         skeleton: its offsets are the bones, in metres.
         rotations: (T, J, 4) local quaternions `w x y z`.
         root: (T, 3) position of joint 0 in the world (the root's own offset is not added).
-        positions: (T, J, 3) local translations that stand in for the offsets, when bones change length.
-        world: the global rotations, when the caller has them already.
+        positions: (T, J, 3) local translations in place of the offsets, if bones change length; metres.
+        world: (T, J, 4) world rotations, if the caller has them already.
 
     Returns:
-        (T, J, 3) float64, metres.
+        (T, J, 3) float64, metres, in the world frame of `root`.
     """
     world = global_rotations(skeleton, rotations) if world is None else world
     offsets = np.asarray(skeleton.offsets if positions is None else positions, np.float64)
@@ -45,13 +45,13 @@ def forward_kinematics(
 
 
 def bone_lengths(joints: Array, skeleton: Skeleton) -> Array:
-    """(T, J) distance of each joint from its parent; zero for the root."""
+    """Return the distance (T, J) of each joint from its parent; zero for the root."""
     parents = np.array([max(p, 0) for p in skeleton.parents])
     return np.linalg.norm(joints - joints[..., parents, :], axis=-1)
 
 
 def across(joints: Array, skeleton: Skeleton, *, hips: float = 1.0) -> Array:
-    """Unit vectors (..., 3) from the left to the right of the body: shoulders and hips together.
+    """Return unit vectors (..., 3) from the left to the right of the body: shoulders and hips together.
 
     As in HumanML3D: r_hip - l_hip + r_shoulder - l_shoulder; `hips` weighs the hips' part.
     """
@@ -61,6 +61,6 @@ def across(joints: Array, skeleton: Skeleton, *, hips: float = 1.0) -> Array:
 
 
 def facing(joints: Array, skeleton: Skeleton) -> Array:
-    """Facing direction of the body: unit vectors (..., 3) in the floor plane, up x across."""
+    """Return the facing direction of the body: unit vectors (..., 3) in the floor plane, up x across."""
     right = across(joints, skeleton)
     return normalize(cross(UP, right))

@@ -1,8 +1,8 @@
 """Leg solver for moved feet: closed-form two-bone inverse kinematics that keeps bone lengths.
 
-A leg close to straight answers a millimetre at the foot with centimetres at the knee, so a moved foot may hardly
-stretch it: first the heel comes up around the toe, as a walker's does, then the hips come down a little, and at last
-the foot gives way.
+In a leg close to straight, a millimetre at the foot is centimetres at the knee, so a moved foot may hardly stretch it:
+first the heel comes up around the toe, as in walking, then the hips come down a little, and last the foot leaves its
+place.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, between, dot, length, normalize, rotate
 from marey.motion.skeleton import Skeleton
 
-STRETCH = 0.99  # of its length: how far a moved foot may stretch a leg that was not straighter before (16 degrees)
-MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot gives way
+STRETCH = 0.99  # of its length: limit for a leg that was not straighter before (16 degrees)
+MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot leaves its place
 
 
 def foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
@@ -33,9 +33,9 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
 
     Args:
         before: (T, J, 3) the motion before its feet were moved.
-        joints: (T, J, 3) the same with moved feet; all joints are changed where need be.
-        stands: (T, 2) left and right toe stand, so must stay where they are.
-        skeleton: knows its hips and feet.
+        joints: (T, J, 3) the same with moved feet, metres; all joints are changed where necessary.
+        stands: (T, 2) bool: left and right toe stand and must stay in place.
+        skeleton: must have hips and feet.
         fps: frames a second.
     """
     r_hip, l_hip = skeleton.facing[:2]
@@ -59,13 +59,13 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
 
 
 def leg_lengths(leg: Array) -> tuple[Array, Array]:
-    """(...) thigh and shank of (..., 3, 3)."""
+    """Return the lengths (...) of thigh and shank of (..., 3, 3)."""
     bones = length(leg[..., 1:, :] - leg[..., :-1, :])
     return bones[..., 0], bones[..., 1]
 
 
 def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
-    """(T,) by how much the hip must come down until leg and foot together reach the toe."""
+    """Return by how much (T,) the hip must come down until leg and foot together reach the toe."""
     across, span = foot[:, 0] - hip, length(foot[:, -1] - foot[:, 0])
     reach = 0.99 * (sum(leg_lengths(leg)) + span)
     room = np.sqrt(np.maximum(reach**2 - across[:, 0] ** 2 - across[:, 2] ** 2, 0.0))
@@ -73,7 +73,8 @@ def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
 
 
 def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
-    """The same leg (T, 3, 3) with knees that a decoder bent backwards by some degrees taken forward to straight.
+    """Return the same leg (T, 3, 3) with knees that a decoder bent backwards by some degrees brought forward to
+    straight.
 
     A knee that swings through straight to the wrong side would have to jump to the right one when its foot is moved.
     The ankle comes nearer or farther by less than a millimetre.
@@ -81,7 +82,7 @@ def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
     hip, knee, ankle = leg[:, 0], leg[:, 1], leg[:, 2]
     axis = normalize(ankle - hip)
     across = (knee - hip) - axis * dot(knee - hip, axis)[:, None]
-    pole = smooth(across, 0.15 * fps) + 0.03 * ahead  # where this knee bends to around that time
+    pole = smooth(across, 0.15 * fps) + 0.03 * ahead  # the direction that this knee bends to at that time
     pole = normalize(pole - axis * dot(pole, axis)[:, None])
     slight = np.clip((0.06 - length(across)) / 0.02, 0.0, 1.0)  # of 6 cm: more is another pose
     cover = smooth_above(slight * np.maximum(-dot(across, pole), 0.0), 0.03 * fps)
@@ -96,14 +97,14 @@ def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
 
 
 def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
-    """(T,) from hip to ankle, near to what is asked for, but such that the knee does not pop.
+    """Return distances (T,) from hip to ankle, close to the requested ones, but without jumps of the knee.
 
     The nearer a leg is to `STRETCH`, the less it is stretched; and where it is nearly straight, what the knee moves off
     its line is smoothed in time, which costs the ankle less than a millimetre.
 
     Args:
-        leg: (T, 3, 3) as it was.
-        distance: (T,) asked for.
+        leg: (T, 3, 3) before the move, metres.
+        distance: (T,) requested distance, metres.
     """
     l1, l2 = leg_lengths(leg)
     was = length(leg[:, 2] - leg[:, 0])
@@ -117,16 +118,16 @@ def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
 
 
 def soft_stretch(was: Array, distance: Array, reach: Array) -> Array:
-    """(...) from hip to ankle: as asked for where that is nearer than it was, else the less far the nearer the leg is
-    to `STRETCH` of its reach, which it does not pass."""
+    """Return the distance (...) from hip to ankle: as requested where that is nearer than before, else reduced the
+    more, the nearer the leg is to `STRETCH` of its reach, which it never exceeds."""
     stretch, room = distance - was, np.maximum(STRETCH * reach - was, 1e-4)
     return np.where(stretch > 0, was - room * np.expm1(-np.maximum(stretch, 0.0) / room), distance)
 
 
 def draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
-    """A foot (..., n, 3), toe first, moved so that its ankle is at the wanted distance (...) from the hip (..., 3).
+    """Move a foot (..., n, 3), toe first, so that its ankle is at the wanted distance (...) from the hip (..., 3).
 
-    Where the toe is held (1) the foot turns around it, heel up or down; where it is not (0), the whole foot gives way.
+    Where the toe is held (1) the foot turns around it, heel up or down; where it is not (0), the whole foot moves.
     """
     toe, ankle = foot[..., 0, :], foot[..., -1, :]
     distance = length(ankle - hip)
@@ -146,22 +147,22 @@ def draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
 
 
 def _bend(distance: Array, l1: Array, l2: Array) -> tuple[Array, Array]:
-    """Position of the knee for a distance (...) from hip to ankle: along the line between them, and off it."""
+    """Return the knee's position for a distance (...) from hip to ankle: along the line between them, and off it."""
     distance = np.maximum(np.minimum(np.maximum(distance, np.abs(l1 - l2)), l1 + l2), 1e-9)
     along = (distance * distance + l1 * l1 - l2 * l2) / (2 * distance)
     return along, np.sqrt(np.maximum(l1 * l1 - along * along, 0.0))
 
 
 def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
-    """Position of the knee after hip and ankle have moved, with both bones keeping their lengths.
+    """Return the knee's position after hip and ankle have moved, with both bone lengths unchanged.
 
-    The leg is turned as a whole to its new direction and then bent or stretched in its plane; a leg that moved nowhere
-    keeps its knee to the last digit. A straight leg that must bend does so ahead.
+    The leg is turned as a whole to its new direction and then bent or stretched in its plane; the knee of a leg that
+    did not move stays bit for bit. A straight leg that must bend bends towards `ahead`.
 
     Args:
-        leg: (..., 3, 3) hip, knee and ankle as they were.
-        hip, ankle: (..., 3) where they are now; out of reach, the leg points there and is straight.
-        ahead: (..., 3) where knees bend to.
+        leg: (..., 3, 3) hip, knee and ankle before, metres.
+        hip, ankle: (..., 3) new positions; out of reach, the leg points to the ankle and is straight.
+        ahead: (..., 3) direction that knees bend to.
 
     Returns:
         (..., 3).

@@ -1,8 +1,8 @@
 """Finish live frames one by one: decode, fit the bones, lock the feet, solve.
 
-The live form of `finish.py`, for the layout's own rate. Joints of a decoder have bones that change a little from frame
-to frame; they are put where the solver would put them, on bones of the skeleton's lengths, before the feet are locked:
-so locked feet stay where they are when it solves the pose.
+The live form of `finish.py`, at the layout's own rate. Bones of a decoder change a little from frame to frame; joints
+are first put where the solver would put them, on bones of the skeleton's lengths, and then the feet are locked: locked
+feet stay in place when the pose is solved.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from marey.motion.rows import Rows
 from marey.motion.skeleton import Skeleton
 
 MEMORY = 40
-"""Frames after which poses and feet no longer show where they began."""
+"""Frames after which poses and feet no longer depend on their start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class LiveFrames:
     Attributes:
         rotations: (S, J, 4) local unit quaternions, continuous in sign from frame to frame.
         root: (S, 3) metres.
-        joints: (S, J, 3) where they put the joints.
-        contacts: (S, 4) L ankle, L toe, R ankle, R toe stand.
+        joints: (S, J, 3) metres, the forward kinematics of the above.
+        contacts: (S, 4) bool: L ankle, L toe, R ankle, R toe stand.
     """
 
     rotations: Float32 = field(repr=False)
@@ -54,7 +54,7 @@ class LiveMotion:
     """Finishes frames of live streams.
 
     Args:
-        layout: what the features mean.
+        layout: layout of the features.
         skeleton: the layout's, with the bone lengths of the body; clients receive them once.
 
     Raises:
@@ -69,13 +69,13 @@ class LiveMotion:
         self._feet = LiveFeet(skeleton, layout.fps)
 
     def start(self, streams: int = 1) -> LiveState:
-        """The state before the first frame."""
+        """Return the state before the first frame."""
         return LiveState(self._decoder.start(streams), self._feet.start(streams), self._poses.start(streams))
 
     def after(self, features: Array) -> LiveState:
-        """The state of one stream behind frames that were made before, (T, D), T at least 1.
+        """Return the state of one stream after its earlier frames (T, D), T at least 1.
 
-        The root is followed through all of them; poses and feet, which forget, through the last `MEMORY` alone.
+        The root is followed through all of them; poses and feet, which forget, through the last `MEMORY` frames alone.
         """
         state = self.start()
         early, late = features[:-MEMORY], features[-MEMORY:]
@@ -86,7 +86,7 @@ class LiveMotion:
         return state
 
     def step(self, features: Array, state: LiveState) -> tuple[LiveFrames, LiveState]:
-        """The next frame of every stream.
+        """Return the next frame of every stream.
 
         Args:
             features: (S, D), not normalized.

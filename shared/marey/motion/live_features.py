@@ -16,27 +16,27 @@ from marey.motion.rows import Rows
 class RootState(Rows):
     """Root yaw and position of S streams. All zeros before the first frame, which faces +Z over the origin."""
 
-    half_yaw: Array  # (S,) of the frame before
-    place: Array  # (S, 2) its root's X and Z, in units of the features
-    step: Array  # (S, 3) what it says of the way to the next: half yaw step, velocity X and Z
+    half_yaw: Array  # (S,) radians, of the last frame
+    place: Array  # (S, 2) X and Z of its root, in units of the features
+    step: Array  # (S, 3) its step to the next frame: half yaw step, velocity X and Z
 
 
 class LiveDecoder:
     """Decodes frames of live streams: the same joints as `layout.decode` of all frames at once, to rounding.
 
     Args:
-        layout: what the features mean.
+        layout: layout of the features.
     """
 
     def __init__(self, layout: HeadingLayout) -> None:
         self.layout = layout
 
     def start(self, streams: int = 1) -> RootState:
-        """The state before the first frame."""
+        """Return the state before the first frame."""
         return RootState(np.zeros(streams), np.zeros((streams, 2)), np.zeros((streams, 3)))
 
     def step(self, features: Array, state: RootState) -> tuple[Float32, RootState]:
-        """The next frame of every stream.
+        """Return the next frame of every stream.
 
         Args:
             features: (S, D), not normalized.
@@ -58,21 +58,21 @@ class LiveDecoder:
         return self.layout.place_joints(features, half_yaw, root), RootState(half_yaw, place, values[:, :3])
 
     def follow(self, features: Array, state: RootState) -> RootState:
-        """The state of one stream behind its next frames (T, D), T at least 1: that of T steps, to rounding, without
-        their joints and in a hundredth of the time.
+        """Return the state of one stream after its next frames (T, D), T at least 1: that of T calls of `step`, to
+        rounding, without their joints and in a hundredth of the time.
 
         Raises:
             InvalidInput: see `run`.
         """
         self._check_run(features, state)
         values = np.asarray(features[:, :3], np.float64)
-        steps = np.concatenate([state.step, values[:-1]])  # (T, 3) what the frame before each says
+        steps = np.concatenate([state.step, values[:-1]])  # (T, 3) step of the frame before each
         half_yaw = np.cumsum(np.concatenate([state.half_yaw, steps[:, 0]]))[1:]  # (T,)
         place = state.place + to_world(half_yaw, steps[:, 1:]).sum(axis=0)
         return RootState(half_yaw[-1:], place, values[-1:])
 
     def run(self, features: Array, state: RootState) -> tuple[Float32, RootState]:
-        """The next frames (T, D) of one stream, T at least 1: the same, bit for bit, as T steps.
+        """Return the next frames (T, D) of one stream, T at least 1: the same, bit for bit, as T calls of `step`.
 
         Raises:
             InvalidInput: see `step`; no frames; the state holds more than one stream.

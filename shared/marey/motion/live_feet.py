@@ -1,12 +1,12 @@
 """Foot locking on a live stream: contact, lock and blend depend on past frames alone.
 
-A toe that is low and slow is locked: its place on the floor stays until it is high or clearly fast. Then what it was
-moved by fades along an ease curve, so nothing pops. The ankle moves with the toe, the knee follows by two-bone inverse
-kinematics (`legs.py`), and a leg that grows short raises the heel.
+A toe that is low and slow is locked: it keeps its place on the floor until it is high or clearly moving. Then the
+displacement fades along an ease curve, so nothing jumps. The ankle moves with the toe, the knee follows by two-bone
+inverse kinematics (`legs.py`), and a leg that becomes too short raises the heel.
 
-What a clip can do and a stream cannot, since it would have to begin before the foot does: share a lock's correction out
-to the swing before it, bring the hips down, lock a height that is not reached yet. So a toe is held in the floor plane
-alone, the hips stay as they are, and a toe that the leg reaches no more, or that is meant to slide, is released.
+A stream cannot do three things that a clip can, since they would have to begin before the foot does: share a lock's
+correction with the swing before it, bring the hips down, lock a height that is not reached yet. So a toe is held in the
+floor plane alone, the hips stay, and a toe that the leg no longer reaches, or that slides on purpose, is released.
 
 Streams are rows, and a chunk of one stream is cleaned frame by frame: see `live_poses.py`.
 """
@@ -29,22 +29,22 @@ from marey.motion.skeleton import Skeleton
 
 FLAT = slice(0, 3, 2)  # X and Z: the floor plane
 TOES = slice(1, 4, 2)  # of ankles and toes in the order of `Skeleton.feet`
-STRAY = 0.10  # metres that a lock may move a toe by; a clip, which sees where the foot ends up, allows 0.15
-REACHED = 1e-6  # metres by which a held toe may miss its place
-GROUND_RISE = 0.02  # m/s at which the height of standing toes is let up, so that one low frame does not count for ever
+STRAY = 0.10  # metres that a lock may move a toe; a clip, whose later frames are known, allows 0.15
+REACHED = 1e-6  # metres of tolerance between a held toe and its place
+GROUND_RISE = 0.02  # m/s at which the standing height of toes may rise, so that one low frame is forgotten
 
 
 @dataclass(frozen=True, eq=False)
 class FeetState(Rows):
     """State carried between frames of S streams; an axis of length two is left, right."""
 
-    started: Bool  # (S,) a frame went before
-    places: Array  # (S, 4, 3) ankles and toes as they came in, in the order of `Skeleton.feet`
+    started: Bool  # (S,) there is an earlier frame
+    places: Array  # (S, 4, 3) input positions of ankles and toes, in the order of `Skeleton.feet`, metres
     stands: Bool  # (S, 4)
     barred: Bool  # (S, 2) released while still low and slow: not locked again before it lifts
     ground: Array  # (S,) height over the floor at which a toe stands, metres
     anchor: Array  # (S, 2, 2) X and Z of a locked toe
-    shift: Array  # (S, 2, 2) what the toe was moved by, X and Z
+    shift: Array  # (S, 2, 2) displacement of the toe, X and Z
     start: Array  # (S, 2, 2) the shift at which it was released
     age: Array  # (S, 2) seconds since then
 
@@ -53,7 +53,7 @@ class LiveFeet:
     """Cleans the feet of live streams of one skeleton.
 
     Args:
-        skeleton: knows its feet, hips and legs.
+        skeleton: must have feet, hips and legs.
         fps: frames a second.
         rule: thresholds of contact.
 
@@ -79,7 +79,7 @@ class LiveFeet:
         )
 
     def start(self, streams: int = 1) -> FeetState:
-        """The state before the first frame."""
+        """Return the state before the first frame."""
         plane = np.zeros((streams, 2, 2))
         no = np.zeros((streams, 4), bool)
         age = np.full((streams, 2), RELEASE)
@@ -87,15 +87,15 @@ class LiveFeet:
         return FeetState(no[:, 0], places, no, no[:, :2], ground, plane, plane, plane, age)
 
     def step(self, joints: Array, state: FeetState) -> tuple[Array, Bool, FeetState]:
-        """The next frame of every stream.
+        """Return the next frame of every stream.
 
         Args:
             joints: (S, J, 3) metres, Y up, floor at y = 0.
             state: of the same streams in the same order; it is not changed.
 
         Returns:
-            (S, J, 3) float64 with every bone as long as before; contacts (S, 4): L ankle, L toe, R ankle, R toe; and
-            the state after them.
+            (S, J, 3) float64 in metres, with unchanged bone lengths; contacts (S, 4): L ankle, L toe, R ankle, R toe;
+            and the state after them.
 
         Raises:
             InvalidInput: wrong shape, numbers that are not finite, or a state of other streams.
@@ -113,7 +113,7 @@ class LiveFeet:
         locked, feet = self._lock(before, stood & stay[:, TOES], held, fading)
         barred = stay[:, TOES] & (state.barred | (stood & ~locked))
         stands[:, TOES] = locked | (enter[:, TOES] & ~barred)
-        # A toe that is locked now keeps the place where this frame puts it, its leg's reach included.
+        # A newly locked toe keeps the place of this frame, limited by its leg's reach.
         hold = locked[..., None]
         anchor = np.where(hold, state.anchor, feet[:, :, 0, FLAT])
         shift = np.where(stands[:, TOES, None], anchor - toes, np.where(hold, held, fading))
@@ -123,7 +123,7 @@ class LiveFeet:
         return self._with_feet(before, feet), stands, state
 
     def run(self, joints: Array, state: FeetState) -> tuple[Array, Bool, FeetState]:
-        """The next frames (T, J, 3) of one stream: the same, bit for bit, as T steps.
+        """Return the next frames (T, J, 3) of one stream: the same, bit for bit, as T calls of `step`.
 
         Raises:
             InvalidInput: see `step`; the state holds more than one stream.
@@ -137,20 +137,21 @@ class LiveFeet:
         return np.concatenate(cleaned), np.concatenate(contacts), state
 
     def _ground(self, places: Array, state: FeetState) -> Array:
-        """(S,) the lowest that toes have stood, rising slowly; in `FLOOR_BAND`, or up to where the T-pose has them."""
+        """Return the lowest standing height of toes (S,), rising slowly; in `FLOOR_BAND`, or up to that of the
+        T-pose."""
         lower = np.minimum(places[:, 1, 1], places[:, 3, 1])
         lowest = np.minimum(np.maximum(lower, FLOOR_BAND[0]), self._highest_ground)
         return np.where(state.started, np.minimum(lowest, state.ground + GROUND_RISE / self.fps), lowest)
 
     def _contacts(self, places: Array, ground: Array, state: FeetState) -> tuple[Bool, Bool]:
-        """(S, 4) feet that stand on if they stood, and that begin to if they did not."""
+        """Return the feet (S, 4) that continue to stand, and those that begin to."""
         speed = np.where(state.started[:, None], length(places - state.places) * self.fps, 0.0)
         low = places[..., 1] - ground[:, None] - self._over_toe < self._low
         return low & (speed < self.rule.leave_speed), low & (speed < self.rule.enter_speed)
 
     def _release(self, state: FeetState) -> tuple[Array, Array, Array]:
-        """Offsets of toes that are not locked (S, 2, 2), the offsets they fade from (S, 2, 2), and the times since
-        release."""
+        """Return offsets of toes that are not locked (S, 2, 2), the offsets they fade from (S, 2, 2), and the times
+        since release in seconds."""
         stood = state.stands[:, TOES]
         start = np.where(stood[..., None], state.shift, state.start)
         age = np.minimum(np.where(stood, 0.0, state.age) + 1.0 / self.fps, RELEASE)
@@ -158,12 +159,12 @@ class LiveFeet:
         return start * (1.0 - part * part * (3.0 - 2.0 * part))[..., None], start, age
 
     def _lock(self, joints: Array, may: Bool, held: Array, fading: Array) -> tuple[Bool, Array]:
-        """Toes that stay locked (S, 2), and feet (S, 2, n, 3), toe first, locked or released.
+        """Return the toes that stay locked (S, 2), and feet (S, 2, n, 3), toe first, locked or released.
 
         Args:
-            joints: (S, J, 3) as they came in.
+            joints: (S, J, 3) input positions, metres.
             may: (S, 2) toes that were held and are still low and slow.
-            held, fading: (S, 2, 2) what moves a toe, X and Z, when it is held and when it is not.
+            held, fading: (S, 2, 2) displacement of a toe, X and Z, if it is held and if it is not.
         """
         feet, reached = self._moved(joints, np.array([held, fading]))
         locked: Bool = may & (length(held) <= STRAY) & reached[0]
@@ -171,8 +172,8 @@ class LiveFeet:
         return locked, np.where(locked[..., None, None], feet[0], free)
 
     def _moved(self, joints: Array, shifts: Array) -> tuple[Array, Bool]:
-        """Feet (W, S, 2, n, 3), toe first, moved in W ways in the floor plane and out of the floor as far as their legs
-        let them; and (W, S, 2) whether the legs let the toes all the way.
+        """Return feet (W, S, 2, n, 3), toe first, moved in W ways in the floor plane and out of the floor as far as
+        their legs reach; and (W, S, 2) True where the legs reach all the way.
 
         Args:
             joints: (S, J, 3).
@@ -190,7 +191,7 @@ class LiveFeet:
         return drawn, length(drawn[..., 0, :] - feet[..., 0, :]) < REACHED
 
     def _with_feet(self, before: Array, feet: Array) -> Array:
-        """(S, J, 3) with the feet (S, 2, n, 3) where they were moved to, and knees that follow."""
+        """Return joints (S, J, 3) with the moved feet (S, 2, n, 3), and knees that follow."""
         legs, ankles = before.take(self._legs, 1), feet[:, :, -1]
         joints = before.copy()
         joints[:, self._chains] = feet

@@ -1,12 +1,13 @@
 """Pose solver for live streams: the rotations of a frame depend on that frame and the past alone.
 
-Each frame is solved by the same closed forms as a clip (`solver.py`), so joints come out as exactly. What a clip
-decides with frames from both sides in time is decided here from a state that is carried along:
+Each frame is solved by the same closed forms as a clip (`solver.py`), with the same accuracy. Decisions that a clip
+takes from frames on both sides in time are taken here from a carried state:
 
-- what frames show of a limb's bend plane runs through an exponential mean, so that a straight limb keeps the plane it
-  had and drifts to the neutral one; a critically damped spring takes the twist there without a jump. Only the twist
-  about the bone lags behind (by 0.15 s), never the place of a joint;
-- a spine twisted past half a turn, which no body does, goes on without a jump and is let back within some seconds;
+- the bend plane that frames show of a limb runs through an exponential mean, so that a straight limb keeps its plane
+and
+  drifts to the neutral one; a critically damped spring brings the twist there without a jump. Only the twist about the
+  bone lags (by 0.15 s), never the position of a joint;
+- a spine twisted past half a turn, which no body does, continues without a jump and returns within some seconds;
 - signs follow the frame before.
 
 Streams are rows: one call takes a frame of each of any number of streams. A chunk of one stream is solved frame by
@@ -28,7 +29,7 @@ from marey.motion.rows import Rows
 from marey.motion.skeleton import Skeleton
 from marey.motion.solver import FrameSolver
 
-SEEN_SECONDS = 0.05  # time constant of the mean of what frames show
+SEEN_SECONDS = 0.05  # time constant of the mean of observed bend planes
 SPRING = 20.0  # 1/s; at 40 a limb that bends again turns by 50 degrees a frame at 20 fps, at 20 by 30
 UNTWIST_SECONDS = 1.0  # time constant in which a surplus full turn fades
 
@@ -37,12 +38,12 @@ UNTWIST_SECONDS = 1.0  # time constant in which a surplus full turn fades
 class PoseState(Rows):
     """State carried between frames of S streams, with L limbs, C spines, J joints."""
 
-    started: NDArray[np.bool_]  # (S,) a frame went before
-    seen: Array  # (S, L, 2) mean of what frames showed of the bend planes
+    started: NDArray[np.bool_]  # (S,) there is an earlier frame
+    seen: Array  # (S, L, 2) mean of the observed bend planes
     angle: Array  # (S, L) twist of the bend planes, radians
     speed: Array  # (S, L) its rate, radians a second
     twist: Array  # (S, C) of the spines, -pi to pi
-    turns: Array  # (S, C) what is added to it, so that there is no jump
+    turns: Array  # (S, C) full turns added to it, so that there is no jump
     rotations: Array  # (S, J, 4) the frame before
 
 
@@ -50,7 +51,7 @@ class LivePoses:
     """Solves frames of live streams of one skeleton.
 
     Args:
-        skeleton: with the bone lengths of the body (`measure_offsets`); they stay the same from the first frame on.
+        skeleton: with the bone lengths of the body (`measure_offsets`); they never change.
         fps: frames a second.
     """
 
@@ -60,7 +61,7 @@ class LivePoses:
         self._solver = FrameSolver(skeleton)
 
     def start(self, streams: int = 1) -> PoseState:
-        """The state before the first frame."""
+        """Return the state before the first frame."""
         limbs, chains = len(self._solver.limbs), len(self._solver.spines)
         return PoseState(
             np.zeros(streams, bool),
@@ -73,7 +74,7 @@ class LivePoses:
         )
 
     def step(self, joints: Array, state: PoseState) -> tuple[Pose, PoseState]:
-        """The next frame of every stream.
+        """Return the next frame of every stream.
 
         Args:
             joints: (S, J, 3) metres.
@@ -96,7 +97,7 @@ class LivePoses:
         return Pose(self.skeleton, local, joints[:, 0].copy(), places), past.after(local)
 
     def places(self, joints: Array) -> Array:
-        """Joint positions (S, J, 3) that `step` would give, computed without state in a fraction of its time.
+        """Return the joint positions (S, J, 3) that `step` would give, without state and in a fraction of its time.
 
         Raises:
             InvalidInput: wrong shape, or numbers that are not finite.
@@ -104,7 +105,7 @@ class LivePoses:
         return self._solver.places(checked_joints(joints, self.skeleton))
 
     def run(self, joints: Array, state: PoseState) -> tuple[Pose, PoseState]:
-        """The next frames (T, J, 3) of one stream: the same, bit for bit, as T steps.
+        """Return the next frames (T, J, 3) of one stream: the same, bit for bit, as T calls of `step`.
 
         Raises:
             InvalidInput: see `step`; the state holds more than one stream.
@@ -124,17 +125,17 @@ class _Past:
     def __init__(self, state: PoseState, fps: float) -> None:
         self.state = state
         self.seconds = 1.0 / fps
-        # In a first frame, what went before weighs nothing.
+        # In a first frame the past has no weight.
         keep = np.where(state.started, math.exp(-self.seconds / SEEN_SECONDS), 0.0)  # (S,)
         self.decay = np.where(state.started, math.exp(-SPRING * self.seconds), 0.0)  # (S,)
         self.unwound = np.where(state.started, math.exp(-self.seconds / UNTWIST_SECONDS), 0.0)  # (S,)
         self.fresh = (1.0 - keep)[:, None]  # (S, 1)
-        self.seen = keep[:, None, None] * state.seen  # the part of what went before; `bend` adds that of this frame
+        self.seen = keep[:, None, None] * state.seen  # the part of the past; `bend` adds that of this frame
         self.angle, self.speed = state.angle.copy(), state.speed.copy()
         self.turned, self.turns = state.twist.copy(), state.turns.copy()
 
     def after(self, rotations: Array) -> PoseState:
-        """The state that this frame leaves."""
+        """Return the state after this frame."""
         started = np.ones(len(rotations), bool)
         return PoseState(started, self.seen, self.angle, self.speed, self.turned, self.turns, rotations)
 
@@ -144,7 +145,7 @@ class _Past:
     def bend(self, limb: int, seen: Array) -> Array:
         mean = self.seen[:, limb] + self.fresh * seen
         aim = np.arctan2(mean[:, 1], mean[:, 0] + PLANE_PRIOR)
-        # The exact motion of a critically damped spring over one frame, on the circle: the shorter way round.
+        # The exact motion of a critically damped spring over one frame, on the circle: in the shorter direction.
         off, speed = _principal(self.state.angle[:, limb] - aim), self.state.speed[:, limb]
         push = (speed + SPRING * off) * self.seconds
         angle = _principal(aim + (off + push) * self.decay)
@@ -161,5 +162,5 @@ class _Past:
 
 
 def _principal(angles: Array) -> Array:
-    """The same angles between -pi and pi."""
+    """Wrap angles to -pi to pi."""
     return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))

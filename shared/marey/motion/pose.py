@@ -1,7 +1,7 @@
 """Convert joint positions to joint rotations in closed form over all frames at once.
 
-What each frame shows is `solver.py`; here a whole clip decides what frames leave open: signs that do not change, bend
-planes of straight limbs from both sides in time, twists without full turns.
+`solver.py` solves each frame; this module decides from the whole clip what a single frame leaves open: continuous
+signs, bend planes of straight limbs from both sides in time, twists without full turns.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Pose:
         skeleton: the tree, with the bone lengths that were solved for.
         rotations: (T, J, 4) float64 local quaternions, continuous in sign.
         root: (T, 3) position of joint 0.
-        joints: (T, J, 3) where they put the joints.
+        joints: (T, J, 3) metres, the forward kinematics of the above.
     """
 
     skeleton: Skeleton
@@ -40,18 +40,18 @@ class Pose:
 
     @property
     def offsets(self) -> Array:
-        """(J, 3) the T-pose with this body's proportions."""
+        """(J, 3) metres, the T-pose with this body's proportions."""
         return self.skeleton.offsets
 
 
 def solve_pose(joints: Array, skeleton: Skeleton, *, fps: float = 20.0, measure: bool = True) -> Pose:
-    """Local rotations that put a skeleton where the joints are.
+    """Solve local rotations that put a skeleton's joints at the given positions.
 
     Args:
         joints: (T, J, 3) metres.
         skeleton: its T-pose gives the directions of the bones.
         fps: frames a second, for the time constants.
-        measure: take the bone lengths from the joints (`measure_offsets`); otherwise those of the skeleton.
+        measure: take the bone lengths from the joints (`measure_offsets`); otherwise from the skeleton.
 
     Returns:
         A pose with constant bone lengths.
@@ -67,7 +67,7 @@ def solve_pose(joints: Array, skeleton: Skeleton, *, fps: float = 20.0, measure:
 
 
 def checked_joints(joints: Array, skeleton: Skeleton) -> Array:
-    """(T, J, 3) float64.
+    """Validate joints and return them as (T, J, 3) float64.
 
     Raises:
         InvalidInput: wrong shape, no frame, or numbers that are not finite.
@@ -101,13 +101,13 @@ class _WholeClip:
 
 
 def _unwrap(angles: Array) -> Array:
-    """(T,) angles without jumps, in the full turn around zero that holds most of them."""
+    """Return angles (T,) without jumps, in the full turn around zero that holds most of them."""
     unwrapped = np.asarray(np.unwrap(angles), np.float64)
     return unwrapped - 2 * np.pi * np.round(np.median(unwrapped) / (2 * np.pi))
 
 
 def measure_offsets(joints: Array, skeleton: Skeleton) -> Array:
-    """The T-pose with the proportions of a moving body.
+    """Measure the T-pose with the proportions of a moving body.
 
     Single bones keep the direction of the skeleton's T-pose and take the median of their lengths over time; rigid
     bodies (pelvis, chest) take the median place of their points in the body's own frame; all is made symmetrical.
@@ -124,8 +124,9 @@ def measure_offsets(joints: Array, skeleton: Skeleton) -> Array:
     for j, points in bodies_of(skeleton).items():
         seen = joints[:, points] - joints[:, j : j + 1]
         rest = rest_vectors(skeleton, template, j, points)
-        # The template has other proportions, so the first fit is in another frame than the last, but in one frame for
-        # all time: what is measured in it is the body, turned. The second fit turns it back to the template.
+        # The template has other proportions, so the first fit has a frame of its own, the same at all times: it
+        # measures the
+        # body in a rotated frame. The second fit rotates it back to the template.
         turns = fit_rotation(rest, seen)
         body = np.median(rotate(conjugate(turns)[:, None], seen), axis=0)
         body = rotate(conjugate(fit_rotation(rest, body[None]))[0], body)
@@ -136,5 +137,5 @@ def measure_offsets(joints: Array, skeleton: Skeleton) -> Array:
     offsets = 0.5 * (offsets + mirrored)
     offsets[0] = template[0]
     standing = skeleton.with_offsets(offsets).rest[:, 1].min()
-    offsets[0, 1] += skeleton.rest[:, 1].min() - standing  # longer legs stand the root higher over the floor
+    offsets[0, 1] += skeleton.rest[:, 1].min() - standing  # longer legs raise the root over the floor
     return offsets

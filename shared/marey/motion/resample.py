@@ -16,24 +16,24 @@ SLOWEST, FASTEST = 1.0, 240.0  # frames a second; film and games use 23.976 to 1
 
 
 def frame_times(frames: int, fps: float, to: float) -> Array:
-    """Positions of the new rate's frames, counted in frames of the old rate: from the first on, none after the last.
+    """Return the positions of the new rate's frames, counted in frames of the old rate, from the first to the last.
 
     Raises:
         InvalidInput: a rate out of bounds.
     """
     if not SLOWEST <= to <= FASTEST:
-        raise InvalidInput(f"{to:g} frames a second; {SLOWEST:g} to {FASTEST:g} can be")
+        raise InvalidInput(f"{to:g} frames a second; allowed: {SLOWEST:g} to {FASTEST:g}")
     count = int((frames - 1) / fps * to + 1e-6) + 1
     return np.minimum(np.arange(count) * (fps / to), frames - 1)
 
 
 def interpolate(values: Array, times: Array) -> Array:
-    """Catmull-Rom interpolation over axis 0 of (T, ...): through every value, without a break in speed."""
+    """Interpolate (T, ...) over axis 0 by Catmull-Rom splines: through every value, with continuous speed."""
     last = len(values) - 1
     at = np.minimum(times.astype(np.intp), max(last - 1, 0))
     t = (times - at).reshape(-1, *[1] * (values.ndim - 1))
     a, b = values[at], values[np.minimum(at + 1, last)]
-    # Outside of the clip the motion goes on as it was: a value mirrored at the end.
+    # Beyond the clip the motion continues: values mirrored at the end.
     before = np.where(_like(at == 0, t), 2 * a - b, values[np.maximum(at - 1, 0)])
     after = np.where(_like(at + 2 > last, t), 2 * b - a, values[np.minimum(at + 2, last)])
     slope_a, slope_b = (b - before) / 2, (after - a) / 2
@@ -50,17 +50,17 @@ def _like(mask: NDArray[np.bool_], t: Array) -> NDArray[np.bool_]:
 
 
 def interpolate_rotations(rotations: Array, times: Array) -> Array:
-    """Unit quaternions (T, ..., 4) at other times, without a break in angular speed.
+    """Interpolate unit quaternions (T, ..., 4) at other times, with continuous angular speed.
 
-    Signs are made continuous, then components run along Catmull-Rom curves on to the sphere. Between neighbours that a
-    clip has (up to 40 degrees apart) this is within 0.1 degree of the spherical interpolation where that is steady, and
+    Signs are made continuous, then components follow Catmull-Rom splines and are normalised. Between neighbouring
+    frames (up to 40 degrees apart) this is within 0.1 degree of spherical interpolation where that is steady, and
     unlike it has no jerk at every old frame.
     """
     return normalize(interpolate(unroll(np.asarray(rotations, np.float64)), times))
 
 
 def resample(clip: MotionClip, fps: float) -> MotionClip:
-    """The clip at another rate; features stay as generated.
+    """Resample a clip to another rate; features stay as generated.
 
     Raises:
         InvalidInput: a rate out of bounds.

@@ -1,5 +1,5 @@
-"""Joints with several bones as rigid bodies: which there are, and how they are turned (Davenport's q-method, Markley &
-Crassidis 2014, section 5.3.1)."""
+"""Joints with several bones as rigid bodies: detection, and their rotation (Davenport's q-method, Markley & Crassidis
+2014, section 5.3.1)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from marey.motion.skeleton import Skeleton
 class BodyFit:
     """Fits all rigid bodies of a skeleton at once, B of them.
 
-    One with fewer bones than another is filled up with bones of no length, which weigh nothing.
+    Bodies with fewer bones are padded with bones of zero length, which have no weight.
     """
 
     def __init__(self, skeleton: Skeleton, offsets: Array, bodies: Mapping[int, tuple[int, ...]]) -> None:
@@ -29,18 +29,18 @@ class BodyFit:
         self._offsets = offsets[None, self.children]  # (1, C, 3)
 
     def fit(self, joints: Array) -> Array:
-        """(T, B, 4) best rotations, in any sign: bones of the T-pose onto those of joints (T, J, 3)."""
+        """Return the best rotations (T, B, 4), in any sign: bones of the T-pose onto those of joints (T, J, 3)."""
         return self._davenport.fit(joints.take(self._points, 1) - joints.take(self.joints, 1)[:, :, None])
 
     def carry(self, joints: Array) -> Array:
-        """(T, C, 3) bones from bodies to their children, turned as the bodies are that best fit joints (T, J, 3)."""
+        """Return bones (T, C, 3) from bodies to their children, rotated by the bodies' best fit to joints (T, J, 3)."""
         return rotate(self.fit(joints).take(self._carriers, 1), self._offsets)
 
 
 def fit_rotation(rest: Array, seen: Array) -> Array:
-    """The rotation that best turns one set of vectors into another, in the sense of least squares.
+    """Return the rotation that best turns one set of vectors into another, in the least-squares sense.
 
-    Where the vectors leave a rotation open (all on one line) the smaller one is taken, by a prior of a billionth.
+    Where the vectors leave a rotation open (all on one line) the smaller one is chosen, by a prior of a billionth.
 
     Args:
         rest: (K, 3). seen: (T, K, 3).
@@ -54,7 +54,7 @@ def fit_rotation(rest: Array, seen: Array) -> Array:
 class _Davenport:
     """Davenport's q-method: the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix.
 
-    The matrix is linear in the vectors seen, so what it takes from each of their coordinates is worked out before.
+    The matrix is linear in the observed vectors, so the factors of their coordinates are computed once.
 
     Args:
         rest: (..., K, 3).
@@ -67,14 +67,14 @@ class _Davenport:
         self.prior = least[..., None, None] * _symmetric(np.eye(3)).reshape(1, 16)  # (..., 1, 16)
 
     def fit(self, seen: Array) -> Array:
-        """(T, ..., 4) for vectors (T, ..., K, 3)."""
+        """Return rotations (T, ..., 4) for vectors (T, ..., K, 3)."""
         shape = seen.shape[:-2]
         matrix = seen.reshape(*shape, 1, -1) @ self.parts + self.prior  # a product for each row: no sum over rows
         return np.linalg.eigh(matrix.reshape(*shape, 4, 4))[1][..., -1]
 
 
 def _symmetric(b: Array) -> Array:
-    """Davenport's matrices (..., 4, 4) of sums (..., 3, 3) of products seen x rest."""
+    """Return Davenport's matrices (..., 4, 4) of sums (..., 3, 3) of products seen x rest."""
     k = np.empty((*b.shape[:-2], 4, 4))
     trace = np.einsum("...ii->...", b)
     k[..., 1:, 1:] = b + np.swapaxes(b, -1, -2) - trace[..., None, None] * np.eye(3)
@@ -85,12 +85,12 @@ def _symmetric(b: Array) -> Array:
 
 
 def rest_vectors(skeleton: Skeleton, offsets: Array, j: int, points: tuple[int, ...]) -> Array:
-    """(K, 3) from joint j to its descendants in the T-pose."""
+    """Return vectors (K, 3) from joint j to its descendants in the T-pose."""
     return np.stack([_rest_vector(skeleton, offsets, j, k) for k in points])
 
 
 def _rest_vector(skeleton: Skeleton, offsets: Array, j: int, k: int) -> Array:
-    """(3,) from joint j to its descendant k in the T-pose."""
+    """Return the vector (3,) from joint j to its descendant k in the T-pose."""
     vector = np.zeros(3)
     while k != j:
         vector, k = vector + offsets[k], skeleton.parents[k]
@@ -98,7 +98,8 @@ def _rest_vector(skeleton: Skeleton, offsets: Array, j: int, k: int) -> Array:
 
 
 def bodies_of(skeleton: Skeleton) -> dict[int, tuple[int, ...]]:
-    """Joints with several bones, and their ends; a child at no distance (SnapMoGen's pelvis) is the same body."""
+    """Return joints with several bones, and their ends; a child at no distance (SnapMoGen's pelvis) is the same
+    body."""
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
 
     def points(j: int) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """Find hips, shoulders and feet in a foreign rig by its joint names.
 
-Names are taken apart into words (`CC_Base_L_ToeBase` is cc base l toe base), their side is found, and what is left is
-looked up among the words that rigs use: Mixamo, Unreal, MotionBuilder, iClone, Bandai-Namco, LaFAN1, SMPL, Rigify.
+Names are split into words (`CC_Base_L_ToeBase` is cc base l toe base), their side is detected, and the remaining words
+are looked up among those of common rigs: Mixamo, Unreal, MotionBuilder, iClone, Bandai-Namco, LaFAN1, SMPL, Rigify.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 from marey.motion.skeleton import Skeleton
 
 _SIDES = {"l": 0, "left": 0, "r": 1, "right": 1}
-# In order of trust: `shoulder` is the upper arm in SMPL and the collar bone elsewhere, `hip` the thigh in some.
+# In order of confidence: `shoulder` is the upper arm in SMPL and the collar bone elsewhere, `hip` the thigh in some.
 _PARTS = {
     "thigh": ("up leg", "upper leg", "thigh", "leg upper", "hip"),
     "ankle": ("ankle", "foot"),
@@ -21,7 +21,7 @@ _PARTS = {
 
 
 def _words(name: str) -> tuple[int | None, str]:
-    """Side (0 left, 1 right, None) of a joint's name, and its other words without numbers."""
+    """Return the side (0 left, 1 right, None) of a joint's name, and its other words without numbers."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name.rsplit(":", 1)[-1])
     words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
     words = " ".join(words).replace("upperarm", "upper arm").replace("upleg", "up leg").replace("upperleg", "upper leg")
@@ -31,7 +31,7 @@ def _words(name: str) -> tuple[int | None, str]:
 
 
 def _find(skeleton: Skeleton, part: str, below: int | None, side: int) -> int | None:
-    """The first joint of one side whose name ends in one of the part's words, under the joint `below`."""
+    """Return the first joint of one side whose name ends in one of the part's words, under the joint `below`."""
     named = [_words(n) for n in skeleton.joint_names]
     for words in _PARTS[part]:
         for j, (its_side, rest) in enumerate(named):
@@ -48,9 +48,10 @@ def _hangs_on(skeleton: Skeleton, j: int, above: int) -> bool:
 
 
 def feet_and_facing(skeleton: Skeleton) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Feet (L ankle, L toe, R ankle, R toe) and facing joints (r_hip, l_hip, r_shoulder, l_shoulder) of a skeleton.
+    """Find the feet (L ankle, L toe, R ankle, R toe) and facing joints (r_hip, l_hip, r_shoulder, l_shoulder) of a
+    skeleton.
 
-    Each is empty where any of its joints is not found; a toe must hang on its ankle, and an ankle on its thigh.
+    Each is empty if any of its joints is not found; a toe must be below its ankle, and an ankle below its thigh.
     """
     thighs = [_find(skeleton, "thigh", None, side) for side in (0, 1)]
     arms = [_find(skeleton, "arm", None, side) for side in (0, 1)]
@@ -58,7 +59,7 @@ def feet_and_facing(skeleton: Skeleton) -> tuple[tuple[int, ...], tuple[int, ...
     for side, thigh in enumerate(thighs):
         ankle = None if thigh is None else _find(skeleton, "ankle", thigh, side)
         toe = None if ankle is None else _find(skeleton, "toe", ankle, side)
-        if ankle is not None and toe == ankle:  # there is one joint of that name, and what hangs on it is the toe
+        if ankle is not None and toe == ankle:  # one joint of that name: its child is the toe
             toe = next(iter(skeleton.children[ankle]), None)
         feet += [ankle, toe]
     return _all(feet), _all([thighs[1], thighs[0], arms[1], arms[0]])

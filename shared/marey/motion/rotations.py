@@ -3,9 +3,9 @@
 Everything broadcasts over leading axes and is vectorized; nothing here loops over frames. Rotations are active: they
 turn vectors, and `multiply(a, b)` turns by `b` first.
 
-What a live stream calls for every frame works on components in the first axis, each in one piece of memory: the same
-arithmetic in half the numpy calls, which are all that a single frame costs. Sums over components are written out in
-their order, so that no bit of a row depends on how many rows there are.
+Functions that a live stream calls for every frame work on components in the first axis, each contiguous in memory: the
+same arithmetic in half the numpy calls, which are the whole cost of a single frame. Sums over components are written
+out in order, so that no bit of a row depends on the number of rows.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _AFTER = np.array([5, 0, 3, 6]), np.array([6, 7, 0, 1]), np.array([7, 2, 5, 0])
 
 
 def dot(a: Array, b: Array) -> Array:
-    """Scalar product (...) along the last axis; leading axes broadcast."""
+    """Return the scalar product (...) along the last axis; leading axes broadcast."""
     return _dot(*_components(a, b)).T
 
 
 def length(vectors: Array) -> Array:
-    """Euclidean length (...) along the last axis."""
+    """Return the Euclidean length (...) along the last axis."""
     return _length(np.ascontiguousarray(vectors.T)).T
 
 
@@ -45,18 +45,18 @@ def normalize(vectors: Array) -> Array:
 
 
 def multiply(a: Array, b: Array) -> Array:
-    """Hamilton product (..., 4): the rotation that turns by `b`, then by `a`."""
+    """Return the Hamilton product (..., 4): the rotation that turns by `b`, then by `a`."""
     a, b = _components(a, b)
     return (a[0] * b + _along(a[1:], b, _BEFORE)).T
 
 
 def conjugate(q: Array) -> Array:
-    """The inverse of unit quaternions (..., 4)."""
+    """Return the inverse of unit quaternions (..., 4)."""
     return q * np.array([1, -1, -1, -1], q.dtype)
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product along the last axis; several times as fast as numpy.cross on small arrays."""
+    """Return the cross product along the last axis; several times as fast as numpy.cross on small arrays."""
     return _cross(*_components(a, b)).T
 
 
@@ -68,9 +68,9 @@ def rotate(q: Array, v: Array) -> Array:
 
 
 def between(a: Array, b: Array) -> Array:
-    """The shortest rotation (..., 4) that turns the direction of `a` to that of `b`.
+    """Return the shortest rotation (..., 4) that turns the direction of `a` to that of `b`.
 
-    Opposite directions turn by half a turn about an axis square to `a`.
+    Opposite directions turn by half a turn about an axis perpendicular to `a`.
     """
     a, b = _components(a, b)
     a, b = _unit(a), _unit(b)
@@ -84,16 +84,16 @@ def between(a: Array, b: Array) -> Array:
 
 
 def aimed(q: Array, bone: Array, aim: Array) -> Array:
-    """Rotations (..., 4) turned on the shortest way until they take a bone to the direction of an aim.
+    """Turn rotations (..., 4) the shortest way until they take a bone to the direction of an aim.
 
-    That is `multiply(between(rotate(q, bone), aim), q)` in half the time. With half a turn about the bone before it and
-    half a turn about the aim after it, a rotation takes the bone as far beyond the aim as it did stay behind; what is
-    wanted lies in the middle between the two, which are q and -aim q bone as quaternions.
+    This equals `multiply(between(rotate(q, bone), aim), q)` in half the time. With half a turn about the bone before it
+    and half a turn about the aim after it, a rotation takes the bone as far beyond the aim as it was before; the result
+    lies in the middle between the two, which are q and -aim q bone as quaternions.
 
     Args:
         q: (..., 4).
         bone: (..., 3) of length one; with as many axes as q, as is the aim.
-        aim: (..., 3) of any length; where it has none, nothing turns.
+        aim: (..., 3) of any length; a zero aim turns nothing.
     """
     before, bones = _components(q, bone)
     aims = _unit(np.ascontiguousarray(aim.T))
@@ -107,14 +107,14 @@ def aimed(q: Array, bone: Array, aim: Array) -> Array:
 
 
 def _along(v: Array, q: Array, order: tuple[NDArray[np.intp], ...]) -> Array:
-    """The product of vectors (3, ...) with quaternions (4, ...), `_BEFORE` or `_AFTER` them."""
+    """Return the product of vectors (3, ...) with quaternions (4, ...), `_BEFORE` or `_AFTER` them."""
     i, j, k = order
     signed = np.concatenate([q, -q])
     return v[0] * signed.take(i, 0) + v[1] * signed.take(j, 0) + v[2] * signed.take(k, 0)
 
 
 def _components(a: Array, b: Array) -> tuple[Array, Array]:
-    """Both with the components in the first axis and the others reversed, of one rank, so that they broadcast."""
+    """Return both with components in the first axis and the others reversed, of one rank, so that they broadcast."""
     if a.ndim != b.ndim:
         rank = max(a.ndim, b.ndim)
         a, b = (v.reshape((1,) * (rank - v.ndim) + v.shape) for v in (a, b))
@@ -138,7 +138,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def about(axis: str, angle: ArrayLike) -> Array:
-    """Quaternions (..., 4) that turn by `angle` radians about one of the axes X, Y, Z."""
+    """Return quaternions (..., 4) that turn by `angle` radians about one of the axes X, Y, Z."""
     half = np.asarray(angle, np.float64) / 2
     q = np.zeros((*half.shape, 4))
     q[..., 0] = np.cos(half)
@@ -147,13 +147,13 @@ def about(axis: str, angle: ArrayLike) -> Array:
 
 
 def from_rotvec(vectors: Array) -> Array:
-    """Quaternions (..., 4) of rotation vectors (..., 3): axis times radians."""
+    """Return quaternions (..., 4) of rotation vectors (..., 3): axis times radians."""
     angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vectors], axis=-1)
 
 
 def to_rotvec(q: Array) -> Array:
-    """Rotation vectors (..., 3), at most half a turn long."""
+    """Return rotation vectors (..., 3), at most half a turn long, of unit quaternions (..., 4)."""
     q = np.where(q[..., :1] < 0, -q, q)
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2 * np.arctan2(sine, q[..., :1])
@@ -161,7 +161,7 @@ def to_rotvec(q: Array) -> Array:
 
 
 def angle_between(a: Array, b: Array) -> Array:
-    """The angle in radians (...) from rotation `a` to rotation `b`, 0 to pi."""
+    """Return the angle in radians (...) from rotation `a` to rotation `b`, 0 to pi."""
     difference = multiply(conjugate(a), b)
     return 2 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
 
@@ -176,7 +176,7 @@ def unroll(q: Array, axis: int = 0) -> Array:
 
 
 def slerp(a: Array, b: Array, t: Array) -> Array:
-    """Spherical interpolation (..., 4) from `a` (t = 0) to `b` (t = 1), the shorter way; `t` broadcasts as (...)."""
+    """Interpolate spherically (..., 4) from `a` (t = 0) to `b` (t = 1), the shorter way; `t` broadcasts as (...)."""
     cosine = dot(a, b)
     b = np.where(cosine[..., None] < 0, -b, b)
     theta = np.arccos(np.clip(np.abs(cosine), -1.0, 1.0))
@@ -189,7 +189,7 @@ def slerp(a: Array, b: Array, t: Array) -> Array:
 
 
 def to_matrix(q: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    """Return rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     m = np.empty((*q.shape[:-1], 3, 3), q.dtype)
     m[..., 0, 0] = 1 - 2 * (y * y + z * z)
@@ -205,7 +205,7 @@ def to_matrix(q: Array) -> Array:
 
 
 def from_matrix(m: Array) -> Array:
-    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the largest component (Shepperd 1978)."""
+    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the largest component (Shepperd 1978)."""
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
     squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], axis=-1)
     wx, wy, wz = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
@@ -224,23 +224,24 @@ def from_matrix(m: Array) -> Array:
 
 
 def to_6d(q: Array) -> Array:
-    """The first two columns of the rotation matrix, end to end (..., 6) (Zhou et al. 2019)."""
+    """Return the first two columns of the rotation matrix, concatenated (..., 6) (Zhou et al. 2019)."""
     m = to_matrix(q)
     return np.concatenate([m[..., :, 0], m[..., :, 1]], axis=-1)
 
 
 def from_6d(d: Array) -> Array:
-    """Quaternions (..., 4) of 6D rotations: x = norm(a), z = norm(a x b), y = z x x."""
+    """Return quaternions (..., 4) of 6D rotations: x = norm(a), z = norm(a x b), y = z x x."""
     x = normalize(d[..., :3])
     z = normalize(cross(x, d[..., 3:]))
     return from_matrix(np.stack([x, cross(z, x), z], axis=-1))
 
 
 def from_euler(angles: Array, order: str) -> Array:
-    """Quaternions (..., 4) of Euler angles in degrees (..., n), given in the order their axes are named.
+    """Return quaternions (..., 4) of Euler angles in degrees (..., n), given in the order in which their axes are
+    named.
 
     `order` is as in a BVH file, `ZXY` for instance: the first axis is the outermost, R = Rz Rx Ry. It may name any
-    number of axes, also none.
+    number of axes, including none.
     """
     half = np.radians(np.asarray(angles, np.float64)) / 2
     cos, sin = np.cos(half), np.sin(half)
@@ -260,8 +261,8 @@ def from_euler(angles: Array, order: str) -> Array:
 
 
 def to_euler(q: Array, order: str) -> Array:
-    """Euler angles in degrees (..., 3) of unit quaternions, in the order of `order` (see `from_euler`); the middle one
-    lies in -90 to 90. At the gimbal lock the last angle is zero."""
+    """Return Euler angles in degrees (..., 3) of unit quaternions, in the order of `order` (see `from_euler`); the
+    middle one lies in -90 to 90. At the gimbal lock the last angle is zero."""
     i, j, k = (AXES.index(a) for a in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     m = to_matrix(np.asarray(q, np.float64))
@@ -287,7 +288,7 @@ def continuous_euler(angles: Array) -> Array:
     def distance(a: Array, b: Array) -> Array:
         return np.abs((a - b + 180) % 360 - 180).sum(axis=-1)
 
-    # Whether to change sides between two frames depends on those two alone, so the side is a running parity.
+    # Changing sides between two frames depends on those two alone, so the side is a running parity.
     change = distance(other[1:], angles[:-1]) < distance(angles[1:], angles[:-1])
     side = np.concatenate([np.zeros((1, *change.shape[1:]), bool), np.cumsum(change, axis=0) % 2 == 1])
     return np.unwrap(np.where(side[..., None], other, angles), period=360, axis=0)

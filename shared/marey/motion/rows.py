@@ -1,4 +1,4 @@
-"""States of live streams: arrays with a row for each stream, so that one call moves all of them a frame on."""
+"""States of live streams: arrays with a row for each stream, so that one call advances all of them by a frame."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from marey.motion.rotations import Array
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Base of a state whose every field is an array (S, ...) or such a state itself. Streams join and leave between
+    """Base of a state whose every field is an array (S, ...) or another such state. Streams join and leave between
     frames by rows."""
 
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
 
     def take(self, rows: Sequence[int]) -> Self:
-        """The state of these streams, in this order."""
+        """Return the state of these streams, in this order."""
         index = np.array(rows, np.intp)
 
         def pick(value: Rows | Array) -> Rows | Array:
@@ -30,7 +30,7 @@ class Rows:
 
     @classmethod
     def join(cls, states: Sequence[Self]) -> Self:
-        """The streams of several states, one after the other."""
+        """Concatenate the streams of several states."""
 
         def merge(values: Sequence[Any]) -> Rows | Array:
             first = values[0]

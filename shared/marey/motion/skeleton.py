@@ -1,7 +1,7 @@
 """Skeletons as data.
 
 A skeleton is a tree of joints with a rest pose: the T-pose, facing +Z, Y up, arms along X (the left hand at +X), feet
-forward, in metres. With all local rotations zero a body stands in exactly that pose.
+forward, in metres. All local rotations zero give exactly that pose.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ class Skeleton:
         name: short name, `humanml3d` for instance.
         joint_names: one a joint, unique.
         parents: index of the parent, -1 for the root; parents come before children.
-        offsets: (J, 3) T-pose, metres, from the parent; the root's own is where it stands over the floor.
+        offsets: (J, 3) T-pose, metres, from the parent; the root's own is its position over the floor.
         mirror: joint index of the other side (itself on the midline).
-        feet: L ankle, L toe, R ankle, R toe; empty when the skeleton has no known feet.
-        facing: r_hip, l_hip, r_shoulder, l_shoulder; empty when unknown.
+        feet: L ankle, L toe, R ankle, R toe; empty if unknown.
+        facing: r_hip, l_hip, r_shoulder, l_shoulder; empty if unknown.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Skeleton:
     def __post_init__(self) -> None:
         count = len(self.joint_names)
         if not count or len(self.parents) != count or len(self.mirror) != count:
-            raise InvalidInput("names, parents and mirror of a skeleton must have one entry a joint", where=self.name)
+            raise InvalidInput("names, parents and mirror of a skeleton must have one entry per joint", where=self.name)
         if self.offsets.shape != (count, 3):
             raise InvalidInput(f"offsets have shape {self.offsets.shape}, not ({count}, 3)", where=self.name)
         if self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents) if j):
@@ -61,7 +61,7 @@ class Skeleton:
 
     @cached_property
     def levels(self) -> tuple[NDArray[np.intp], ...]:
-        """Joint indices by depth, the root's level first: what can be computed at once lies in one level."""
+        """Joint indices by depth, the root's level first: a level can be computed at once."""
         depth = [0] * len(self)
         for j, p in enumerate(self.parents[1:], start=1):
             depth[j] = depth[p] + 1
@@ -76,11 +76,11 @@ class Skeleton:
         return rest
 
     def with_offsets(self, offsets: NDArray[np.floating]) -> Skeleton:
-        """The same tree with other proportions."""
+        """Return the same tree with other offsets (J, 3), metres."""
         return replace(self, offsets=np.asarray(offsets, np.float32))
 
     def index(self, name: str) -> int:
-        """Index of a joint by name."""
+        """Return the index of a joint by name."""
         return self.joint_names.index(name)
 
 
@@ -94,7 +94,7 @@ def _sided(
     feet: tuple[str, str, str, str],
     facing: tuple[str, str, str, str],
 ) -> Skeleton:
-    """Read a skeleton from lines of `joint parent x y z`; right joints repeat the left ones with x mirrored (`=`)."""
+    """Parse a skeleton from lines of `joint parent x y z`; right joints repeat the left ones with x mirrored (`=`)."""
     names: list[str] = []
     parents: list[int] = []
     offsets: dict[str, list[float]] = {}
@@ -194,8 +194,8 @@ KIT = _sided(
     facing=("RH", "LH", "RS", "LS"),
 )
 
-# SnapMoGen's rig (Guo et al. 2025). Its "centimetres" are a rig scale (the character is about 1.1 m high), kept here as
-# they are: scale on export.
+# SnapMoGen's rig (Guo et al. 2025). Its "centimetres" are a rig scale (the character is about 1.1 m high), kept as
+# published: scale on export.
 SNAPMOGEN = _sided(
     "snapmogen",
     """
@@ -252,7 +252,8 @@ def mirror_by_name(names: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def skeleton_of(names: tuple[str, ...], parents: tuple[int, ...], offsets: NDArray[np.floating]) -> Skeleton:
-    """A skeleton read from a file: one of ours with these offsets when names and tree are the same, else a new one."""
+    """Return a skeleton read from a file: one of Marey's with these offsets if names and tree are equal, else a new
+    one."""
     for known in SKELETONS.values():
         if known.joint_names == names and known.parents == parents:
             return known.with_offsets(offsets)
@@ -260,7 +261,8 @@ def skeleton_of(names: tuple[str, ...], parents: tuple[int, ...], offsets: NDArr
 
 
 def known_order(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Skeleton, tuple[int, ...]] | None:
-    """One of our skeletons with the same joints and bones in any order, and for each of its joints the index here.
+    """Return one of Marey's skeletons with the same joints and bones in any order, and the index here of each of its
+    joints.
 
     A BVH file lists joints depth first, which is not the order of HumanML3D's arrays.
     """

@@ -1,22 +1,23 @@
 """Solve joint rotations from bone directions, each frame by itself: the closed forms of the pose solver.
 
-Positions say where bones point, not how they twist. What decides the twist, by joint:
+Positions determine where bones point, not how they twist. The twist is decided by kind of joint:
 
 - a joint with several children (pelvis, chest) is a rigid body: the best fit of all its bones (Davenport's q-method,
   Markley & Crassidis 2014, section 5.3.1);
-- upper arm and thigh turn so that the elbow or knee bends like the hinge it is. A straight limb has no such plane: its
-  frames borrow it from other moments, and where there are none either, from a neutral swing;
+- upper arm and thigh turn so that the elbow or knee bends as a hinge. A straight limb shows no such plane: its frames
+use
+  that of other moments, and without any, a neutral swing;
 - joints between two rigid bodies (the spine) share the twist between those evenly;
 - every other joint swings the shortest way from its parent; a joint without children does not turn.
 
-Each bone is aimed from where its joint really comes to lie at where its child should be, so that errors of bone lengths
-do not add up along a limb.
+Each bone is aimed from its joint's solved position at its child's target, so that errors of bone lengths do not add up
+along a limb.
 
-Three things need more than one frame, and a `Moments` decides them: `pose.py` from a whole clip, `live_poses.py` from
+Three decisions need more than one frame, and a `Moments` takes them: `pose.py` from a whole clip, `live_poses.py` from
 the past alone.
 
-What a single frame costs is numpy calls, not arithmetic. So joints that are ready at the same time and turn in the same
-way form a group that is turned at once: all rigid bodies, arms and legs, elbows and knees.
+The cost of a single frame is numpy calls, not arithmetic. So joints that are ready at the same time and turn in the
+same way form a group that is turned at once: all rigid bodies, arms and legs, elbows and knees.
 """
 
 from __future__ import annotations
@@ -58,30 +59,30 @@ class Moments(Protocol):
     """Port that relates the rows of one call: successive frames of a clip, or one frame each of live streams."""
 
     def signs(self, q: Array) -> Array:
-        """Rotations (T, B, 4) of rigid bodies with the sign chosen of each."""
+        """Return rotations (T, B, 4) of rigid bodies with a chosen sign."""
         ...
 
     def bend(self, limb: int, seen: Array) -> Array:
-        """(T,) twist of a limb's bend plane against the neutral one.
+        """Return the twist (T,) of a limb's bend plane against the neutral one, radians.
 
         Args:
-            limb: which limb, by its place in `FrameSolver.limbs`.
-            seen: (T, 2) cosine and sine of that twist as each frame shows it, times the weight of that, 0 to 1.
+            limb: index in `FrameSolver.limbs`.
+            seen: (T, 2) cosine and sine of that twist as each frame shows it, times its weight, 0 to 1.
         """
         ...
 
     def twist(self, chain: int, angles: Array) -> Array:
-        """(T,) angles that a spine shares, without jumps; given to a full turn.
+        """Return the angles (T,) that a spine shares, without jumps; the input is known up to full turns.
 
         Args:
-            chain: which spine, by its place in `FrameSolver.spines`.
+            chain: index in `FrameSolver.spines`.
             angles: (T,) radians.
         """
         ...
 
 
 @dataclass(frozen=True)
-class Limb:
+class HingeLimb:
     """Upper joint with a hinge below: T-pose normal of the bend plane, neutral direction."""
 
     upper: int
@@ -89,11 +90,11 @@ class Limb:
     end: int
     normal: tuple[float, float, float]
     neutral: tuple[float, float, float]
-    one_way: bool  # a knee; an elbow's neutral swing is too rough to tell the sides
+    one_way: bool  # a knee; an elbow's neutral swing is too inexact to tell the sides
 
 
 class FrameSolver:
-    """The solver of one skeleton: `limbs` and `spines` say what its `Moments` are asked about."""
+    """The solver of one skeleton; its `Moments` receive indices into `limbs` and `spines`."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
@@ -107,11 +108,11 @@ class FrameSolver:
         self._groups = tuple(self._in_order(bodies))
 
     def solve(self, joints: Array, moments: Moments) -> tuple[Array, Array]:
-        """Local rotations (T, J, 4), in any sign, and where they put the joints (T, J, 3).
+        """Solve local rotations (T, J, 4), in any sign, and the resulting joints (T, J, 3) in metres.
 
         Args:
-            joints: (T, J, 3) float64, finite.
-            moments: how the rows hang together.
+            joints: (T, J, 3) float64, finite, metres.
+            moments: relation between the rows.
         """
         rows = _Rows(joints, moments)
         if self._bodies:
@@ -122,14 +123,14 @@ class FrameSolver:
         return np.ascontiguousarray(local), rows.places
 
     def places(self, joints: Array) -> Array:
-        """Joint positions (T, J, 3) that `solve` would give, whatever the moments are, in a fifth of its time.
+        """Return the joint positions (T, J, 3) that `solve` would give, whatever the moments are, in a fifth of its
+        time.
 
-        A rigid body carries its bones, every other bone points from where its joint comes to lie at where its child
-        should be, and no joint moves when a bone twists. (A joint with several bones that is no body, such as
-        SnapMoGen's pelvis, aims all of them here; `solve` can aim one.)
-
+        A rigid body carries its bones, every other bone points from its joint's solved position at its child's target,
+        and no joint moves when a bone twists. (A joint with several bones that is not a body, such as SnapMoGen's
+        pelvis, aims all of them here; `solve` can aim one.)
         Args:
-            joints: (T, J, 3) float64, finite.
+            joints: (T, J, 3) float64, finite, metres.
         """
         places = np.empty_like(joints)
         places[:, 0] = joints[:, 0]
@@ -143,8 +144,8 @@ class FrameSolver:
         return places
 
     def _in_order(self, bodies: Mapping[int, object]) -> Iterator[_Group]:
-        """Groups from the root outwards. Limbs wait until nothing else can be turned, so that the legs, which are ready
-        first, come with the arms; joints without children come last."""
+        """Return groups from the root outwards. Limbs wait until no other joint can be turned, so that the legs, which
+        are ready first, share a group with the arms; joints without children come last."""
         limbs = {limb.upper: number for number, limb in enumerate(self.limbs)}
         above = {j: child for chain in self.spines for j, child in pairwise(chain)}
         tops = {chain[-2]: number for number, chain in enumerate(self.spines)}
@@ -169,14 +170,14 @@ class FrameSolver:
 
     @cached_property
     def _bones(self) -> tuple[_Bones, ...]:
-        """Joints below the root, from there outwards: what bodies carry before what is aimed."""
+        """Return joints below the root, outwards: carried ones before aimed ones."""
         children = self._bodies.children if self._bodies else []
         _, *rounds = _rounds(self.skeleton.parents, lambda j: 0 if j in children else 1)
         return tuple(_Bones(self, joints, children) for joints in rounds)
 
 
 def _rounds(parents: Sequence[int], rank: Callable[[int], int]) -> Iterator[list[int]]:
-    """Joints in lists, from the root outwards: of those whose parents were in lists before, all of the lowest rank."""
+    """Yield lists of joints, from the root outwards: of those with parents in earlier lists, all of the lowest rank."""
     waiting, done = list(range(len(parents))), {-1}
     while waiting:
         ready = [j for j in waiting if parents[j] in done]
@@ -190,9 +191,9 @@ class _Rows:
     """The T rows of one call, filled from the root outwards.
 
     Attributes:
-        target: (T, J, 3) where joints should be.
-        places: (T, J, 3) where they come to lie.
-        world: (T, J + 1, 4) world rotations; the last is the identity, which stands for the parent of the root.
+        target: (T, J, 3) target positions, metres.
+        places: (T, J, 3) solved positions, metres.
+        world: (T, J + 1, 4) world rotations; the last is the identity, the parent of the root.
     """
 
     def __init__(self, target: Array, moments: Moments) -> None:
@@ -205,7 +206,7 @@ class _Rows:
 
 
 class _Joints:
-    """G joints that are done at once, after their parents."""
+    """G joints that are solved at once, after their parents."""
 
     def __init__(self, solver: FrameSolver, joints: Sequence[int]) -> None:
         self.joints = np.array(joints)  # (G,)
@@ -222,8 +223,8 @@ class _Bones(_Joints):
         self.lengths = length(self.offsets)[..., None]  # (1, G, 1)
 
     def aim(self, ways: Array) -> Array:
-        """The bones (T, G, 3) on the ways (T, G, 3) from where they begin to where they should end; as in the T-pose
-        where a way has no length, so shows no direction."""
+        """Return bones (T, G, 3) along the ways (T, G, 3) from their start to their target; as in the T-pose where a
+        way has no length and thus no direction."""
         far = length(ways)[..., None]
         seen = far > 0
         return np.where(seen, ways * (self.lengths / np.where(seen, far, 1.0)), self.offsets)
@@ -233,9 +234,9 @@ class _Group(_Joints, ABC):
     """Joints that turn in the same way."""
 
     def place(self, rows: _Rows) -> Array:
-        """Put the joints where their parents take them; (T, G, 4) the world rotations of those."""
+        """Put the joints where their parents take them; return the parents' world rotations (T, G, 4)."""
         before = rows.world.take(self.parents, 1)
-        if self.parents[0] >= 0:  # the root is where it should be
+        if self.parents[0] >= 0:  # the root is at its target
             rows.places[:, self.joints] = rows.places.take(self.parents, 1) + rotate(before, self.offsets)
         return before
 
@@ -245,21 +246,21 @@ class _Group(_Joints, ABC):
 
 
 class _Bodies(_Group):
-    """Rigid bodies, whose rotations are known from the start."""
+    """Rigid bodies, whose rotations are known beforehand."""
 
     def turn(self, rows: _Rows) -> None:
         self.place(rows)
 
 
 class _Ends(_Group):
-    """Joints without children do not turn."""
+    """Joints without children, which do not turn."""
 
     def turn(self, rows: _Rows) -> None:
         rows.world[:, self.joints] = self.place(rows)
 
 
 class _Swings(_Group):
-    """The shortest way from the parent that aims a bone at the child."""
+    """Joints that turn the shortest way from the parent until a bone aims at the child."""
 
     def __init__(self, solver: FrameSolver, joints: Sequence[int], children: Sequence[int]) -> None:
         super().__init__(solver, joints)
@@ -273,7 +274,7 @@ class _Swings(_Group):
 
 
 class _Twists(_Group):
-    """Joints from below one rigid body up to the next, which swung and now share the twist between the two."""
+    """Joints from below one rigid body up to the next; they swing and share the twist between the two."""
 
     def __init__(self, solver: FrameSolver, spine: int) -> None:
         *joints, self.body = chain = solver.spines[spine]
@@ -303,7 +304,7 @@ class _Limbs(_Group):
         self.neutral = normalize(np.array([[limb.neutral for limb in limbs]]))
         self.to_neutral = between(self.bones, self.neutral)  # (1, G, 4)
         normal = np.array([[limb.normal for limb in limbs]])
-        self.axes = normalize(normal - self.bones * dot(self.bones, normal)[..., None])  # square to the bones
+        self.axes = normalize(normal - self.bones * dot(self.bones, normal)[..., None])  # perpendicular to the bones
 
     def turn(self, rows: _Rows) -> None:
         before = self.place(rows)
@@ -311,15 +312,15 @@ class _Limbs(_Group):
         upper = normalize(hinges - rows.places.take(self.joints, 1))
         lower = normalize(rows.target.take(self.ends, 1) - hinges)
         swing = multiply(aimed(before, self.neutral, upper), self.to_neutral)
-        across = rotate(swing, self.axes)  # where the hinge's axis would be, square to `upper`
-        axis = cross(upper, lower)  # where it is seen to be, as long as the sine of the bend
+        across = rotate(swing, self.axes)  # expected hinge axis, perpendicular to `upper`
+        axis = cross(upper, lower)  # observed hinge axis, its length is the sine of the bend
         seen = _evidence(dot(axis, across), dot(axis, cross(upper, across)), self.one_way)
         twist = [rows.moments.bend(number, seen[:, k]) for k, number in enumerate(self.numbers)]
         rows.world[:, self.joints] = multiply(swing, _turn(self.bones, np.array(twist).T))
 
 
 def _evidence(along: Array, beside: Array, one_way: NDArray[np.bool_]) -> Array:
-    """(T, G, 2) what `Moments.bend` is given, from cosine and sine of the twist, both times the sine of the bend.
+    """Return the input (T, G, 2) of `Moments.bend`, from cosine and sine of the twist, both times the sine of the bend.
 
     Args:
         along, beside: (T, G). one_way: (G,).
@@ -333,7 +334,7 @@ def _evidence(along: Array, beside: Array, one_way: NDArray[np.bool_]) -> Array:
 
 
 def _turn(axes: Array, angles: Array) -> Array:
-    """(T, G, 4) rotations about unit axes (1, G, 3) by angles (T, G)."""
+    """Return rotations (T, G, 4) about unit axes (1, G, 3) by angles (T, G)."""
     half = angles / 2
     q = np.empty((*half.shape, 4))
     q[..., 0], q[..., 1:] = np.cos(half), np.sin(half)[..., None] * axes
@@ -341,25 +342,25 @@ def _turn(axes: Array, angles: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _limbs(parents: tuple[int, ...], facing: tuple[int, ...]) -> tuple[Limb, ...]:
-    """Arms and legs of a skeleton that knows its hips and shoulders.
+def _limbs(parents: tuple[int, ...], facing: tuple[int, ...]) -> tuple[HingeLimb, ...]:
+    """Return arms and legs of a skeleton with known hips and shoulders.
 
     Normals in the T-pose: a knee bends about +X; an elbow takes the hand forward, about Y, the two sides opposite.
     """
-    limbs: list[Limb] = []
+    limbs: list[HingeLimb] = []
     for upper, arm, side in zip(facing, (False, False, True, True), (-1, 1, -1, 1), strict=False):
         hinges = [j for j, p in enumerate(parents) if p == upper]
         ends = [j for j, p in enumerate(parents) if hinges and p == hinges[0]]
         if len(hinges) == 1 and len(ends) == 1:
             x, y, z = NEUTRAL_ARM if arm else NEUTRAL_LEG
             normal = (0.0, -1.0 * side, 0.0) if arm else (1.0, 0.0, 0.0)
-            limbs.append(Limb(upper, hinges[0], ends[0], normal, (side * x, y, z), one_way=not arm))
+            limbs.append(HingeLimb(upper, hinges[0], ends[0], normal, (side * x, y, z), one_way=not arm))
     return tuple(limbs)
 
 
 @lru_cache(maxsize=64)
 def _spines(parents: tuple[int, ...], bodies: frozenset[int]) -> dict[int, tuple[int, ...]]:
-    """Chains between two rigid bodies by their first joint: (first, …, last, body above)."""
+    """Return chains between two rigid bodies by their first joint: (first, …, last, body above)."""
     chains: dict[int, tuple[int, ...]] = {}
     for body in bodies:
         chain = [body]

@@ -1,4 +1,4 @@
-"""Units and axes of files. Inside there are only metres and Y up."""
+"""Units and axes of files. All code inside uses metres and Y up."""
 
 from __future__ import annotations
 

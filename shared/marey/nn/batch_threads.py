@@ -1,8 +1,8 @@
 """Threads that process parts of a batch in parallel, each with one torch thread.
 
-torch shares every single operation among its threads and makes them wait for each other behind it. At HGM³'s `paper`
-size two threads then take 1.4 times the processor time of one, and a batch of one is no faster for the second. Parts
-of a batch that know nothing of each other wait once, at their end.
+torch shares every single operation among its threads and waits for all of them after each. At HGM³'s `paper` size two
+threads then take 1.4 times the processor time of one, and a batch of one is no faster. Independent parts of a batch
+wait once, at their end.
 """
 
 from __future__ import annotations

@@ -16,9 +16,9 @@ from marey.core.errors import InvalidBundle
 from marey.motion.features import layout
 
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
-"""Of a tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""
+"""Tensors of a tokenizer: state of the codebooks' training, as large as the codebooks; and the bundle's statistics."""
 ASKED_IN_TRAINING = "ahead."
-"""Of MOGO's transformer: what training asks some frames ahead."""
+"""Tensors of MOGO's transformer: heads for frames further ahead, used in training alone."""
 
 
 def stored(name: str) -> bool:
@@ -54,8 +54,8 @@ def write_generator(
 
     Args:
         path: the bundle's folder; its last name is the bundle's.
-        model: which network reads it.
-        config: what the networks are built from.
+        model: name of the model that reads it.
+        config: configuration of the networks.
         parts: state dict of each part; those of the codebooks' training are left out.
         statistics: mean and std (D,) that the tokenizer normalises with.
         text: encoder, labeller and caps.
@@ -116,8 +116,8 @@ def random_parts(
 
     Args:
         build: makes the networks, by part; one is the `tokenizer`, whose codebooks are drawn as well.
-        loud: parts whose matrices are larger than at the start of training, so that prompts make a difference.
-        seed: torch's own generator stays as it was.
+        loud: parts whose matrices are scaled up from their initial values, so that prompts make a difference.
+        seed: torch's own generator is not changed.
     """
     with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
@@ -132,7 +132,7 @@ def random_parts(
 
 
 def standing(name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Mean and std (D,) of a layout's features around the rest pose: statistics for random weights."""
+    """Return mean and std (D,) of a layout's features around the rest pose: statistics for random weights."""
     features = layout(name)
     rest = features.skeleton.offsets.astype(np.float64).copy()
     for joint, parent in enumerate(features.skeleton.parents):

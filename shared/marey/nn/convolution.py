@@ -12,12 +12,12 @@ from torch import Tensor, nn
 
 
 def frame_mask(lengths: Tensor, size: int) -> Tensor:
-    """(B,) lengths to (B, size) bool, true within the clip."""
+    """Convert lengths (B,) to a mask (B, size) bool, True within the clip."""
     return torch.arange(size, device=lengths.device)[None] < lengths[:, None]
 
 
 def masked(x: Tensor, mask: Tensor | None) -> Tensor:
-    """Zeros where the mask is, or `x` where there is none."""
+    """Return `x` with zeros outside the mask, or `x` unchanged without one."""
     return x if mask is None else x * mask
 
 

@@ -1,6 +1,6 @@
 """Select a device and query its capabilities.
 
-`python -m marey.nn.devices cuda` says whether there is one, for processes that do without torch.
+`python -m marey.nn.devices cuda` reports if there is one, for processes that run without torch.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ HINT = "Set MAREY_DEVICE (of a training, --device) to cpu or auto."
 
 
 def choose_device(name: str) -> torch.device:
-    """`auto` (CUDA where there is one), `cpu`, `cuda`, `cuda:1`.
+    """Return the device of a name: `auto` (CUDA if available), `cpu`, `cuda`, `cuda:1`.
 
     Raises:
-        InvalidInput: the device is not there.
+        InvalidInput: the device does not exist.
     """
     if name == "auto":
         local = int(os.environ.get("LOCAL_RANK", "0"))
@@ -32,7 +32,7 @@ def choose_device(name: str) -> torch.device:
     if device.type == "cuda" and not torch.cuda.is_available():
         raise InvalidInput("no CUDA device is available", where=name, hint=HINT)
     if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
-        raise InvalidInput(f"there are {torch.cuda.device_count()} CUDA devices here", where=name, hint=HINT)
+        raise InvalidInput(f"this machine has {torch.cuda.device_count()} CUDA devices", where=name, hint=HINT)
     return device
 
 

@@ -15,7 +15,7 @@ def is_distributed() -> bool:
 
 
 def rank() -> int:
-    """This process's rank, 0 without a process group."""
+    """Return this process's rank, 0 without a process group."""
     return dist.get_rank() if is_distributed() else 0
 
 
@@ -27,7 +27,7 @@ def all_reduce_sum(tensor: Tensor) -> Tensor:
 
 
 def broadcast(tensor: Tensor) -> Tensor:
-    """Overwrite `tensor` by that of rank 0, in place."""
+    """Overwrite `tensor` with rank 0's, in place."""
     if is_distributed():
         dist.broadcast(tensor, src=0)
     return tensor

@@ -12,13 +12,13 @@ from marey.nn.stored_names import load_stored, stored_parameters
 
 
 def warm_momentum(momentum: float, updates: int) -> float:
-    """λ_k = min(λ, (1 + k) / (10 + k)): an average that starts late is not held back by random weights."""
+    """Return λ_k = min(λ, (1 + k) / (10 + k)): an average that starts late is not dominated by random weights."""
     return min(momentum, (1 + updates) / (10 + updates))
 
 
 @torch.no_grad()
 def update_average(average: nn.Module, source: nn.Module, momentum: float) -> None:
-    """average <- λ·average + (1 - λ)·source for parameters; buffers are copied (eq. 6)."""
+    """Update average <- λ·average + (1 - λ)·source for parameters; buffers are copied (eq. 6)."""
     for mine, theirs in zip(average.parameters(), source.parameters(), strict=True):
         mine.lerp_(theirs, 1 - momentum)
     for mine, theirs in zip(average.buffers(), source.buffers(), strict=True):
@@ -54,7 +54,7 @@ class WeightAverage:
             self._assign(saved)
 
     def assign(self) -> None:
-        """Put the averaged weights into the module, for good."""
+        """Put the averaged weights into the module permanently."""
         self._assign(self.values)
 
     def load(self, values: dict[str, Tensor]) -> None:

@@ -8,13 +8,13 @@ from torch import Tensor
 
 
 def token_losses(logits: Tensor, targets: Tensor) -> Tensor:
-    """ℓ_k = −log F(y_k | ·), eq. 3: (B, n, K) logits and (B, n) tokens to (B, n); float32."""
+    """Return ℓ_k = −log F(y_k | ·), eq. 3: (B, n, K) logits and (B, n) tokens to (B, n); float32."""
     losses = F.cross_entropy(logits.float().flatten(0, 1), targets.flatten().clamp(min=0), reduction="none")
     return losses.view(targets.shape)
 
 
 def ranking_loss(predicted: Tensor, losses: Tensor, masked: Tensor) -> Tensor:
-    """Eq. 5 as a mean over ordered pairs (ours: the sum would weigh a clip by the square of its masked tokens).
+    """Return eq. 5 as a mean over ordered pairs (ours: the sum would weigh a clip by the square of its masked tokens).
 
     For i ≠ j both masked, with 1_ij = [ℓ_i > ℓ_j]: −1_ij·log σ(l̂_i − l̂_j) − (1 − 1_ij)·log(1 − σ(l̂_i − l̂_j)).
 

@@ -9,12 +9,12 @@ from torch import Tensor
 
 
 def cosine_schedule(progress: Tensor) -> Tensor:
-    """γ(τ) = cos(πτ/2), the masked share (Chang et al. 2022)."""
+    """Return γ(τ) = cos(πτ/2), the masked share (Chang et al. 2022)."""
     return torch.cos(progress * (math.pi / 2))
 
 
 def mask_counts(progress: Tensor, lengths: Tensor) -> Tensor:
-    """Masked tokens m = max(1, round(γ(τ)·n)) a sample, n its OWN length (ours).
+    """Return the number of masked tokens m = max(1, round(γ(τ)·n)) per sample, n its OWN length (ours).
 
     Counted on the padded length, as MoMask does, a short clip can lose every mask, or all of its tokens.
 
@@ -40,7 +40,7 @@ def easy_to_hard_mask(difficulty: Tensor, noise: Tensor, valid: Tensor, counts: 
     """
     hard_counts = torch.floor(alpha * counts + 1e-6).long()
     hard = _first(difficulty.masked_fill(~valid, -torch.inf), hard_counts)
-    # Random priority among the rest: hard ones stand before everything, invalid ones behind.
+    # Random priority among the rest: hard ones come before everything, invalid ones after.
     priority = noise.clamp(0, 1).masked_fill(hard, 2.0).masked_fill(~valid, -1.0)
     return _first(priority, counts)
 
@@ -55,7 +55,7 @@ def _first(score: Tensor, counts: Tensor) -> Tensor:
 
 
 def remaining_masks(length: int, steps: int, *, min_progress: bool = False) -> list[int]:
-    """Masked tokens m_l left after each pass l = 1 … L of decoding a clip of `length` tokens (Sec. 3.4).
+    """Return the masked tokens m_l left after each pass l = 1 … L of decoding a clip of `length` tokens (Sec. 3.4).
 
     m_l = min(⌈γ(l/L)·n − 1e-6⌉, m_{l−1}), m_L = 0 (cos(π/2) is not 0 in floating point).
 

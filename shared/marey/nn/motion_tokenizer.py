@@ -1,4 +1,4 @@
-"""Port of motion tokenizers for training and generation."""
+"""Interface of motion tokenizers for training and generation."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from torch import Tensor, nn
 from marey.nn.quantizer import Quantized
 
 ROOT = slice(0, 4)
-"""Yaw rate, X and Z displacement, height: the columns every HumanML3D-like layout begins with."""
+"""Yaw rate, X and Z displacement, height: the first columns of every HumanML3D-like layout."""
 CONTACTS = slice(-4, None)
 
 
 class MotionTokenizer(nn.Module, ABC):
-    """Features in their own units to tokens and back; their statistics are inside."""
+    """Tokenizer of features in their own units; its statistics are inside."""
 
     mean: Tensor  # (D,)
     std: Tensor  # (D,), as the network uses it
@@ -41,28 +41,28 @@ class MotionTokenizer(nn.Module, ABC):
 
     @abstractmethod
     def encode(self, features: Tensor, lengths: Tensor | None = None) -> Tensor:
-        """Tokens (B, n, V) of features (B, T, D); -1 beyond a clip's own length (B,), in frames."""
+        """Encode features (B, T, D) as tokens (B, n, V); -1 beyond a clip's own length (B,), in frames."""
 
     @abstractmethod
     def decode(self, tokens: Tensor, lengths: Tensor | None = None) -> Tensor:
-        """Features (B, T, D) in their own units; `lengths` (B,) in TOKENS; zero beyond them."""
+        """Decode tokens to features (B, T, D) in their own units; `lengths` (B,) in TOKENS; zero beyond them."""
 
     def set_statistics(self, mean: Tensor, std: Tensor) -> None:
-        """Mean and std (D,) as the network uses them (`biased_std` makes the latter from the data's)."""
+        """Set mean and std (D,) as the network uses them (`biased_std` makes the latter from the data's)."""
         self.mean.copy_(mean)
         self.std.copy_(std)
 
     def normalize(self, features: Tensor) -> Tensor:
-        """(…, D) in their own units to zero mean and unit std."""
+        """Normalise (…, D) in their own units to zero mean and unit std."""
         return (features - self.mean) / self.std
 
     def restore(self, normalized: Tensor) -> Tensor:
-        """The way back."""
+        """Invert `normalize`."""
         return normalized * self.std + self.mean
 
 
 def biased_std(std: Tensor, bias: float) -> Tensor:
-    """Divide the std of root and contact columns by `bias` (MoMask), so that their errors weigh more."""
+    """Divide the std of root and contact columns by `bias` (MoMask), which gives their errors more weight."""
     scaled = std.clone()
     scaled[ROOT] /= bias
     scaled[CONTACTS] /= bias

@@ -1,13 +1,13 @@
-"""Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on rows beside it.
+"""Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on other rows.
 
-`torch.nn.functional.linear` takes other kernels, which add in another order, for fewer than some 18 rows. oneDNN's
+`torch.nn.functional.linear` uses other kernels, with another order of addition, for fewer than about 18 rows. oneDNN's
 packed product in float32 does so for a single row alone: measured with torch 2.13 on AVX-512 for 16 shapes, 2 to 192
 rows give equal bits; 6 rows by 1024 x 3072 take 0.6 ms in place of 0.9. Many rows at once (128 and more) are 5 % faster
 than with torch's own product, which packs the weights anew each time, and give the very same bits.
 
-Every call of it costs 50 µs, though, and in bfloat16, which halves what is read, bits do depend on the number of rows
-while they are few. So what is drawn frame by frame goes through `GroupedLinear`: products of one shape. Other devices
-need none of this: there `cast_linears` halves what is read.
+Each call costs 50 µs, though, and in bfloat16, which halves the memory traffic, bits do depend on the number of rows
+while they are few. So code that draws frame by frame uses `GroupedLinear`: products of one shape. Other devices need
+none of this: there `cast_linears` halves the memory traffic.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 SMALL = 2**19
-"""Weights of a matrix that stays in the processor's cache: torch's own product of a few rows takes 20 µs there in place
-of 80, and less to read is worth nothing."""
+"""Number of weights of a matrix that stays in the processor's cache: torch's own product of a few rows takes 20 µs
+there in place of 80, and smaller weights gain nothing."""
 
 
 class PackedLinear(nn.Module):
-    """The inference twin of a linear layer; its weights can be neither trained nor read.
+    """Inference replacement of a linear layer; its weights can be neither trained nor read.
 
     In float32 a row's bits do not depend on the others; in bfloat16 they do while rows are few.
     """
@@ -34,7 +34,7 @@ class PackedLinear(nn.Module):
 
         Args:
             linear: the layer.
-            dtype: of the weights, float32 or bfloat16; what goes in and comes out has one type, float32 or this.
+            dtype: of the weights, float32 or bfloat16; input and output have one type, float32 or this.
             gelu: GELU follows, in the same pass.
         """
         super().__init__()
@@ -58,7 +58,7 @@ class PackedLinear(nn.Module):
 
 
 class SmallLinear(nn.Module):
-    """The inference twin of a linear layer whose matrix is small: torch's own product, on its columns."""
+    """Inference replacement of a linear layer whose matrix is small: torch's own product, on its columns."""
 
     def __init__(self, linear: nn.Linear) -> None:
         super().__init__()
@@ -72,11 +72,11 @@ class SmallLinear(nn.Module):
 
 
 class GroupedLinear(nn.Module):
-    """Inference replacement of a linear layer for a varying number of sessions, which does not change the bits of any.
+    """Inference replacement of a linear layer for a varying number of sessions, which changes no session's bits.
 
-    (S, R, in) are S sessions of R rows; every product has the rows of `group` sessions, made up with zeros where there
-    are fewer. More sessions in a group share one reading of the weights; a session that is alone pays for all of them.
-    (R, in) is a product of its own.
+    (S, R, in) are S sessions of R rows; every product has the rows of `group` sessions, padded with zeros. More
+    sessions in a group share one reading of the weights; a single session pays for all of them. (R, in) is a product of
+    its own.
     """
 
     def __init__(self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, group: int = 1) -> None:
@@ -84,8 +84,7 @@ class GroupedLinear(nn.Module):
 
         Args:
             linear: the layer.
-            dtype: of the weights where they are many (`SMALL`), float32 or bfloat16; what goes in and comes out is
-                float32.
+            dtype: of the weights of large matrices (`SMALL`), float32 or bfloat16; input and output are float32.
             group: sessions of one product.
         """
         super().__init__()
@@ -133,7 +132,7 @@ def can_pack(module: nn.Module) -> bool:
 
 
 def packed_gelu(linear: nn.Module, gelu: nn.Module, dtype: torch.dtype) -> tuple[nn.Module, nn.Module]:
-    """A linear layer and the GELU after it, packed into one pass where possible."""
+    """Pack a linear layer and the GELU after it into one pass where possible."""
     if isinstance(linear, nn.Linear) and can_pack(linear):
         return PackedLinear(linear, dtype, gelu=True), nn.Identity()
     return linear, gelu

@@ -18,19 +18,19 @@ NO_TOKEN = -1
 
 @dataclass(frozen=True)
 class Quantized:
-    """Output of one pass through the quantizer."""
+    """Result of one pass through the quantizer."""
 
-    output: Tensor  # (B, n, d), straight-through: its gradient goes to the input unchanged
+    output: Tensor  # (B, n, d), straight-through: its gradient is passed to the input unchanged
     tokens: Tensor  # (B, n, V) int64, NO_TOKEN where dropped or invalid
     commitment: Tensor  # scalar: sum over levels of the mean squared distance (eq. 2, without β)
     perplexity: Tensor  # (V,), exp of the entropy of each level's code usage in this batch
 
 
 class ResidualQuantizer(nn.Module):
-    """V codebooks of K codes; level v quantizes what the levels below it left over (eq. 1)."""
+    """V codebooks of K codes; level v quantizes the residual of the levels below it (eq. 1)."""
 
     codebooks: Tensor  # (V, K, d)
-    counts: Tensor  # (V, K), moving average of how many vectors of a batch chose the code
+    counts: Tensor  # (V, K), moving average of the number of vectors per batch that chose the code
     sums: Tensor  # (V, K, d), moving average of the sum of those vectors
     initialized: Tensor  # (), bool
 
@@ -71,7 +71,7 @@ class ResidualQuantizer(nn.Module):
 
         Args:
             latent: (B, n, d).
-            valid: (B, n) bool, None = all. Invalid positions neither train nor count, and come out as zeros.
+            valid: (B, n) bool, None = all. Invalid positions neither train nor count, and their output is zero.
         """
         with torch.autocast(latent.device.type, enabled=False):
             return self._forward(latent.float(), valid)
@@ -109,20 +109,20 @@ class ResidualQuantizer(nn.Module):
         return Quantized(output, torch.stack(tokens, -1), commitment, torch.stack(perplexity))
 
     def scaled(self, vectors: Tensor, level: int) -> Tensor:
-        """Vectors (..., d) as the codebook of `level` sees them: here unchanged."""
+        """Return vectors (..., d) as the codebook of `level` sees them: here unchanged."""
         return vectors
 
     def restored(self, codes: Tensor, level: int) -> Tensor:
-        """The inverse of `scaled`, for codes (..., d)."""
+        """Invert `scaled`, for codes (..., d)."""
         return codes
 
     def straight_through(self, latent: Tensor, total: Tensor) -> Tensor:
-        """`total` by value; the gradient goes to `latent` alone."""
+        """Return the value of `total`, with its gradient passed to `latent` alone."""
         return latent + (total - latent).detach()
 
     @torch.no_grad()
     def encode(self, latent: Tensor) -> Tensor:
-        """Tokens (B, n, V) of `latent` (B, n, d), all levels, nothing trained."""
+        """Return tokens (B, n, V) of `latent` (B, n, d), all levels, without training."""
         residual = latent.float()
         tokens: list[Tensor] = []
         for level in range(self.levels):
@@ -132,7 +132,7 @@ class ResidualQuantizer(nn.Module):
         return torch.stack(tokens, -1)
 
     def decode(self, tokens: Tensor) -> Tensor:
-        """Sum of the codes (B, n, d) of tokens (B, n, V' <= V); NO_TOKEN adds nothing."""
+        """Return the sum of the codes (B, n, d) of tokens (B, n, V' <= V); NO_TOKEN adds nothing."""
         total = self.codebooks.new_zeros((*tokens.shape[:-1], self.codebooks.shape[-1]))
         for level in range(tokens.shape[-1]):
             index = tokens[..., level]
@@ -141,7 +141,7 @@ class ResidualQuantizer(nn.Module):
         return total
 
     def nearest(self, vectors: Tensor, level: int) -> Tensor:
-        """Index (...) of the code of `level` nearest to each vector (..., d), Euclidean."""
+        """Return the index (...) of the code of `level` nearest to each vector (..., d), Euclidean."""
         codebook = self.codebooks[level]
         flat = vectors.reshape(-1, vectors.shape[-1])
         # |x|² is the same for every code: left out
@@ -149,7 +149,8 @@ class ResidualQuantizer(nn.Module):
         return scores.argmin(-1).view(vectors.shape[:-1])
 
     def _kept_levels(self, latent: Tensor) -> Tensor:
-        """Number of levels each sample keeps (B,): all, or in training for a share of the samples 1 to V - 1."""
+        """Return the number of levels that each sample keeps (B,): all, or in training for a share of the samples 1 to
+        V - 1."""
         batch = latent.shape[0]
         everything = torch.full((batch,), self.levels, device=latent.device)
         if not self.training or self.dropout == 0 or self.levels == 1:
@@ -178,7 +179,7 @@ class ResidualQuantizer(nn.Module):
         self.codebooks[level] = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
         if len(vectors) == 0 or bool(alive.all()):
             return
-        # A revived code starts as if it had just been used often enough, so that it lives long enough to find work.
+        # A revived code starts as if just used often enough, so that it is not reset before vectors choose it.
         fresh = broadcast(_draw(vectors, self.codes))
         dead = ~alive
         self.codebooks[level][dead] = fresh[dead]
@@ -187,7 +188,7 @@ class ResidualQuantizer(nn.Module):
 
 
 def _draw(vectors: Tensor, count: int) -> Tensor:
-    """`count` vectors drawn from (N, d) without replacement; when N < count, repeated with a little noise."""
+    """Return `count` vectors drawn from (N, d) without replacement; if N < count, repeated with a little noise."""
     rows = len(vectors)
     if rows >= count:
         return vectors[torch.randperm(rows, device=vectors.device)[:count]].clone()
@@ -196,6 +197,6 @@ def _draw(vectors: Tensor, count: int) -> Tensor:
 
 
 def _perplexity(usage: Tensor) -> Tensor:
-    """exp(entropy) of a histogram (K,)."""
+    """Return exp(entropy) of a histogram (K,)."""
     share = usage / usage.sum().clamp(min=1)
     return torch.exp(-(share * torch.log(share + 1e-10)).sum())

@@ -1,8 +1,8 @@
 """Sequences of different lengths without their padding: for inference on a CPU.
 
-Everything but attention acts on each row alone, so only rows that exist are computed, (R, w) for the whole batch; for
-attention they are laid out in sequences padded to whole vectors (`ROWS`, `pad_length`). Packed products give a row
-the same bits beside any others (`marey.nn.packed`), so a batch does not change a row's.
+All operations but attention act on each row alone, so only existing rows are computed, (R, w) for the whole batch; for
+attention they are laid out in sequences padded to whole vectors (`ROWS`, `pad_length`). Packed products give a row the
+same bits beside any others (`marey.nn.packed`), so a batch does not change a row's.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from torch import Tensor
 SEQUENCE_MULTIPLE = 16
 """Sequences padded to a multiple of this give the same bits however much padding follows (see `pad_length`)."""
 ROWS = 32
-"""The number of rows is made up to a multiple of this: few rows go through other kernels on some processors."""
+"""The number of rows is rounded up to a multiple of this: few rows use other kernels on some processors."""
 
 
 def pad_length(size: int, multiple: int = SEQUENCE_MULTIPLE) -> int:
-    """`size` rounded up to a multiple of 16, or of another number.
+    """Return `size` rounded up to a multiple of 16, or of another number.
 
     A softmax over keys sums in vectors of 16 lanes and treats a last incomplete vector apart. Where all readable keys
     lie in whole vectors, masked keys behind them add exact zeros: measured with torch 2.13 on AVX-512, float32 and
@@ -29,7 +29,7 @@ def pad_length(size: int, multiple: int = SEQUENCE_MULTIPLE) -> int:
 
 
 def key_bias(readable: Tensor, dtype: torch.dtype) -> Tensor:
-    """Attention bias of keys: 0 where a key may be read, else far below any score. Same shape."""
+    """Return the attention bias of keys: 0 where a key may be read, else far below any score. Same shape."""
     return torch.zeros(readable.shape, dtype=dtype, device=readable.device).masked_fill(~readable, -1e30)
 
 
@@ -37,7 +37,7 @@ def key_bias(readable: Tensor, dtype: torch.dtype) -> Tensor:
 class Ragged:
     """Layout of the rows of B padded sequences for H heads: R computed rows, P places of a sequence.
 
-    A chunk is what one head has of one row: D numbers.
+    A chunk is the part of one row that one head reads: D numbers.
     """
 
     taken: Tensor  # (R,) places of the rows among B · S
@@ -56,7 +56,7 @@ class Ragged:
         places = pad_length(size)
         rows = valid.flatten().nonzero().squeeze(1)
         taken = torch.cat([rows, rows[:1].expand(-len(rows) % ROWS)])
-        row = torch.zeros(batch, places, dtype=torch.long)  # what is masked may be any row
+        row = torch.zeros(batch, places, dtype=torch.long)  # masked places may hold any row
         row[rows // size, rows % size] = torch.arange(len(rows))
         part, head = torch.arange(3).view(3, 1, 1, 1), torch.arange(heads).view(1, 1, heads, 1)
         spread = (row[None, :, None] * 3 + part) * heads + head  # (3, B, H, P)
@@ -68,14 +68,14 @@ class Ragged:
         return cls(taken, spread.flatten(), collect, bias, heads, size, places)
 
     def first(self, rows: int) -> tuple[Tensor, Tensor]:
-        """The first `rows` places of each sequence.
+        """Return the layout's first `rows` places of each sequence.
 
         Returns:
-            kept (R',), those among the R rows; place (B, rows), where each stands among the kept ones, 0 where it
-            does not exist.
+            kept (R',), those among the R rows; place (B, rows), their index among the kept ones, 0 where a row does not
+            exist.
         """
         inside = self.taken % self.size < rows
-        inside[1:] &= self.taken[1:] > self.taken[:-1]  # not what the number of rows was made up with
+        inside[1:] &= self.taken[1:] > self.taken[:-1]  # without the rows that round up their number
         kept = inside.nonzero().squeeze(1)
         batch = len(self.bias) // self.heads
         place = torch.zeros(batch, rows, dtype=torch.long)
@@ -84,12 +84,12 @@ class Ragged:
         return torch.cat([kept, kept[:1].expand(-len(kept) % ROWS)]), place
 
     def sequences(self, qkv: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(R, 3 · H · D) to queries, keys and values, each (B · H, P, D)."""
+        """Spread (R, 3 · H · D) to queries, keys and values, each (B · H, P, D)."""
         chunks = qkv.view(len(qkv) * 3 * self.heads, -1).index_select(0, self.spread)
         query, key, value = chunks.view(3, len(self.bias), self.places, -1).unbind()
         return query, key, value
 
     def rows(self, mixed: Tensor, kept: Tensor | None = None) -> Tensor:
-        """(B · H, P, D) to (R, H · D), or to the rows `kept`."""
+        """Collect (B · H, P, D) to (R, H · D), or to the rows `kept`."""
         collect = self.collect if kept is None else self.collect[kept]
         return mixed.flatten(0, 1).index_select(0, collect.flatten()).view(len(collect), -1)

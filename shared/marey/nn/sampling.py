@@ -17,11 +17,11 @@ _MIX_2 = -7723592293110705685  # 0x94D049BB133111EB
 
 
 def uniform(seeds: Tensor, stream: int, step: int, positions: Tensor) -> Tensor:
-    """Uniform numbers in (0, 1), float32, for each (seed, position).
+    """Return uniform numbers in (0, 1), float32, for each (seed, position).
 
     Args:
         seeds: (B,) int64, one an item.
-        stream: what the numbers are for (base tokens, residual tokens, …).
+        stream: purpose of the numbers (base tokens, residual tokens, …).
         step: decoding step.
         positions: (n,) int64, or (B, n), its own for each seed.
 
@@ -41,7 +41,7 @@ def guide(conditional: Tensor, unconditional: Tensor, scale: float) -> Tensor:
 
 
 def sample_top_k(logits: Tensor, noise: Tensor, *, temperature: float, share: float) -> Tensor:
-    """Draw one token a row by inverting the distribution function of softmax(top-k(logits / temperature)).
+    """Draw one token per row by inverting the distribution function of softmax(top-k(logits / temperature)).
 
     Args:
         logits: (..., K) float32.
@@ -63,17 +63,17 @@ def sample_top_k(logits: Tensor, noise: Tensor, *, temperature: float, share: fl
 
 
 def _hash(value: Tensor) -> Tensor:
-    """SplitMix64's finaliser on int64 (overflow wraps)."""
+    """Apply SplitMix64's finaliser to int64 (overflow wraps)."""
     value = (value ^ _shift(value, 30)) * _MIX_1
     value = (value ^ _shift(value, 27)) * _MIX_2
     return value ^ _shift(value, 31)
 
 
 def _wrap(value: int) -> int:
-    """A Python integer modulo 2^64, as signed 64 bits."""
+    """Return a Python integer modulo 2^64, as signed 64 bits."""
     return (value + (1 << 63)) % (1 << 64) - (1 << 63)
 
 
 def _shift(value: Tensor, bits: int) -> Tensor:
-    """Logical right shift of int64 (torch's is arithmetic)."""
+    """Shift int64 right logically (torch's shift is arithmetic)."""
     return (value >> bits) & ((1 << (64 - bits)) - 1)

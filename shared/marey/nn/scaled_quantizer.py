@@ -1,6 +1,6 @@
-"""MoSA-VQ: a residual quantizer whose levels scale and shift what they quantize (MOGO Sec. 2.1, eq. 1-6).
+"""MoSA-VQ: a residual quantizer whose levels scale and shift their input (MOGO Sec. 2.1, eq. 1-6).
 
-Fu et al., "MOGO: Residual Quantized Hierarchical Causal Transformer", 2025. The codebooks live in the scaled space;
+Fu et al., "MOGO: Residual Quantized Hierarchical Causal Transformer", 2025. The codebooks are in the scaled space;
 averages, resets and dropped levels are those of `ResidualQuantizer`.
 """
 
@@ -16,11 +16,11 @@ from marey.nn.quantizer import ResidualQuantizer
 Scale = Literal["elementwise", "scalar", "none"]
 
 MIN_SCALE = 0.05
-"""Floor of |s|, which eq. 3 divides by."""
+"""Lower limit of |s|, the divisor of eq. 3."""
 
 
 class ScaledQuantizer(ResidualQuantizer):
-    """Level l quantizes |s|·r + bias and gives back (code - bias) / |s| (eq. 1-3), s and bias learnt.
+    """Level l quantizes |s|·r + bias and returns (code - bias) / |s| (eq. 1-3), s and bias learned.
 
     |s| is read elementwise: the paper writes a norm of a vector that its regularizer pulls to 1, and only elementwise
     is identity its fixed point. Scales and biases are vectors, one parameter a level: the training loop decays
@@ -56,22 +56,23 @@ class ScaledQuantizer(ResidualQuantizer):
         self.biases = nn.ParameterList(torch.zeros(width) for _ in range(learnt))
 
     def scaled(self, vectors: Tensor, level: int) -> Tensor:
-        """|s|·r + bias (eq. 1)."""
+        """Return |s|·r + bias (eq. 1)."""
         return vectors * self._scale(level) + self.biases[level] if len(self.scales) else vectors
 
     def restored(self, codes: Tensor, level: int) -> Tensor:
-        """(code - bias) / |s| (eq. 3); s and bias get their gradient here and nowhere else."""
+        """Return (code - bias) / |s| (eq. 3); s and bias get their gradient here alone."""
         return (codes - self.biases[level]) / self._scale(level) if len(self.scales) else codes
 
     def straight_through(self, latent: Tensor, total: Tensor) -> Tensor:
-        """`total` by value; its own gradient goes to s and bias, that of the identity to `latent` (ours).
+        """Return the value of `total`; its own gradient goes to s and bias, that of the identity to `latent` (ours).
 
         Inside the scaling, straight-through would cancel the bias and give s a gradient that inflates it.
         """
         return total + (latent - latent.detach())
 
     def regularizer(self) -> Tensor:
-        """Last term of eq. 6 without γ: sum over levels of (s - 1)² and bias², each as a mean over elements (ours)."""
+        """Return the last term of eq. 6 without γ: sum over levels of (s - 1)² and bias², each a mean over elements
+        (ours)."""
         total = self.codebooks.new_zeros(())
         for scale, bias in zip(self.scales, self.biases, strict=True):
             total = total + (scale - 1).square().mean() + bias.square().mean()

@@ -1,4 +1,4 @@
-"""Reading a prompt takes one thread."""
+"""Limit of torch's threads while a prompt is read."""
 
 from __future__ import annotations
 

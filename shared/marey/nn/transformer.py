@@ -1,8 +1,8 @@
 """Bidirectional transformer encoder: fused QKV, scaled dot-product attention, either norm placement.
 
-Sequences are laid out [tokens | condition slots] in memory although positions count the slots first: attention does
-not care about memory order, positions are added to the inputs, and padding that stands last (of tokens within their
-bucket, or of slots) can be cut off without moving anything else.
+Sequences are laid out [tokens | condition slots] in memory although positions count the slots first: attention does not
+depend on memory order, positions are added to the inputs, and trailing padding (of tokens within their bucket, or of
+slots) can be cut off without moving anything else.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
 
 
 def _attention(query: Tensor, key: Tensor, value: Tensor, bias: Tensor, rate: float) -> Tensor:
-    """Scaled dot-product attention written out, for CPUs: queries (B · H, Q, D), keys and values (B · H, S, D), `bias`
-    of the scores (B · H or 1, Q or 1, S or 1).
+    """Compute scaled dot-product attention step by step, for CPUs: queries (B · H, Q, D), keys and values (B · H, S,
+    D), `bias` of the scores (B · H or 1, Q or 1, S or 1).
 
     At 64 rows torch's fused CPU kernel takes twice as long forward, and a third of a training step backward.
     """

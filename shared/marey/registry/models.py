@@ -32,7 +32,7 @@ RESERVED = frozenset({"text", "evaluator", "live"})
 
 @dataclass(frozen=True)
 class Setting:
-    """A number that changes how a model draws.
+    """A number that changes how a model samples.
 
     Attributes:
         name: as in requests and `--set NAME=VALUE`.
@@ -72,7 +72,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Choice:
-    """An option of a model's training that takes one of several words; none given = as the configuration says."""
+    """An option of a model's training that takes one of several words; by default the configuration decides."""
 
     name: str
     values: tuple[str, ...]
@@ -81,13 +81,13 @@ class Choice:
 
 @dataclass(frozen=True)
 class Training:
-    """How bundles are trained. All functions are references, `module:attribute`.
+    """Training of bundles. All functions are references, `module:attribute`.
 
     Attributes:
         help: of the group of commands.
         stages: in training order; one named `all` runs every other.
         config: `(name, **choices) -> configuration`, a `marey.core.configs.ModelConfig` with one
-            `train_<stage>: StageConfig` a stage.
+            `train_<stage>: StageConfig` per stage.
         train: `(stage, TrainOptions) -> {metric: value}`.
         assemble: `(prepared, run, output, configuration, *, card, overwrite) -> Bundle`.
         unpack: `(bundle, run) -> configuration`; None = bundles cannot be trained further.
@@ -122,23 +122,23 @@ class Ablation:
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """All that the product knows of a generator model.
+    """Description of a generator model for the product.
 
     Attributes:
         name: of the model, its queue, and `model` in the manifests of its bundles.
-        title: for people.
-        about: what it can and cannot do, in about ten lines.
-        handler: `() -> Handler`, the work of its queue.
+        title: display name.
+        about: abilities and limits, in about ten lines.
+        handler: `() -> Handler` of its queue.
         load: `(bundle, *, device, threads) -> Generator` (`marey.generation.port`).
         settings: of sampling.
-        live: `() -> Show` (`marey.runtime.live.port`); None = it does not stream.
+        live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
         training: None = it is not trained here.
-        tokenizer: `(parameters) -> MotionTokenizer`, untrained; it is filled from the part `tokenizer` of a bundle or
-            run. None = no part is named so.
-        random_bundle: `(path) -> Bundle` with random weights, for a look at the machinery.
+        tokenizer: `(parameters) -> MotionTokenizer`, untrained; its weights come from the part `tokenizer` of a bundle
+            or run. None = the model has no such part.
+        random_bundle: `(path) -> Bundle` with random weights, for tests and demos.
         live_adherence: `(generator, prompts, *, steers, walks) -> {title: sessions}`; see `marey eval adherence`.
-        self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> motions kept`.
-        ablations: what `marey train ablate` compares.
+        self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> number of kept motions`.
+        ablations: comparisons for `marey train ablate`.
     """
 
     name: str
@@ -177,7 +177,7 @@ def _owner(entry: EntryPoint) -> str:
 
 
 def model_names() -> tuple[str, ...]:
-    """The names of all registered models, sorted; imports none of them.
+    """Return the names of all registered models, sorted; imports none of them.
 
     Raises:
         InvalidInput: two packages register one name.
@@ -187,7 +187,7 @@ def model_names() -> tuple[str, ...]:
 
 @cache
 def find_model(name: str) -> ModelSpec | None:
-    """The spec of a registered model; None where it is not installed here.
+    """Return the spec of a registered model; None if it is not installed here.
 
     Raises:
         InvalidInput: its package cannot be imported, or registers something else.
@@ -213,7 +213,7 @@ def find_model(name: str) -> ModelSpec | None:
 
 
 def get_model(name: str, where: str | None = None) -> ModelSpec:
-    """The spec of a registered model.
+    """Return the spec of a registered model.
 
     Raises:
         NotFound: it is not installed here.
@@ -222,7 +222,7 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
     spec = find_model(name)
     if spec is None:
         raise NotFound(
-            f"there is no model {name!r}",
+            f"unknown model {name!r}",
             where=where,
             hint=f"Installed here: {', '.join(model_names()) or 'none'}. A package that registers it adds it.",
         )
@@ -230,7 +230,7 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
 
 
 def resolve(reference: str) -> Any:
-    """Import what `module:attribute` names; the attribute may be dotted, as `Generator.load`.
+    """Import the attribute of a reference `module:attribute`; the attribute may be dotted, as `Generator.load`.
 
     Raises:
         ImportError: there is no such module, or one that it needs is not installed.

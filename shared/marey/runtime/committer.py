@@ -19,10 +19,10 @@ from marey.evaluations import NewScore, commit_score
 from marey.jobs import (
     AssetDigest,
     Committed,
+    FailureReason,
     ItemFailure,
     NewMotion,
     NewText,
-    Problem,
     asset_key,
     begin_assets,
     commit_motions,
@@ -197,7 +197,7 @@ class Committer(threading.Thread):
             raise  # released when the lease is finished
         except Exception as error:
             log.exception("write_failed", items=len(group), item_ids=ids_of(outcome.item for outcome in group))
-            problem = Problem.of(as_problem(error))
+            problem = FailureReason.of(as_problem(error))
             failures = [ItemFailure(outcome.item, problem, retryable=True) for outcome in group]
             lease.settle(outcome.item for outcome in group)
             self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
@@ -211,7 +211,9 @@ class Committer(threading.Thread):
         texts = [NewText(o.item, o.key, o.blob) for o in group if isinstance(o, TextDone)]
         if texts:
             self._commit(lease, "texts", lambda conn, token: commit_texts(conn, token, texts))
-        failures = [ItemFailure(o.item, Problem.of(o.problem), o.retryable) for o in group if isinstance(o, Failed)]
+        failures = [
+            ItemFailure(o.item, FailureReason.of(o.problem), o.retryable) for o in group if isinstance(o, Failed)
+        ]
         if failures:
             self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
 

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import MareyError, Unreachable
 from marey.db import transaction
-from marey.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts
+from marey.jobs import NO_TEXT, Claim, ClaimedItem, ItemStage, claim, load_texts
 from marey.runtime.committer import Committer
 from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, retry_unreachable
 from marey.runtime.handler import Batch, Failed, Handler
@@ -35,7 +35,7 @@ CLAIM_PATIENCE = 30.0  # seconds without a database until a drain gives up; the 
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedBundle:
     """State of a handler: loaded bundle and last served lane."""
 
     bundle: str
@@ -83,7 +83,7 @@ class Drain:
         self._stopping = stopping
         self._ticked = ticked
         self._turns = deque(handlers)
-        self.loaded: dict[str, Loaded] = {}
+        self.loaded: dict[str, LoadedBundle] = {}
 
     def drain(self, seconds: float) -> int:
         """Work until all queues are empty, `seconds` are over or a stop comes; every result is written at the end.
@@ -116,7 +116,7 @@ class Drain:
             started = time.monotonic()
             self._handlers[queue].load(bundle)
             log.info("loaded", queue=queue, bundle=bundle, seconds=round(time.monotonic() - started, 2))
-        self.loaded[queue] = Loaded(bundle, batch_key)
+        self.loaded[queue] = LoadedBundle(bundle, batch_key)
 
     def _one_batch(self) -> int:
         self._committer.acquire_slot()
@@ -196,7 +196,7 @@ class Drain:
     def _batch(self, lease: HeldLease) -> Batch:
         """Return the claim with its text features, or its scoring input; items that lack features fail, retryably."""
         taken = lease.claim
-        if taken.stage is Stage.TEXT:
+        if taken.stage is ItemStage.TEXT:
             return Batch(taken, taken.items, {})
         if taken.items[0].text_key == NO_TEXT:
             score = partial(score_input, self._engine, self._store, taken.job)

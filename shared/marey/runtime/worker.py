@@ -108,7 +108,7 @@ def _watch(home: Path, name: str) -> None:
 
 
 def _is_stuck(status: WorkerStatus | None, now: float) -> bool:
-    """Return True if the child that wrote the status hangs. The last status of a killed child says nothing about its
+    """Return True if the child that wrote the status hangs. The last status of a killed child does not describe its
     successor, which may still be importing; Celery's pool waits for that."""
     return status is not None and psutil.pid_exists(status.pid) and not status.alive(now)
 

@@ -69,7 +69,7 @@ class S3Options:
     Attributes:
         endpoint: `http://host:port`, `https://host`, or `host:port`.
         secure: use https for an endpoint without a scheme.
-        public_endpoint: stands in presigned URLs, where clients reach the store under another name or scheme.
+        public_endpoint: address in presigned URLs, where clients reach the store under another name or scheme.
         ca_file: PEM file of certificate authorities to trust beside the machine's own.
     """
 
@@ -230,10 +230,10 @@ class S3Store:
             STORE_ERRORS.labels("s3").inc()
             raise
         except S3Error as error:
-            told = self._told(error)
-            if key is not None and told.code in MISSING:
+            precise = self._refined(error)
+            if key is not None and precise.code in MISSING:
                 raise no_such_object(key) from error
-            raise self._because(told.code or "", told.message) from error
+            raise self._because(precise.code or "", precise.message) from error
         except (ServerError, InvalidResponseError, MinioException) as error:
             raise self._unreachable(str(error).splitlines()[0]) from error
         except (urllib3.exceptions.HTTPError, OSError) as error:
@@ -243,7 +243,7 @@ class S3Store:
             cause = getattr(error, "reason", None) or error
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
-    def _told(self, error: S3Error) -> S3Error:
+    def _refined(self, error: S3Error) -> S3Error:
         """Return the error, or a more precise one: the answer to a HEAD names neither a missing bucket nor invalid
         keys, so the request is repeated as a GET."""
         try:
@@ -275,9 +275,9 @@ class S3Store:
     def _unreachable(self, cause: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()
         return Unreachable(
-            f"the object store does not answer as it should ({cause})",
+            f"the object store failed ({cause})",
             where=self._where(),
-            hint="Is it running, has it room left, and are MAREY_S3_ENDPOINT (with its scheme) and the keys right?",
+            hint="Is it running, has it free space, and are MAREY_S3_ENDPOINT (with its scheme) and the keys right?",
             public=PUBLIC,
         )
 

@@ -9,7 +9,7 @@ from marey.streams.repository import (
     list_streams,
     open_streams,
     prompts_with_rewrites,
-    stream_acts,
+    stream_actions,
     stream_prompts,
     take_stream,
 )
@@ -31,7 +31,7 @@ __all__ = [
     "list_streams",
     "open_streams",
     "prompts_with_rewrites",
-    "stream_acts",
+    "stream_actions",
     "stream_prompts",
     "take_stream",
 ]

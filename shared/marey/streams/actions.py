@@ -10,5 +10,5 @@ class ActionStart(NamedTuple):
 
     frame: int
     """Number of the first frame of the action."""
-    act: int
+    action: int
     """Number of the action in its prompt, from 0."""

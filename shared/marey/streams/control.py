@@ -24,7 +24,7 @@ FIELD = b"m"
 
 
 @dataclass(frozen=True)
-class Control:
+class StreamControl:
     """One control message; only a steer has a `prompt`, the new text."""
 
     kind: Kind
@@ -43,7 +43,7 @@ class Control:
         return json.dumps(message, ensure_ascii=False).encode()
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> Control:
+    def from_bytes(cls, data: bytes) -> StreamControl:
         """Decode a message.
 
         Raises:
@@ -75,14 +75,14 @@ class ControlQueue:
         self.key = stream_key(stream, "control")
         self._redis: Any = client
 
-    def send(self, control: Control) -> str:
+    def send(self, control: StreamControl) -> str:
         """Append a message; return its id. Ids grow."""
         with reached(self.stream), self._redis.pipeline() as pipe:
             pipe.xadd(self.key, {FIELD: control.to_bytes()}, maxlen=KEPT_MESSAGES, approximate=False)
             pipe.pexpire(self.key, KEEP_MS)
             return pipe.execute()[0].decode()
 
-    def read(self, after: str = START, *, block_ms: int = 0) -> list[tuple[str, Control | InvalidInput]]:
+    def read(self, after: str = START, *, block_ms: int = 0) -> list[tuple[str, StreamControl | InvalidInput]]:
         """Return all messages after the one with this id, oldest first, each with its own id.
 
         A message unknown to this release is returned as an error: a worker that stopped at it would never get past
@@ -95,10 +95,10 @@ class ControlQueue:
         block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
         with reached(self.stream):
             answer = self._redis.xread({self.key: after}, block=block)
-        found: list[tuple[str, Control | InvalidInput]] = []
+        found: list[tuple[str, StreamControl | InvalidInput]] = []
         for identity, fields in stream_entries(answer):
             try:
-                message: Control | InvalidInput = Control.from_bytes(fields.get(FIELD, b""))
+                message: StreamControl | InvalidInput = StreamControl.from_bytes(fields.get(FIELD, b""))
             except InvalidInput as error:
                 message = error
             found.append((identity.decode(), message))

@@ -22,7 +22,7 @@ Prompts: TypeAlias = Sequence[tuple[int, str]]
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class StreamRecording:
     """Everything of a stream that determines its clip.
 
     Attributes:
@@ -48,7 +48,7 @@ class Recording:
         return save(arrays)
 
     @classmethod
-    def from_blob(cls, blob: bytes) -> Recording | None:
+    def from_blob(cls, blob: bytes) -> StreamRecording | None:
         """Decode the output of `to_blob`; None for any other safetensors.
 
         Raises:

@@ -20,7 +20,7 @@ from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
 from marey.db.sql import CLOCK, check_text, interval
 from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
-from marey.jobs.types import NewItem, NewJob, Problem
+from marey.jobs.types import FailureReason, NewItem, NewJob
 from marey.streams import tables
 from marey.streams.actions import ActionStart
 from marey.streams.rewrites import PromptRewrite
@@ -125,11 +125,11 @@ def prompts_with_rewrites(conn: sa.Connection, stream: UUID) -> list[StreamPromp
     ]
 
 
-def stream_acts(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
+def stream_actions(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
     """Return every recorded action start of a stream; none from workers that did not record actions."""
     table = tables.stream_chunk.c
     query = sa.select(table.acts).where(table.stream_id == stream, table.acts.is_not(None)).order_by(table.first)
-    return [ActionStart(*act) for acts in conn.execute(query).scalars() for act in acts]
+    return [ActionStart(*action) for actions in conn.execute(query).scalars() for action in actions]
 
 
 # --- functions for workers ---
@@ -165,7 +165,7 @@ def take_stream(conn: sa.Connection, stream: UUID, fence: int, worker: str) -> S
     row = _row(conn.execute(_streams().where(table.c.id == stream)).mappings().one())
     chunk = tables.stream_chunk.c
     tokens = conn.execute(sa.select(chunk.tokens).where(chunk.stream_id == stream).order_by(chunk.first)).scalars()
-    return StreamPast(row, b"".join(tokens), tuple(stream_prompts(conn, stream)), tuple(stream_acts(conn, stream)))
+    return StreamPast(row, b"".join(tokens), tuple(stream_prompts(conn, stream)), tuple(stream_actions(conn, stream)))
 
 
 def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk) -> bool:
@@ -185,7 +185,7 @@ def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk)
                 first=chunk.first,
                 tokens=chunk.tokens,
                 prompts=[[frame, text] for frame, text in chunk.prompts],
-                acts=[list(act) for act in chunk.acts],
+                acts=[list(action) for action in chunk.actions],
                 reads=sa.null() if chunk.reads is None else [list(read) for read in chunk.reads],
             )
         )
@@ -198,7 +198,7 @@ def end_stream(
     fence: int | None,
     reason: str,
     *,
-    problem: Problem | None = None,
+    problem: FailureReason | None = None,
     clip: tuple[NewItem, bytes] | None = None,
 ) -> bool:
     """End a stream; its clip, if it has one, becomes a job of one item.
@@ -272,7 +272,7 @@ def _streams() -> sa.Select[*tuple[Any, ...]]:
 def _row(row: sa.RowMapping) -> StreamRow:
     values: dict[str, Any] = dict(row)
     values["state"] = StreamState(row["state"])
-    values["problem"] = None if row["problem"] is None else Problem(**row["problem"])
+    values["problem"] = None if row["problem"] is None else FailureReason(**row["problem"])
     return StreamRow(**values)
 
 

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import NamedTuple
 from uuid import UUID
 
-from marey.jobs.types import Problem
+from marey.jobs.types import FailureReason
 from marey.streams.actions import ActionStart
 from marey.streams.rewrites import PromptRewrite
 from marey.streams.states import StreamState
@@ -52,7 +52,7 @@ class StreamRow:
     position: int | None
     """Number of streams that wait before it; None if it does not wait."""
     reason: str | None
-    problem: Problem | None
+    problem: FailureReason | None
     fence: int
     worker: str | None
     control: str
@@ -82,13 +82,13 @@ class StreamPast:
     Attributes:
         tokens: int16, little-endian, a column of V levels for each of `row.frames`.
         prompts: every prompt with its first frame; none before the first frame.
-        acts: starts of actions of all these prompts.
+        actions: starts of actions of all these prompts.
     """
 
     row: StreamRow
     tokens: bytes = field(repr=False)
     prompts: tuple[tuple[int, str], ...]
-    acts: tuple[ActionStart, ...]
+    actions: tuple[ActionStart, ...]
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class StreamChunk:
         prompts: prompts that came into force; `reads`, of the same length, has their rewrites.
         control: id of the last applied message.
         state: live or paused; None = unchanged.
-        acts: starts of actions.
+        actions: starts of actions.
     """
 
     first: int
@@ -111,5 +111,5 @@ class StreamChunk:
     prompts: Sequence[tuple[int, str]]
     control: str
     state: StreamState | None = None
-    acts: Sequence[ActionStart] = ()
+    actions: Sequence[ActionStart] = ()
     reads: Sequence[PromptRewrite] | None = None

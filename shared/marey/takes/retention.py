@@ -157,11 +157,11 @@ def rewrite_files(engine: sa.Engine, store: FileStore) -> int:
     otherwise, keeps its files from being served; the next call tries again. Other formats do not wait for it.
 
     Returns:
-        How many files were done.
+        Number of rewritten files.
 
     Raises:
-        Unreachable: the store or the database does not answer; the next call goes on.
-        ExceptionGroup: of some formats no file could be rewritten.
+        Unreachable: the store or the database does not answer; the next call continues.
+        ExceptionGroup: no file of some formats could be rewritten.
     """
     with transaction(engine, MAINTENANCE) as conn:
         formats = _formats_waiting(conn)
@@ -256,7 +256,7 @@ def _rewrite_format(engine: sa.Engine, store: FileStore, exporter: Exporter[Any]
 
 
 def _without_prompt(exporter: Exporter[Any], data: bytes, where: str) -> bytes:
-    """Encode a file again, with a manifest of no more than what is `KEPT`, and that the rest was erased."""
+    """Encode a file again, with a manifest that holds only the keys in `KEPT` and the fact that the rest was erased."""
     assert exporter.decode is not None  # `Exporter` checks it of formats that hold prompts
     clip = exporter.decode(data, where, Coordinates())
     manifest = {name: value for name, value in clip.manifest.items() if name in KEPT}

@@ -56,12 +56,12 @@ def review(
     _check(motions, comment)
     rows = motions_of(conn, tenant, motions)
     locked = [lock_job_of(conn, tenant, job) for job in sorted({row.job for row in rows})]
-    said = _say(conn, [row.id for row in rows], verdict, by, comment)
+    changed = _write_verdict(conn, [row.id for row in rows], verdict, by, comment)
     verb = "taken back" if verdict is None else str(verdict)
     for job in locked:
-        if said[job.id]:
-            told = f"{said[job.id]} motions {verb} by {by}" + (f": {comment}" if comment else "")
-            record(conn, job, [NewEvent("reviewed", told, data={"verdict": verdict, "motions": said[job.id]})])
+        if changed[job.id]:
+            message = f"{changed[job.id]} motions {verb} by {by}" + (f": {comment}" if comment else "")
+            record(conn, job, [NewEvent("reviewed", message, data={"verdict": verdict, "motions": changed[job.id]})])
     return motions_of(conn, tenant, motions)
 
 
@@ -149,12 +149,12 @@ def _roll_again(
         for item in sources
     ]
     lanes = write_items(conn, job.id, takes, first=numbers.position)
-    told = f"{len(takes)} motions re-rolled by {by}" + (f": {comment}" if comment else "")
+    message = f"{len(takes)} motions re-rolled by {by}" + (f": {comment}" if comment else "")
     # Ended jobs continue; the pause of a job with open items stays.
     control = JobControl.RUN if job.state in ENDED else None
-    record(conn, job, [NewEvent("rerolled", told, data={"items": len(takes)})], added=len(takes), control=control)
+    record(conn, job, [NewEvent("rerolled", message, data={"items": len(takes)})], added=len(takes), control=control)
     change_lanes(conn, job.id, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
-    _say(conn, [wanted[item.id].id for item in sources], Review.REROLLED, by, comment)
+    _write_verdict(conn, [wanted[item.id].id for item in sources], Review.REROLLED, by, comment)
     return {wanted[item.id].id for item in sources}
 
 
@@ -205,7 +205,7 @@ def _refuse_streams(conn: sa.Connection, items: Sequence[UUID]) -> None:
         )
 
 
-def _say(
+def _write_verdict(
     conn: sa.Connection, motions: Sequence[UUID], verdict: Review | None, by: str, comment: str | None
 ) -> Counter[UUID]:
     """Write a verdict where another one is set; return the number of changed motions by job."""

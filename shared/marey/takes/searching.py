@@ -166,9 +166,9 @@ def _conditions(found: MotionFilter, terms: sa.ColumnElement[Any]) -> list[sa.Co
     if found.text is not None:
         asked = sa.func.websearch_to_tsquery(sa.literal_column("'english'::regconfig"), found.text)
         wanted.append(terms.bool_op("@@")(asked))
-    said = [*map(str, found.reviews), *([UNREVIEWED] if found.unreviewed else [])]
-    if said:
-        wanted.append(_has(terms, sa.literal(" | ".join(f"'\x01r{_escaped(each)}'" for each in said))))
+    verdicts = [*map(str, found.reviews), *([UNREVIEWED] if found.unreviewed else [])]
+    if verdicts:
+        wanted.append(_has(terms, sa.literal(" | ".join(f"'\x01r{_escaped(each)}'" for each in verdicts))))
     return wanted
 
 

@@ -49,8 +49,8 @@ class LightNetwork(nn.Module):
         self.suffixes = nn.Embedding(SUFFIX_BUCKETS * SUFFIXES, config.suffix_width)
         self.suffixes_out = nn.Linear(config.suffix_width * SUFFIXES, width)
         self.endings = nn.Embedding(ENDINGS, width)
-        self.trunk = nn.ModuleList(Block(width, config.heads, drop) for _ in range(config.trunk))
-        self.body = nn.ModuleList(Block(width, config.heads, drop) for _ in range(config.body))
+        self.trunk = nn.ModuleList(EncoderBlock(width, config.heads, drop) for _ in range(config.trunk))
+        self.body = nn.ModuleList(EncoderBlock(width, config.heads, drop) for _ in range(config.body))
         self.predicate = nn.Sequential(
             nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Dropout(drop), nn.Linear(width, 1)
         )
@@ -149,7 +149,7 @@ def sentence_dropout(values: Tensor, probability: float) -> Tensor:
     return values * keep / (1 - probability)
 
 
-class Block(nn.Module):
+class EncoderBlock(nn.Module):
     """Pre-norm self-attention with a learned bias for each distance, and a feed-forward of twice the width."""
 
     def __init__(self, width: int, heads: int, dropout: float) -> None:

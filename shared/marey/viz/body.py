@@ -1,8 +1,9 @@
-"""The drawn body: a skeleton dressed in round cones, for the contact sheet and for the player alike.
+"""The drawn body: round cones along the bones of a skeleton, for contact sheets and the player.
 
-Any skeleton gets a body: legs end in feet, arms in hands, the highest bone of the middle carries a head with a nose, so
-that a picture shows which way a person faces. Sizes and directions are measured in a pose in which the body stands: the
-T-pose of our skeletons; of a foreign one, whose rest pose may be anything, the frame in which it is tallest.
+Any skeleton gets a body: legs end in feet, arms in hands, and the highest bone of the trunk carries a head with a nose,
+so that a picture shows which way a person faces. Sizes and directions are measured in a pose in which the body stands:
+the T-pose of Marey's skeletons; for a foreign skeleton, whose rest pose may be anything, the frame in which it is
+tallest.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 # Radii in metres on a body whose joints span 1.5 m from the lowest to the highest; they scale with the span.
 SPAN = 1.5
 PELVIS, WAIST, CHEST, NECK, GIRDLE = 0.098, 0.094, 0.108, 0.048, 0.062
-DETAIL = 0.015  # eyes, fingers' helpers and the like: side branches of the trunk shorter than an arm
+DETAIL = 0.015  # eyes and similar joints: side branches of the trunk shorter than an arm
 SHORTEST_LIMB = 0.3
 SOLE = 0.028
 # Radius over the share of the way from where the limb leaves the trunk to its end.
@@ -36,7 +37,7 @@ END_SITE = re.compile(r"(end|nub|top|site|tip)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Limb:
+class LimbShape:
     """A round cone between two points, each fixed to a joint by an offset in that joint's own axes, metres."""
 
     part: Part
@@ -50,14 +51,15 @@ class Limb:
 
 @dataclass(frozen=True)
 class Body:
-    """The limbs of one skeleton; how high the figure stands, and how far its soles reach under the lowest joint."""
+    """The limbs of one skeleton; the height of the standing figure, and the depth of its soles below the lowest
+    joint."""
 
-    limbs: tuple[Limb, ...]
+    limbs: tuple[LimbShape, ...]
     height: float  # metres
     sole: float  # metres
 
     def points(self, joints: NDArray[np.floating], axes: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Ends of every limb in the world.
+        """Return the ends of every limb in the world.
 
         Args:
             joints: (F, J, 3) world positions, metres.
@@ -71,26 +73,26 @@ class Body:
         return (joints[:, ends] + np.einsum("flkij,lkj->flki", axes[:, ends], offsets)).astype(np.float32)
 
     def radii(self) -> NDArray[np.float32]:
-        """(L, 2) metres."""
+        """Return radii (L, 2) in metres."""
         return np.array([(limb.start_radius, limb.end_radius) for limb in self.limbs], np.float32)
 
 
 def dress(skeleton: Skeleton) -> Body:
-    """Put a body on a skeleton that stands in its rest pose, facing +Z."""
-    return _Tailor(skeleton, skeleton.rest, np.broadcast_to(np.eye(3), (len(skeleton), 3, 3))).body()
+    """Build the body of a skeleton that stands in its rest pose, facing +Z."""
+    return _BodyBuilder(skeleton, skeleton.rest, np.broadcast_to(np.eye(3), (len(skeleton), 3, 3))).body()
 
 
 def dress_clip(clip: MotionClip) -> Body:
-    """Put a body on the skeleton of a clip, whatever its rest pose is."""
+    """Build the body of a clip's skeleton, whatever its rest pose is."""
     if clip.skeleton.facing:
         return dress(clip.skeleton)
     tallest = int(np.argmax(_stature(clip.skeleton, clip.joints)))
     axes = to_matrix(global_rotations(clip.skeleton, clip.rotations[tallest : tallest + 1]))[0]
-    return _Tailor(clip.skeleton, clip.joints[tallest], axes).body()
+    return _BodyBuilder(clip.skeleton, clip.joints[tallest], axes).body()
 
 
 def part_of(skeleton: Skeleton, joint: int) -> Part:
-    """The side a joint is on: where its name first differs from its mirror image's, one has an L and one an R."""
+    """Return the side of a joint: where its name first differs from its mirror image's, one has an L and one an R."""
     name, twin = skeleton.joint_names[joint].lower(), skeleton.joint_names[skeleton.mirror[joint]].lower()
     difference = next(((a, b) for a, b in zip(name, twin, strict=False) if a != b), None)
     if difference is None:
@@ -99,7 +101,8 @@ def part_of(skeleton: Skeleton, joint: int) -> Part:
 
 
 def forward_of(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Forward direction of a body: on the floor, perpendicular to the line from its right to its left hips and collars.
+    """Return the forward direction of a body: on the floor, perpendicular to the line from right to left hips and
+    collars.
 
     Args:
         skeleton: its sides are read from its joints' names.
@@ -118,13 +121,14 @@ def forward_of(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.f
 
 
 def _stature(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.floating]:
-    """(...) from the lowest joint of (..., J, 3) to the highest of the middle: raised hands do not count."""
+    """Return the height (...) from the lowest joint of (..., J, 3) to the highest of the middle: raised hands do not
+    count."""
     middle = [j for j in range(len(skeleton)) if skeleton.mirror[j] == j]
     return places[..., middle, 1].max(axis=-1) - places[..., 1].min(axis=-1)
 
 
-class _Tailor:
-    """Measures one skeleton in a pose in which it stands: places (J, 3) and axes (J, 3, 3) of its joints."""
+class _BodyBuilder:
+    """Measurement of one skeleton in a standing pose: places (J, 3) and axes (J, 3, 3) of its joints."""
 
     def __init__(self, skeleton: Skeleton, places: NDArray[np.floating], axes: NDArray[np.floating]) -> None:
         self.skeleton, self.places, self.axes = skeleton, places.astype(np.float64), axes
@@ -152,7 +156,7 @@ class _Tailor:
         return Body(tuple(limbs), height=self.height + 0.2 * self.unit, sole=SOLE * self.unit)
 
     def _fixed_to(self, joint: int, vector: NDArray[np.floating]) -> Vector:
-        """A world vector of the standing pose in the joint's own axes."""
+        """Return a world vector of the standing pose in the joint's own axes."""
         x, y, z = (float(v) for v in self.axes[joint].T @ vector)
         return x, y, z
 
@@ -189,20 +193,20 @@ class _Tailor:
         shoulders = [c for c in self.skeleton.children[joint] if self.part[c] != "middle" and not self._is_detail(c)]
         return self.unit * (CHEST if shoulders else WAIST)
 
-    def bone(self, joint: int) -> Limb:
+    def bone(self, joint: int) -> LimbShape:
         parent = self.skeleton.parents[joint]
         end = self.radius(joint)
         start = self.radius(parent)
         if self.part[parent] == "middle" and self.part[joint] != "middle":  # where a limb leaves the trunk
             start = end if self._is_detail(joint) else self.unit * (0.9 * PELVIS if joint in self.legs else GIRDLE)
             # A little thinner than the limb that begins there, so that two surfaces never coincide and flicker.
-            return Limb("middle", parent, joint, start, 0.95 * end)
+            return LimbShape("middle", parent, joint, start, 0.95 * end)
         if parent in self.trunk and joint not in self.trunk:  # the chest narrows towards the neck
             start = 0.92 * self.unit * CHEST
-        return Limb(self.part[joint], parent, joint, start, end)
+        return LimbShape(self.part[joint], parent, joint, start, end)
 
-    def head(self) -> list[Limb]:
-        """A skull and a nose on the highest bone of the middle."""
+    def head(self) -> list[LimbShape]:
+        """Return a skull and a nose on the highest bone of the middle."""
         inner = {self.skeleton.parents[j] for j, part in enumerate(self.part) if part == "middle"}
         leaves = [j for j, part in enumerate(self.part) if part == "middle" and j and j not in inner]
         if not leaves:
@@ -214,13 +218,15 @@ class _Tailor:
         def at(up: float, forward: float) -> Vector:
             return self._fixed_to(joint, self.unit * (np.array([0.0, up, 0.0]) + forward * self.forward))
 
-        skull = Limb("middle", joint, joint, 0.070 * self.unit, 0.088 * self.unit, at(0.030, 0.020), at(0.105, 0.012))
-        nose = Limb("face", joint, joint, 0.012 * self.unit, 0.019 * self.unit, at(0.085, 0.098), at(0.048, 0.102))
+        skull = LimbShape(
+            "middle", joint, joint, 0.070 * self.unit, 0.088 * self.unit, at(0.030, 0.020), at(0.105, 0.012)
+        )
+        nose = LimbShape("face", joint, joint, 0.012 * self.unit, 0.019 * self.unit, at(0.085, 0.098), at(0.048, 0.102))
         return [skull, nose]
 
-    def hands(self) -> list[Limb]:
-        """A hand beyond the wrist, where the skeleton ends there."""
-        hands: list[Limb] = []
+    def hands(self) -> list[LimbShape]:
+        """Return a hand beyond the wrist, if the skeleton ends there."""
+        hands: list[LimbShape] = []
         for joint, children in enumerate(self.skeleton.children):
             top = self.top[joint]
             alone = sum(self.top[j] == top and not c for j, c in enumerate(self.skeleton.children)) == 1
@@ -228,17 +234,19 @@ class _Tailor:
                 continue
             bone = self.places[joint] - self.places[self.skeleton.parents[joint]]
             tip = self._fixed_to(joint, bone / max(self.length(joint), 1e-6) * 0.135 * self.unit)
-            hands.append(Limb(self.part[joint], joint, joint, 0.036 * self.unit, 0.021 * self.unit, end_offset=tip))
+            hands.append(
+                LimbShape(self.part[joint], joint, joint, 0.036 * self.unit, 0.021 * self.unit, end_offset=tip)
+            )
         return hands
 
-    def feet(self) -> list[Limb]:
-        """Heel and toes, so that a foot shows where it stands and points."""
-        feet: list[Limb] = []
+    def feet(self) -> list[LimbShape]:
+        """Return heel and toes, which show where a foot stands and points."""
+        feet: list[LimbShape] = []
         for ankle, toe in zip(self.skeleton.feet[::2], self.skeleton.feet[1::2], strict=True):
             drop = self.places[toe, 1] - self.places[ankle, 1]
             heel = self._fixed_to(ankle, np.array([0.0, drop, 0.0]) - 0.040 * self.unit * self.forward)
             tip = self._fixed_to(toe, 0.055 * self.unit * self.forward)
             wide, thin = 0.033 * self.unit, SOLE * self.unit
-            feet.append(Limb(self.part[toe], ankle, toe, thin, wide, start_offset=heel))
-            feet.append(Limb(self.part[toe], toe, toe, wide, 0.75 * thin, end_offset=tip))
+            feet.append(LimbShape(self.part[toe], ankle, toe, thin, wide, start_offset=heel))
+            feet.append(LimbShape(self.part[toe], toe, toe, wide, 0.75 * thin, end_offset=tip))
         return feet

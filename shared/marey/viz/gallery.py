@@ -1,6 +1,6 @@
 """Gallery: one HTML file with many motions as small 3D players, for deciding which to keep.
 
-As in the player everything is inside, every text is escaped, and the page may fetch nothing. It changes nothing by
+The page is self-contained as the player is: every text is escaped, and it may fetch nothing. It changes nothing by
 itself: it shows the commands that do.
 """
 
@@ -27,9 +27,9 @@ class Card:
     """A motion with its description.
 
     Args:
-        id: what the commands name it by.
+        id: reference for the commands.
         facts: one line: number, name, seed, length.
-        said: what was thought of it before; empty = nothing.
+        said: earlier review; empty = none.
     """
 
     id: str
@@ -53,7 +53,7 @@ def html_gallery(
 
     Args:
         path: the `.html` to write.
-        count: which of how many these are.
+        count: number of this page and of all pages.
         earlier, later: names of the pages beside it.
 
     Returns:

@@ -1,7 +1,7 @@
-"""The live page: type a prompt, watch a figure move while its motion is made, steer it.
+"""The live page: type a prompt, watch a figure move while its motion is generated, steer it.
 
-One file that loads nothing: the page of `GET /live`, and what it may do. Its scripts and its style are named by their
-hashes, so nothing else runs, whatever reaches the page; it talks to its own server alone.
+One file that loads nothing: the page of `GET /live`, with its permissions. Its scripts and its style are listed by
+their hashes, so no other code runs, whatever data the page receives; it connects to its own server alone.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ class LivePage:
 
 @lru_cache(maxsize=4)
 def live_page(examples: tuple[str, ...] = ()) -> LivePage:
-    """The page, assembled once per process.
+    """Return the page, assembled once per process.
 
     Args:
-        examples: prompts that it offers.
+        examples: example prompts.
     """
     parts = {
         "%EXAMPLES%": script_json(examples),

@@ -23,9 +23,10 @@ TEXT = 42  # pixels for prompt and facts
 TILE = (POSES * CELL[0], TEXT + CELL[1] + 16 + 2 * (LANE + 5))
 GAP = (32, 12)  # between tiles: across, down
 ACROSS = 6
-"""Tiles beside each other, at most: a wider sheet has to be scrolled both ways."""
+"""Largest number of tiles side by side: a wider sheet has to be scrolled both ways."""
 MOST_TILES = 400
-"""A sheet of so many is 16,000 pixels high. Viewers and graphics cards refuse pictures beyond 16,384."""
+"""Largest number of tiles: such a sheet is 16,000 pixels high, and viewers and graphics cards refuse pictures beyond
+16,384."""
 
 
 def draw_tile(clip: MotionClip, caption: str, *, theme: Theme) -> Image.Image:
@@ -43,10 +44,10 @@ def draw_tile(clip: MotionClip, caption: str, *, theme: Theme) -> Image.Image:
 
 
 def overview(tiles: Iterable[Image.Image], count: int, title: str, *, theme: Theme) -> Image.Image:
-    """A sheet of tiles, from `draw_tile`, row by row.
+    """Return a sheet of tiles from `draw_tile`, row by row.
 
     Args:
-        count: of the tiles; the sheet takes shape before they are there.
+        count: number of tiles; the sheet is allocated before they arrive.
 
     Raises:
         InvalidInput: none, or more than `MOST_TILES`.

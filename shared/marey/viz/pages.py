@@ -1,7 +1,7 @@
 """Assemble pages with a 3D figure: one HTML file with style, scripts, three.js and data inside.
 
-Nothing is loaded from elsewhere. Inserted values are data: no text can end the element it stands in
-or pass for a mark of the template.
+Nothing is loaded from elsewhere. Inserted values are data: no text can end its element or be read as a mark of the
+template.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 
 
 def asset(name: str, package: str = "marey.viz") -> str:
-    """The text of a file in a package's `assets`."""
+    """Return the text of a file in a package's `assets`."""
     return (resources.files(package) / "assets" / name).read_text(encoding="utf-8")
 
 
 def fill(template: str, parts: Mapping[str, str]) -> str:
     """Replace each mark of a template by its text, in order and once each.
 
-    What is filled in is never searched for the next mark.
+    Inserted text is never searched for the next mark.
     """
     pieces: list[str] = []
     for mark, text in parts.items():
@@ -65,7 +65,7 @@ def whole_page(body: str, *, title: str, styles: Sequence[str], theme: str = "au
 
 
 def script_json(value: object) -> str:
-    """JSON that may stand inside a `<script>`: no character in it can end the element or start a comment."""
+    """Return JSON that may be inserted in a `<script>`: no character in it can end the element or start a comment."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -73,7 +73,7 @@ def script_json(value: object) -> str:
 
 
 def code_hashes(page: str) -> tuple[str, str]:
-    """`script-src` and `style-src` of a policy under which the page's own scripts and styles run, and nothing else."""
+    """Return `script-src` and `style-src` of a policy that allows only the page's own scripts and styles."""
     return (
         " ".join(["script-src", *(_hash(script) for script in _SCRIPT.findall(page))]),
         " ".join(["style-src", *(_hash(text) for text in _STYLE.findall(page))]),
@@ -91,7 +91,7 @@ def _hash(text: str) -> str:
 
 
 def body_document(skeleton: Skeleton, body: Body) -> dict[str, object]:
-    """A skeleton and its body as scene.js reads them."""
+    """Return a skeleton and its body in the form that scene.js reads."""
     return {
         "parents": list(skeleton.parents),
         "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],

@@ -19,7 +19,7 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of a sheet, sRGB. Blue and orange stay apart for the colour-blind."""
+    """Colours of a sheet, sRGB. Blue and orange are distinct for colour-blind viewers."""
 
     paper: Colour
     ink: Colour
@@ -58,10 +58,10 @@ THEMES = {
 
 
 def theme_named(name: str) -> Theme:
-    """A theme by name.
+    """Return a theme by name.
 
     Raises:
-        InvalidInput: there is none of that name.
+        InvalidInput: the name is unknown.
     """
     if name not in THEMES:
         raise InvalidInput(f"unknown theme {name!r}", hint=f"One of: {', '.join(THEMES)}.")
@@ -69,13 +69,13 @@ def theme_named(name: str) -> Theme:
 
 
 def blend(under: Colour, over: Colour, share: float) -> Colour:
-    """`share` of one colour over another."""
+    """Return a mix with `share` of one colour over another."""
     r, g, b = (round(u + (o - u) * share) for u, o in zip(under, over, strict=True))
     return r, g, b
 
 
 def one_line(text: str) -> str:
-    """Any text as one printable line: line breaks and control characters become spaces."""
+    """Return any text as one printable line: line breaks and control characters become spaces."""
     return " ".join("".join(" " if unicodedata.category(c).startswith(("C", "Z")) else c for c in text).split())
 
 
@@ -86,7 +86,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 @dataclass(frozen=True)
 class Paper:
-    """An image to write on."""
+    """An image to draw text and shapes on."""
 
     image: Image.Image
     theme: Theme
@@ -99,16 +99,16 @@ class Paper:
         colour: Colour,
         align: Literal["left", "centre", "right"] = "left",
     ) -> None:
-        """One line; `at` is the left end, centre or right end of its top."""
+        """Draw one line; `at` is the left end, centre or right end of its top."""
         anchor = {"left": "la", "centre": "ma", "right": "ra"}[align]
         ImageDraw.Draw(self.image).text(at, text, fill=colour, font=_font(size), anchor=anchor)
 
     def length(self, text: str, size: int) -> float:
-        """Width of a line, pixels."""
+        """Return the width of a line in pixels."""
         return ImageDraw.Draw(self.image).textlength(text, font=_font(size))
 
     def wrap(self, text: str, size: int, width: float, *, lines: int) -> list[str]:
-        """Break at words into at most `lines` lines; what does not fit ends in an ellipsis."""
+        """Break text at words into at most `lines` lines; a longer text ends in an ellipsis."""
         words, broken = one_line(text).split(), list[str]()
         while words and len(broken) < lines:
             line = words.pop(0)
@@ -123,6 +123,6 @@ class Paper:
         if self.length(line, size) <= width:
             return line
         line = line.rstrip("…")
-        # The longest beginning that fits, by halving: a prompt may be one word of thousands of letters.
+        # Find the longest prefix that fits by bisection: a prompt may be one word of thousands of letters.
         fits = bisect.bisect_right(range(len(line)), width, key=lambda n: self.length(line[:n] + "…", size)) - 1
         return line[: max(fits, 0)].rstrip() + "…"

@@ -1,8 +1,8 @@
 """Player: one HTML file that shows motion in 3D, without a network.
 
-Everything is inside the page: style, script, three.js and the motion (root as float32, local rotations as float16,
-which keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy
-forbids the page to fetch anything. Every text is escaped: a prompt is data, whatever is in it.
+The page is self-contained: style, script, three.js and the motion (root as float32, local rotations as float16, which
+keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy forbids
+the page to fetch anything. Every text is escaped, prompts included.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def html_player(
         clips: one clip or several, which become a list to choose from.
         path: the `.html` to write.
         title: of the page; otherwise the first caption.
-        captions: one a clip; otherwise the prompt of its manifest.
+        captions: one per clip; otherwise the prompt of its manifest.
         theme: `auto` (as the browser asks), `light` or `dark`.
 
     Returns:
@@ -79,7 +79,7 @@ def _page(document: dict[str, object], title: str, theme: str) -> str:
 
 
 def motion_document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:
-    """Clips with a caption each, as clip.js reads them out of a page: `bodies`, and `clips` that refer to them."""
+    """Return clips with a caption each, as clip.js reads them from a page: `bodies`, and `clips` that refer to them."""
     bodies: dict[str, int] = {}  # clips of one skeleton share one body
     entries: list[dict[str, object]] = []
     for number, (clip, caption) in enumerate(zip(clips, captions, strict=True), start=1):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 Depth = tuple[Floats, NDArray[np.bool_]]
-"""Depth of each pixel of a window, and where the surface is there at all."""
+"""Depth of each pixel of a window, and a mask of the pixels that show the surface."""
 Window = tuple[slice, slice]
 
 # Key light from the upper left in front, sky from above, a rim from behind: view coordinates, y down.
@@ -28,7 +28,7 @@ RIM = np.array([0.75, -0.35, -0.55], np.float32)
 AMBIENT, SKY, DIFFUSE, RIM_STRENGTH = 0.46, 0.16, 0.50, 0.35
 EXPOSURE = 1.206
 MIN_SLOPE = 1e-6
-"""Below this a ray counts as parallel to a flank."""
+"""Below this value a ray counts as parallel to a flank."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Camera:
 
     @cached_property
     def axes(self) -> Floats:
-        """Rows are the view's x (right), y (down) and z (towards the viewer) in world axes, (3, 3)."""
+        """Return view axes x (right), y (down) and z (towards the viewer) in world axes, as rows (3, 3)."""
         azimuth, elevation = np.radians(self.azimuth), np.radians(self.elevation)
         right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
         towards = np.array(
@@ -53,13 +53,13 @@ class Camera:
         return np.stack([right, -np.cross(towards, right), towards]).astype(np.float32)
 
     def project(self, points: NDArray[np.floating]) -> Floats:
-        """World points (..., 3) in metres to view axes (..., 3), still in metres."""
+        """Transform world points (..., 3) in metres to view axes (..., 3), still in metres."""
         return (points @ self.axes.T).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class Shown:
-    """The pixels of a picture that show something, and their colours: (N,), (N,) and (N, 3) sRGB bytes."""
+    """The pixels that show a surface, and their colours: (N,), (N,) and (N, 3) sRGB bytes."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
@@ -69,8 +69,8 @@ class Shown:
 def shade(ends: Floats, radii: Floats, colours: Floats, size: tuple[int, int]) -> Shown:
     """Draw round cones, nearest in front.
 
-    The first pass keeps of each pixel the depth of the nearest surface and its number. Normals and light follow once
-    for each pixel that shows something. (Draw large and shrink to smooth the edges.)
+    The first pass keeps depth and number of the nearest surface for each pixel. Normals and light follow once for each
+    pixel that shows a surface. (Draw large and shrink to smooth the edges.)
 
     Args:
         ends: (L, 2, 3) both ends of each cone, pixels.
@@ -179,17 +179,17 @@ class _Flank:
 
 
 def _surfaces(ends: NDArray[np.float64], radii: NDArray[np.float64]) -> Iterator[_Ball | _Flank]:
-    """Both balls and the flank between."""
+    """Return both balls and the flank between them."""
     for end, radius in zip(ends, radii, strict=True):
         yield _Ball(end, float(radius))
     axis, taper = ends[1] - ends[0], float(radii[0] - radii[1])
     length = float(np.sqrt(axis @ axis))
-    if length * length - taper * taper > 1e-6:  # else one ball swallows the other
+    if length * length - taper * taper > 1e-6:  # else one ball contains the other
         yield _Flank(ends[0], axis / length, radii, length, taper / length)
 
 
 def _window(ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[int, int]) -> Window | None:
-    """Rows and columns that balls of these centres (2D) and radii can reach; None outside the picture."""
+    """Return the rows and columns that balls of these centres (2D) and radii cover; None outside the picture."""
     left, top = (max(floor(min(low)), 0) for low in (ends - radii[:, None]).T.tolist())
     right, bottom = (
         min(ceil(max(high)), most) for high, most in zip((ends + radii[:, None]).T.tolist(), size, strict=True)
@@ -198,7 +198,7 @@ def _window(ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[i
 
 
 def _normals(surfaces: list[_Ball | _Flank], shown: NDArray[np.int32], points: Floats) -> Floats:
-    """Unit normals at points (N, 3) on the surfaces `shown` (N)."""
+    """Return unit normals at points (N, 3) on the surfaces `shown` (N)."""
     slopes = np.array([surface.slope() for surface in surfaces], np.float32)[shown]
     away, along = points - slopes[:, :3], slopes[:, 3:6]
     place = np.einsum("nk,nk->n", away, along) - slopes[:, 7]
@@ -207,7 +207,7 @@ def _normals(surfaces: list[_Ball | _Flank], shown: NDArray[np.int32], points: F
 
 
 def _light(normals: Floats, colours: Floats) -> NDArray[np.uint8]:
-    """sRGB of points with these unit normals and colours, (N, 3)."""
+    """Return sRGB colours of points with these unit normals and colours, (N, 3)."""
     wrapped = np.clip(normals @ (KEY / np.linalg.norm(KEY)) * 0.75 + 0.25, 0, 1)  # wrap light: soft, like clay
     rim = np.clip(normals @ (RIM / np.linalg.norm(RIM)), 0, 1) ** 2
     lit = AMBIENT + SKY * np.clip(-normals[:, 1], -0.6, 1) + DIFFUSE * wrapped

@@ -1,7 +1,7 @@
 """Contact sheet: clips as rows of poses on one image.
 
-A clip is a row: a strip of poses along time with the lanes of foot contact under it (`strip.py`), and beside it the
-path from above. Many clips at a glance are an overview (`overview.py`).
+A clip is a row: a strip of poses over time with the tracks of foot contact under it (`strip.py`), and beside it the
+path seen from above. An overview shows many clips on one sheet (`overview.py`).
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def contact_sheet(
     Args:
         clips: one clip, or several, which become rows.
         path: the PNG to write.
-        columns: poses a clip, evenly spaced from its first frame to its last.
+        columns: poses per clip, evenly spaced from its first frame to its last.
         frames: these frames instead.
         title: a line at the top of the sheet.
-        captions: one a clip; otherwise the prompt of its manifest.
+        captions: one per clip; otherwise the prompt of its manifest.
         theme: `light` or `dark`.
 
     Returns:
@@ -97,7 +97,7 @@ def save_png(image: Image.Image, path: Path) -> Path:
 
 
 def stack_rows(rows: Sequence[Image.Image], title: str | None, *, theme: Theme) -> Image.Image:
-    """A sheet of rows, from `draw_row`, all of one width."""
+    """Return a sheet of rows, from `draw_row`, all of one width."""
     width, head = rows[0].width + 2 * MARGIN, 64 if title else 0
     height = MARGIN - 8 + head + sum(row.height for row in rows) + GAP * (len(rows) - 1) + 46
     paper = Paper(Image.new("RGB", (width, height), theme.paper), theme)
@@ -113,12 +113,12 @@ def stack_rows(rows: Sequence[Image.Image], title: str | None, *, theme: Theme) 
 
 
 def caption_of(clip: MotionClip) -> str:
-    """The prompt a clip was made from; empty when its manifest has none."""
+    """Return the prompt of a clip; empty if its manifest has none."""
     return str(clip.manifest.get("prompt") or "")
 
 
 def facts_of(clip: MotionClip) -> str:
-    """One line about a clip: length, rate, seed, model, terms, and a note if the weights are random."""
+    """Describe a clip in one line: length, rate, seed, model, terms, and a note if the weights are random."""
     facts = [f"{clip.seconds:.1f} s", f"{clip.frames} frames at {clip.fps:g} fps"]
     if clip.manifest.get("seed") is not None:
         facts.append(f"seed {clip.manifest['seed']}")
@@ -132,7 +132,7 @@ def draw_row(clip: MotionClip, caption: str, frames: NDArray[np.intp], *, column
     """Draw one clip: caption and facts, the poses of these frames, the foot-contact tracks, and the path from above.
 
     Args:
-        columns: room for so many poses.
+        columns: number of poses that fit in the row.
     """
     strip = make_strip(clip, frames, CELL)
     width, facts = columns * CELL[0] + 24 + PLAN, facts_of(clip)
@@ -154,7 +154,7 @@ def draw_row(clip: MotionClip, caption: str, frames: NDArray[np.intp], *, column
 
 
 def _plan(strip: Strip, theme: Theme) -> Image.Image:
-    """The path from above, up is where the figure faced first (+Z), with an arrow where each pose faces."""
+    """Draw the path from above, up is where the figure faced first (+Z), with an arrow where each pose faces."""
     big = PLAN_SMOOTH
     size = (PLAN * big, CELL[1] * big)
     image = Image.new("RGB", size, theme.paper)
@@ -207,7 +207,7 @@ def _plan_grid(
 
 
 def _headings(strip: Strip) -> NDArray[np.floating]:
-    """(F, 2) X and Z of where each chosen pose faces."""
+    """Return X and Z (F, 2) of the direction that each chosen pose faces."""
     clip = strip.clip
     if clip.skeleton.facing:
         return facing(np.asarray(clip.joints[strip.frames], np.float64), clip.skeleton)[:, [0, 2]]

@@ -1,7 +1,7 @@
-"""Strip: poses of a clip along time, each on its own patch of the floor, with foot-contact tracks below.
+"""Strip: poses of a clip over time, each on its own patch of the floor, with foot-contact tracks below.
 
 The patch has a grid of half metres, fixed to the world, so that travel shows; the root's trail; the figure's shadow;
-the feet that touch lit. Left is blue and right is orange everywhere.
+and highlights of feet in contact. Left is blue and right is orange everywhere.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from marey.viz.raster import Camera, shade
 
 SMOOTH = 2  # figures are drawn this much larger and shrunk
 GRID = 0.5  # metres
-LIGHT = np.array([-0.22, 1.0, 0.34])  # where the sun stands, world axes
-SOFTENED = [int(v * 0.34) for v in range(256)]  # a shadow, from its mask
+LIGHT = np.array([-0.22, 1.0, 0.34])  # direction to the light, world axes
+SOFTENED = [int(v * 0.34) for v in range(256)]  # opacity of a shadow, from its mask
 
 Projection = Callable[[NDArray[np.floating]], NDArray[np.float32]]
 Size = tuple[int, int]
@@ -55,10 +55,10 @@ class Strip:
 
 
 def chosen_frames(clip: MotionClip, columns: int, frames: Sequence[int] | None = None) -> NDArray[np.intp]:
-    """Evenly spaced frames from the first to the last, `columns` of them; or the given `frames`.
+    """Choose evenly spaced frames from the first to the last, `columns` of them; or the given `frames`.
 
     Raises:
-        InvalidInput: one of these is not in the clip, or there is none.
+        InvalidInput: a frame is not in the clip, or there is none.
     """
     count = clip.frames
     if frames is None:
@@ -91,7 +91,7 @@ def make_strip(clip: MotionClip, frames: NDArray[np.intp], cell: Size) -> Strip:
 
 
 def draw_pose(strip: Strip, column: int, theme: Theme) -> Image.Image:
-    """One pose on its patch of floor."""
+    """Draw one pose on its patch of floor."""
     size = (strip.cell[0] * SMOOTH, strip.cell[1] * SMOOTH)
     scale = strip.scale * SMOOTH
     origin = np.array([size[0] / 2, size[1] - strip.below * SMOOTH, 0], np.float32)
@@ -112,7 +112,7 @@ def draw_pose(strip: Strip, column: int, theme: Theme) -> Image.Image:
 
 
 def _patch(image: Image.Image, strip: Strip, frame: int, radius: float, pixels: Projection, theme: Theme) -> None:
-    """A round piece of floor under one pose: grid, trail, lit contacts."""
+    """Draw a round piece of floor under one pose: grid, trail, highlighted contacts."""
     draw = ImageDraw.Draw(image)
     root = strip.root[frame]
     draw.polygon(view_points(pixels(_circle(radius))), fill=theme.floor)
@@ -144,7 +144,7 @@ def _light_contacts(image: Image.Image, strip: Strip, frame: int, pixels: Projec
 def _shadow(
     strip: Strip, column: int, size: tuple[int, int], rim: list[tuple[float, float]], pixels: Projection
 ) -> Image.Image:
-    """The figure's soft shadow, as far as the patch of floor goes."""
+    """Draw the figure's soft shadow on the patch of floor."""
     limbs = strip.limbs[column]
     fallen = limbs - LIGHT / LIGHT[1] * np.maximum(limbs[..., 1:2], 0)
     ends = pixels(fallen) / SMOOTH
@@ -186,10 +186,10 @@ def _unit_circle() -> NDArray[np.float64]:
 
 
 def _circle(radius: float) -> NDArray[np.float64]:
-    """(73, 3) points around the origin on the floor."""
+    """Return points (73, 3) around the origin on the floor."""
     return radius * _unit_circle()
 
 
 def view_points(view: NDArray[np.floating]) -> list[tuple[float, float]]:
-    """Points in view coordinates as Pillow takes them."""
+    """Convert points in view coordinates to Pillow's form."""
     return [(x, y) for x, y in view[:, :2].tolist()]

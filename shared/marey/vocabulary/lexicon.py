@@ -31,11 +31,11 @@ class Meaning:
 
 
 @dataclass(slots=True)
-class Node:
-    """A node of the tree: what the words up to here mean, and the words that may follow."""
+class PhraseNode:
+    """A node of the phrase tree: meanings of the words up to here, and the words that may follow."""
 
     meanings: tuple[Meaning, ...] = ()
-    children: dict[str, Node] = field(default_factory=dict[str, "Node"])
+    children: dict[str, PhraseNode] = field(default_factory=dict[str, "PhraseNode"])
 
 
 class Lexicon:
@@ -43,7 +43,7 @@ class Lexicon:
 
     def __init__(self, vocabulary: Vocabulary, other_verbs: Iterable[str], idioms: Iterable[str]) -> None:
         """Build the tree of all phrases."""
-        self.root: dict[str, Node] = {}
+        self.root: dict[str, PhraseNode] = {}
         self._base: dict[str, str] = {}
         self._verbs = set[str]()
         entries = [(words_of(phrase), meaning) for phrase, meaning in _phrases(vocabulary)]
@@ -84,9 +84,9 @@ class Lexicon:
                 self._verbs |= verb_forms(word)
 
     def _add(self, words: list[str], meaning: Meaning) -> None:
-        node = self.root.setdefault(words[0], Node())
+        node = self.root.setdefault(words[0], PhraseNode())
         for word in words[1:]:
-            node = node.children.setdefault(word, Node())
+            node = node.children.setdefault(word, PhraseNode())
         if meaning not in node.meanings:
             node.meanings = (*node.meanings, meaning)
 

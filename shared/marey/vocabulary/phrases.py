@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from marey.vocabulary.lexicon import EXACT, WILDCARD, Lexicon, Meaning, Node
+from marey.vocabulary.lexicon import EXACT, WILDCARD, Lexicon, Meaning, PhraseNode
 from marey.vocabulary.word_lists import WordLists
 
 STOPS = ".,;:!?"
@@ -88,7 +88,7 @@ class PhraseFinder:
         if root is None:
             return None
         best: Match | None = None
-        open_nodes: list[tuple[Node, int, int, int]] = [(root, start + 1, start + 1, 0)]
+        open_nodes: list[tuple[PhraseNode, int, int, int]] = [(root, start + 1, start + 1, 0)]
         while open_nodes:
             node, at, end, gap = open_nodes.pop()
             longer = best is None or end > best.end
@@ -98,7 +98,9 @@ class PhraseFinder:
                 open_nodes += self._next(words[at], node, at, end, gap)
         return best
 
-    def _next(self, word: Word, node: Node, at: int, end: int, gap: int) -> Iterator[tuple[Node, int, int, int]]:
+    def _next(
+        self, word: Word, node: PhraseNode, at: int, end: int, gap: int
+    ) -> Iterator[tuple[PhraseNode, int, int, int]]:
         """Yield where a phrase may go on behind a word: node, next word, end of the phrase, words of the wildcard."""
         child = node.children.get(word.base) or node.children.get(EXACT + word.text)
         if child is not None:
@@ -111,7 +113,7 @@ class PhraseFinder:
             if (wildcard := node.children.get(WILDCARD)) is not None:
                 yield wildcard, at + 1, end, 1
 
-    def _allowed(self, words: list[Word], start: int, end: int, node: Node) -> tuple[Meaning, ...]:
+    def _allowed(self, words: list[Word], start: int, end: int, node: PhraseNode) -> tuple[Meaning, ...]:
         """Meanings of a phrase at this place: a single verb must stand as one."""
         if end - start > 1 or self.is_verb(words, start):
             return node.meanings

@@ -9,7 +9,7 @@ import pytest
 import sqlalchemy as sa
 
 from marey.core.settings import Settings
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
 from tests.support.evaluations import ToyEvaluator, ToyTexts, models_of
 from tests.support.runtime import Loop
@@ -22,8 +22,8 @@ def config(tmp_path: Path) -> Settings:
 
 
 @pytest.fixture
-def scheduler(engine: sa.Engine, config: Settings) -> Evaluations:
-    return Evaluations(engine, config)
+def scheduler(engine: sa.Engine, config: Settings) -> EvaluationScheduler:
+    return EvaluationScheduler(engine, config)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from marey.db import transaction
 from marey.evaluations import EvaluationState, NewScore, cancel_evaluation, commit_score
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import AssetDigest, JobState, begin_assets, cancel, claim, sweep
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
 from marey.takes import collect_garbage, delete
 from marey.tenants import DEFAULT_TENANT
@@ -40,7 +40,7 @@ S = EvaluationState
 
 
 def test_a_deleted_bundle_fails_the_evaluation_with_the_reason_and_submits_nothing(
-    engine: sa.Engine, scheduler: Evaluations
+    engine: sa.Engine, scheduler: EvaluationScheduler
 ) -> None:
     evaluation = new_evaluation(engine, bundle="gone")
     scheduler.round()
@@ -51,7 +51,7 @@ def test_a_deleted_bundle_fails_the_evaluation_with_the_reason_and_submits_nothi
 
 
 def test_a_bundle_that_was_replaced_since_is_not_measured_in_place_of_it(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, config: Settings
 ) -> None:
     evaluation = new_evaluation(engine, bundle=f"{GENERATOR}@{'0' * 12}")
     scheduler.round()
@@ -59,7 +59,7 @@ def test_a_bundle_that_was_replaced_since_is_not_measured_in_place_of_it(
 
 
 def test_lengths_that_the_bundle_cannot_make_fail_the_evaluation_before_anything_is_made(
-    engine: sa.Engine, scheduler: Evaluations
+    engine: sa.Engine, scheduler: EvaluationScheduler
 ) -> None:
     evaluation = new_evaluation(engine, [*PROMPTS, EvaluationPrompt("walk far", 30.0)])
     scheduler.round()
@@ -77,7 +77,7 @@ def test_lengths_that_the_bundle_cannot_make_fail_the_evaluation_before_anything
     ],
 )
 def test_an_evaluator_of_other_motion_is_refused_before_anything_is_made(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings, judge: dict[str, Any], message: str
+    engine: sa.Engine, scheduler: EvaluationScheduler, config: Settings, judge: dict[str, Any], message: str
 ) -> None:
     write_evaluator(config.models, "judge-of-others", **judge)
     evaluation = new_evaluation(engine, evaluator="judge-of-others")
@@ -88,7 +88,7 @@ def test_an_evaluator_of_other_motion_is_refused_before_anything_is_made(
 
 
 def test_an_evaluator_that_refuses_fails_the_evaluation_with_its_message(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     judge.problems = [InvalidInput("the motions are of another skeleton")]
     row = finish(scheduler, loop, engine, new_evaluation(engine))
@@ -98,7 +98,7 @@ def test_an_evaluator_that_refuses_fails_the_evaluation_with_its_message(
 
 
 def test_a_bug_of_the_evaluator_is_tried_again(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     judge.problems = [RuntimeError("a bug")]
     evaluation = new_evaluation(engine)
@@ -112,7 +112,7 @@ def test_a_bug_of_the_evaluator_is_tried_again(
 
 
 def test_a_report_with_a_number_that_is_none_is_not_written(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop
 ) -> None:
     evaluation = new_evaluation(engine)
     bring_to(scheduler, loop, engine, evaluation, S.SCORING)
@@ -133,7 +133,7 @@ def test_a_report_with_a_number_that_is_none_is_not_written(
 
 
 def test_a_generation_whose_motions_an_operator_cancelled_cancels_the_evaluation(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop
 ) -> None:
     evaluation = new_evaluation(engine)
     bring_to(scheduler, loop, engine, evaluation, S.GENERATING)
@@ -147,7 +147,7 @@ def test_a_generation_whose_motions_an_operator_cancelled_cancels_the_evaluation
 
 
 def test_a_job_that_an_open_evaluation_needs_cannot_be_deleted(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop
 ) -> None:
     evaluation = new_evaluation(engine)
     bring_to(scheduler, loop, engine, evaluation, S.SCORING)
@@ -167,7 +167,7 @@ def test_a_job_that_an_open_evaluation_needs_cannot_be_deleted(
 
 @pytest.mark.parametrize("state", [S.PLANNED, S.GENERATING, S.SCORING])
 def test_cancelling_an_evaluation_cancels_the_job_that_runs_for_it(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, folder_store: FolderStore, state: EvaluationState
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, folder_store: FolderStore, state: EvaluationState
 ) -> None:
     evaluation = new_evaluation(engine)
     bring_to(scheduler, loop, engine, evaluation, state)
@@ -185,7 +185,9 @@ def test_cancelling_an_evaluation_cancels_the_job_that_runs_for_it(
         assert audit_tables(conn) == []
 
 
-def test_cancelling_one_that_is_over_changes_nothing(engine: sa.Engine, scheduler: Evaluations, loop: Loop) -> None:
+def test_cancelling_one_that_is_over_changes_nothing(
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop
+) -> None:
     evaluation = new_evaluation(engine)
     finish(scheduler, loop, engine, evaluation)
     with transaction(engine) as conn:
@@ -193,7 +195,7 @@ def test_cancelling_one_that_is_over_changes_nothing(engine: sa.Engine, schedule
 
 
 def test_an_evaluation_that_is_being_measured_can_be_cancelled(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator, folder_store: FolderStore
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator, folder_store: FolderStore
 ) -> None:
     judge.seconds = 300.0
     evaluation = new_evaluation(engine)

@@ -13,7 +13,7 @@ from marey.db import transaction
 from marey.evaluations import EvaluationRow, EvaluationState
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import get_job
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
 from marey.tenants import DEFAULT_TENANT
 from tests.servers.audit import audit as audit_tables
@@ -43,7 +43,7 @@ def failing(count: int, total: int) -> list[EvaluationPrompt]:
 
 
 def test_an_evaluation_is_generated_in_the_background_then_scored_and_reported(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator, folder_store: FolderStore
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator, folder_store: FolderStore
 ) -> None:
     evaluation = new_evaluation(engine, repeats=2)
     row = finish(scheduler, loop, engine, evaluation)
@@ -65,7 +65,7 @@ def test_an_evaluation_is_generated_in_the_background_then_scored_and_reported(
 
 
 def test_the_evaluator_sees_every_motion_in_input_order_with_what_was_expected(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     finish(scheduler, loop, engine, new_evaluation(engine, repeats=2))
     (score,) = judge.seen
@@ -83,7 +83,7 @@ def test_the_evaluator_sees_every_motion_in_input_order_with_what_was_expected(
 
 
 def test_the_captions_of_the_evaluators_bundle_are_generated_as_long_as_the_model_can(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     row = finish(scheduler, loop, engine, new_evaluation(engine, None))
     assert (row.state, row.request.source, row.prompt_count) == (S.DONE, "test", 3)
@@ -93,7 +93,7 @@ def test_the_captions_of_the_evaluators_bundle_are_generated_as_long_as_the_mode
 
 
 def test_motions_that_were_not_made_are_told_to_the_evaluator(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     row = finish(scheduler, loop, engine, new_evaluation(engine, failing(1, 100)))  # just 1 %
     assert (row.state, row.summary and row.summary["made"]) == (S.DONE, 99.0)
@@ -105,11 +105,11 @@ def test_motions_that_were_not_made_are_told_to_the_evaluator(
 
 
 def test_more_than_one_percent_of_failed_motions_fail_the_report(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     row = finish(scheduler, loop, engine, new_evaluation(engine, failing(2, 100)))
     assert row.state is S.FAILED
-    assert row.reason.startswith("2 of 100 motions were not made, 2.0% where 1% may be")
+    assert row.reason.startswith("2 of 100 motions are missing, 2.0%; the limit is 1%")
     assert row.reason.endswith("the first: this cannot be danced")
     assert (row.summary, row.reports, judge.seen) == (None, (), [])
 
@@ -124,7 +124,7 @@ class Other(ToyHandler):
 
 
 def test_a_run_is_not_compared_with_one_of_another_model(
-    engine: sa.Engine, scheduler: Evaluations, folder_store: FolderStore, judge: ToyEvaluator, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, folder_store: FolderStore, judge: ToyEvaluator, config: Settings
 ) -> None:
     write_generator(config.models, "other-starter", model="other")
     loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), Other(), judge)
@@ -137,7 +137,7 @@ def test_a_run_is_not_compared_with_one_of_another_model(
 
 
 def test_a_run_is_compared_with_the_last_of_the_same_model_prompts_and_evaluator(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator, config: Settings
 ) -> None:
     first = new_evaluation(engine)
     finish(scheduler, loop, engine, first)
@@ -153,7 +153,7 @@ def test_a_run_is_compared_with_the_last_of_the_same_model_prompts_and_evaluator
 
 
 def test_a_pinned_baseline_stays_the_one_to_compare_with(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     first, second = (new_evaluation(engine) for _ in range(2))
     for each in (first, second):
@@ -169,7 +169,7 @@ def test_a_pinned_baseline_stays_the_one_to_compare_with(
 
 @pytest.mark.parametrize("what", ["prompts", "evaluator", "state"])
 def test_a_baseline_of_other_prompts_or_evaluator_or_without_numbers_is_refused(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, config: Settings, what: str
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, config: Settings, what: str
 ) -> None:
     baseline = new_evaluation(engine, PROMPTS[:2] if what == "prompts" else PROMPTS)
     if what != "state":
@@ -183,7 +183,7 @@ def test_a_baseline_of_other_prompts_or_evaluator_or_without_numbers_is_refused(
     assert said[what] in row.reason
 
 
-def step(scheduler: Evaluations, engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
+def step(scheduler: EvaluationScheduler, engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
     """One step of this evaluation alone."""
     scheduler._step(evaluation)
     return evaluation_row(engine, evaluation)

@@ -36,7 +36,7 @@ from marey.jobs import (
     sweep,
 )
 from marey.scheduler import evaluations as steps
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
 from marey.takes import collect_garbage, delete
 from marey.tenants import DEFAULT_TENANT
@@ -62,7 +62,7 @@ S = EvaluationState
 
 
 def test_a_scheduler_that_dies_in_the_middle_of_a_step_leaves_nothing_and_the_next_does_it_once(
-    engine: sa.Engine, config: Settings, scheduler: Evaluations, loop: Loop, monkeypatch: pytest.MonkeyPatch
+    engine: sa.Engine, config: Settings, scheduler: EvaluationScheduler, loop: Loop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed after the submit, before the commit: the only place where half of a step could stand."""
 
@@ -79,14 +79,14 @@ def test_a_scheduler_that_dies_in_the_middle_of_a_step_leaves_nothing_and_the_ne
         with monkeypatch.context() as patch:
             patch.setattr(steps, "move_evaluation", die)
             with pytest.raises(Killed):
-                Evaluations(engine, config).round()
+                EvaluationScheduler(engine, config).round()
         assert (state_of(engine, evaluation), jobs_there(engine)) == (state, jobs)
-    assert finish(Evaluations(engine, config), loop, engine, evaluation).state is S.DONE
+    assert finish(EvaluationScheduler(engine, config), loop, engine, evaluation).state is S.DONE
     assert jobs_there(engine) == 2
 
 
 def test_a_submit_that_is_refused_half_way_leaves_nothing(
-    engine: sa.Engine, scheduler: Evaluations, monkeypatch: pytest.MonkeyPatch
+    engine: sa.Engine, scheduler: EvaluationScheduler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(conn: sa.Connection, job: NewJob) -> None:
         submit(conn, job)
@@ -100,7 +100,7 @@ def test_a_submit_that_is_refused_half_way_leaves_nothing(
 
 
 def test_an_evaluation_that_another_scheduler_has_in_hand_is_left_alone(
-    engine: sa.Engine, scheduler: Evaluations
+    engine: sa.Engine, scheduler: EvaluationScheduler
 ) -> None:
     evaluation = new_evaluation(engine)
     with engine.connect() as other:
@@ -117,7 +117,7 @@ def test_many_schedulers_at_once_take_each_step_once(
 ) -> None:
     evaluations = [new_evaluation(engine) for _ in range(4)]
     for _ in range(4):
-        at_once(*(Evaluations(engine, config).round for _ in range(4)))
+        at_once(*(EvaluationScheduler(engine, config).round for _ in range(4)))
         work(loop)
     assert {state_of(engine, each) for each in evaluations} == {S.DONE}
     assert jobs_there(engine) == 8
@@ -125,7 +125,7 @@ def test_many_schedulers_at_once_take_each_step_once(
 
 
 def test_a_worker_that_dies_while_it_measures_is_followed_by_another(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     evaluation = new_evaluation(engine)
     bring_to(scheduler, loop, engine, evaluation, S.SCORING)
@@ -143,7 +143,7 @@ def test_a_worker_that_dies_while_it_measures_is_followed_by_another(
 
 
 def test_an_outage_of_the_store_while_motions_are_read_costs_nothing(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator, monkeypatch: pytest.MonkeyPatch
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("marey.runtime.loop.OUTAGE_PAUSE", 0.01)
     judge.problems = [Unreachable("the store is away")]
@@ -157,7 +157,7 @@ def test_an_outage_of_the_store_while_motions_are_read_costs_nothing(
 
 
 def test_a_score_for_an_evaluation_that_is_over_writes_nothing_and_does_not_go_round(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
     """An operator tries the failed item of a failed evaluation again."""
     judge.problems = [InvalidInput("no")]
@@ -183,7 +183,9 @@ def test_a_score_for_an_evaluation_that_is_over_writes_nothing_and_does_not_go_r
     assert state_of(engine, evaluation) is S.FAILED
 
 
-def test_one_evaluation_that_breaks_the_scheduler_holds_up_no_other(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_one_evaluation_that_breaks_the_scheduler_holds_up_no_other(
+    engine: sa.Engine, scheduler: EvaluationScheduler
+) -> None:
     broken, good = new_evaluation(engine), new_evaluation(engine)
     with transaction(engine) as conn:  # as if an older version had written it
         conn.execute(sa.text("UPDATE evaluation SET request = '{}' WHERE id = :id"), {"id": broken})
@@ -192,7 +194,7 @@ def test_one_evaluation_that_breaks_the_scheduler_holds_up_no_other(engine: sa.E
 
 
 def test_a_broken_evaluators_bundle_fails_the_evaluation(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, config: Settings
 ) -> None:
     write_evaluator(config.models, "broken", clips=[{**CLIPS[0], "acts": 3}, CLIPS[1]])
     evaluation = new_evaluation(engine, None, evaluator="broken")
@@ -205,7 +207,7 @@ def test_a_broken_evaluators_bundle_fails_the_evaluation(
 
 
 def test_reports_are_in_use_and_the_collector_leaves_them(
-    engine: sa.Engine, scheduler: Evaluations, loop: Loop, folder_store: FolderStore
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, folder_store: FolderStore
 ) -> None:
     row = finish(scheduler, loop, engine, new_evaluation(engine))
     assert row.generation is not None

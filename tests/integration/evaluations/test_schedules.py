@@ -29,7 +29,7 @@ from marey.evaluations import (
     run_schedule,
 )
 from marey.evaluations.cron import next_time
-from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.evaluations import EvaluationScheduler
 from marey.tenants import DEFAULT_TENANT, tables
 from tests.support.evaluations import (
     GENERATOR,
@@ -62,7 +62,7 @@ def test_a_new_schedule_is_due_at_its_next_time_in_its_zone(engine: sa.Engine) -
         assert due_schedules(conn) == []
 
 
-def test_a_due_schedule_plans_one_evaluation_for_that_time(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_a_due_schedule_plans_one_evaluation_for_that_time(engine: sa.Engine, scheduler: EvaluationScheduler) -> None:
     schedule = new_schedule(engine)
     due = time_passes(engine, schedule)
     for _ in range(3):
@@ -75,7 +75,9 @@ def test_a_due_schedule_plans_one_evaluation_for_that_time(engine: sa.Engine, sc
     assert after > database_now(engine)
 
 
-def test_missed_times_are_made_up_for_by_one_run_and_never_again(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_missed_times_are_made_up_for_by_one_run_and_never_again(
+    engine: sa.Engine, scheduler: EvaluationScheduler
+) -> None:
     schedule = new_schedule(engine)
     since = time_passes(engine, schedule, missed=5)
     for _ in range(3):
@@ -114,7 +116,7 @@ def test_two_schedulers_at_once_fire_a_due_schedule_once(engine: sa.Engine, conf
     schedules = [new_schedule(engine) for _ in range(5)]
     for schedule in schedules:
         time_passes(engine, schedule, missed=2)
-    at_once(*(Evaluations(engine, config).round for _ in range(4)))
+    at_once(*(EvaluationScheduler(engine, config).round for _ in range(4)))
     assert [len(runs(engine, schedule)) for schedule in schedules] == [1] * 5
 
 
@@ -131,7 +133,9 @@ def test_a_scheduler_that_has_the_row_keeps_the_other_from_it(engine: sa.Engine)
     assert len(runs(engine, schedule)) == 1
 
 
-def test_a_run_that_takes_longer_than_its_interval_is_waited_for(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_a_run_that_takes_longer_than_its_interval_is_waited_for(
+    engine: sa.Engine, scheduler: EvaluationScheduler
+) -> None:
     schedule = new_schedule(engine)
     time_passes(engine, schedule, missed=1)
     scheduler.round()
@@ -145,7 +149,7 @@ def test_a_run_that_takes_longer_than_its_interval_is_waited_for(engine: sa.Engi
 
 
 def test_a_deleted_bundle_marks_the_run_and_the_schedule_goes_on(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, config: Settings
 ) -> None:
     schedule = new_schedule(engine, own_prompts=False)
     (config.models / GENERATOR / "manifest.json").rename(config.models / "aside.json")
@@ -165,7 +169,7 @@ def test_a_deleted_bundle_marks_the_run_and_the_schedule_goes_on(
 
 
 def test_each_run_measures_the_bundle_that_has_the_name_then(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings
+    engine: sa.Engine, scheduler: EvaluationScheduler, config: Settings
 ) -> None:
     schedule = new_schedule(engine)
     with transaction(engine) as conn:
@@ -182,7 +186,9 @@ def test_each_run_measures_the_bundle_that_has_the_name_then(
     assert schedule_row(engine, schedule).request.bundle == GENERATOR
 
 
-def test_a_paused_schedule_is_never_due_and_makes_up_for_nothing(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_a_paused_schedule_is_never_due_and_makes_up_for_nothing(
+    engine: sa.Engine, scheduler: EvaluationScheduler
+) -> None:
     schedule = new_schedule(engine)
     assert change(engine, schedule, paused=True).next is None
     time_passes(engine, schedule, missed=5)
@@ -195,7 +201,9 @@ def test_a_paused_schedule_is_never_due_and_makes_up_for_nothing(engine: sa.Engi
     assert runs(engine, schedule) == []
 
 
-def test_run_now_works_on_a_paused_schedule_and_moves_no_time(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_run_now_works_on_a_paused_schedule_and_moves_no_time(
+    engine: sa.Engine, scheduler: EvaluationScheduler
+) -> None:
     schedule = new_schedule(engine)
     before = schedule_row(engine, schedule).next
     change(engine, schedule, paused=True)
@@ -236,7 +244,7 @@ def test_a_bad_line_or_zone_changes_nothing(engine: sa.Engine) -> None:
 
 
 def test_a_zone_that_is_known_no_longer_pauses_its_schedule_and_marks_the_run(
-    engine: sa.Engine, scheduler: Evaluations
+    engine: sa.Engine, scheduler: EvaluationScheduler
 ) -> None:
     lost, good = new_schedule(engine), new_schedule(engine)
     for schedule in (lost, good):
@@ -253,7 +261,7 @@ def test_a_zone_that_is_known_no_longer_pauses_its_schedule_and_marks_the_run(
     assert not change(engine, lost, paused=False, time_zone="UTC").paused
 
 
-def test_the_runs_of_a_deleted_schedule_stay_and_go_on(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_the_runs_of_a_deleted_schedule_stay_and_go_on(engine: sa.Engine, scheduler: EvaluationScheduler) -> None:
     schedule = new_schedule(engine)
     time_passes(engine, schedule)
     scheduler.round()

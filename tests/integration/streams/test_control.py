@@ -12,7 +12,7 @@ from marey.api.streams import messages, session
 from marey.core.settings import Settings
 from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
-from marey.streams.control import Control
+from marey.streams.control import StreamControl
 from marey.streams.redis import FrameStream
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import PATIENCE, Hand, watching
@@ -27,10 +27,15 @@ def test_what_a_client_asks_reaches_the_worker(api: LiveApi, stream: str, secret
         viewer.ask("pause")
         viewer.connection.send(b'{"kind": "resume"}')
         viewer.ask("stop")
-        heard: list[Control] = []
-        while len(heard) < 4:
-            heard += hand.heard()
-    assert heard == [Control("steer", "a person jumps"), Control("pause"), Control("resume"), Control("stop")]
+        received: list[StreamControl] = []
+        while len(received) < 4:
+            received += hand.received()
+    assert received == [
+        StreamControl("steer", "a person jumps"),
+        StreamControl("pause"),
+        StreamControl("resume"),
+        StreamControl("stop"),
+    ]
 
 
 def test_a_stop_of_a_stream_that_waits_ends_it(api: LiveApi, stream: str, secret: str) -> None:
@@ -65,7 +70,7 @@ def test_a_message_that_cannot_be_used_is_told_and_the_socket_stays(
         assert problem["type"] == f"urn:marey:problem:{kind}"
         assert problem["detail"]
         viewer.ask("pause")
-        assert hand.heard() == [Control("pause")]
+        assert hand.received() == [StreamControl("pause")]
 
 
 def test_a_message_that_is_far_too_long_closes_the_socket(api: LiveApi, stream: str, secret: str) -> None:
@@ -83,7 +88,7 @@ def test_too_many_messages_at_once_are_told(
         for _ in range(300):
             viewer.ask("pause")
         assert viewer.until("error").of("error")[0]["problem"]["type"] == "urn:marey:problem:busy"
-    assert len(hand.heard()) >= 1
+    assert len(hand.received()) >= 1
 
 
 def test_who_may_only_look_asks_in_vain(api: LiveApi, stream: str, hand: Hand) -> None:

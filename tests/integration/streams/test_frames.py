@@ -12,7 +12,7 @@ from marey.api.streams import protocol
 from marey.core.settings import Settings
 from marey.motion.skeleton import HUMANML3D
 from marey.streams import StreamState
-from marey.streams.control import Control
+from marey.streams.control import StreamControl
 from marey.streams.presence import ViewerPresence
 from marey.streams.rewrites import PromptRewrite
 from tests.support.live_api import ApiThread, LiveApi
@@ -98,10 +98,10 @@ def test_for_a_slow_client_that_wants_every_frame_the_stream_is_paused_until_it_
         slow.until_frame(4)
         for _ in range(LATE // 100):
             hand.show(100)
-        assert hand.heard() == [Control("pause")]
+        assert hand.received() == [StreamControl("pause")]
         hand.note(state=StreamState.PAUSED)
         assert slow.until_frame(LATE + 4).numbers == list(range(5, LATE + 5))
-        assert hand.heard() == [Control("resume")]
+        assert hand.received() == [StreamControl("resume")]
 
 
 def test_a_client_that_goes_away_leaves_no_stream_paused(api: LiveApi, stream: str, secret: str, hand: Hand) -> None:
@@ -110,9 +110,9 @@ def test_a_client_that_goes_away_leaves_no_stream_paused(api: LiveApi, stream: s
         slow.until_frame(4)
         for _ in range(LATE // 100):
             hand.show(100)
-        assert hand.heard() == [Control("pause")]
+        assert hand.received() == [StreamControl("pause")]
         slow.connection.socket.close()
-    assert hand.heard() == [Control("resume")]
+    assert hand.received() == [StreamControl("resume")]
 
 
 def test_a_client_that_takes_nothing_any_more_is_let_go(
@@ -126,10 +126,10 @@ def test_a_client_that_takes_nothing_any_more_is_let_go(
         dead.until_frame(4)
         for _ in range(LATE // 100):
             hand.show(100)
-        assert hand.heard() == [Control("pause")]
-        heard: list[Control] = []
-        until(lambda: heard or heard.extend(hand.heard()))
-        assert heard == [Control("resume")]
+        assert hand.received() == [StreamControl("pause")]
+        received: list[StreamControl] = []
+        until(lambda: received or received.extend(hand.received()))
+        assert received == [StreamControl("resume")]
 
 
 def test_a_stream_is_watched_as_long_as_a_socket_is_open(

@@ -15,7 +15,7 @@ from marey.db import transaction
 from marey.motion.skeleton import HUMANML3D
 from marey.streams import tables as stream_tables
 from marey.streams import take_stream
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 from marey.tenants import tables as tenant_tables
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import BUNDLE, PATIENCE, Hand
@@ -100,7 +100,7 @@ def test_a_stream_that_waits_is_over_as_soon_as_it_is_deleted(
 def test_a_stream_that_a_worker_has_is_asked_to_stop(http: httpx2.Client, stream: str, hand: Hand) -> None:
     response = http.delete(f"/v1/streams/{stream}")
     assert (response.status_code, response.json()["state"]) == (202, "live")
-    assert hand.heard() == [Control("stop")]
+    assert hand.received() == [StreamControl("stop")]
 
 
 def test_a_worker_that_takes_a_stream_while_it_is_deleted_has_it_and_hears_of_that(
@@ -114,7 +114,7 @@ def test_a_worker_that_takes_a_stream_while_it_is_deleted_has_it_and_hears_of_th
         until(lambda: waiting_for_a_row(api.engine))
     deleting.join(PATIENCE)
     assert answers[0].json()["state"] == "live"
-    assert [control for _, control in ControlQueue(client, stream).read()] == [Control("stop")]
+    assert [control for _, control in ControlQueue(client, stream).read()] == [StreamControl("stop")]
 
 
 def test_the_stream_of_another_tenant_is_404_over_http_and_over_the_socket(api: LiveApi, stream: str) -> None:

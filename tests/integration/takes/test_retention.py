@@ -15,10 +15,10 @@ from marey.core.errors import Conflict, NotFound, PluginError
 from marey.db import transaction
 from marey.jobs import (
     AssetDigest,
+    FailureReason,
     ItemFailure,
     JobState,
     NewMotion,
-    Problem,
     asset_key,
     begin_assets,
     cancel,
@@ -75,7 +75,7 @@ def made(
         motions.append(NewMotion(item.id, files, 40, 20.0, "MIT", 0.5, metadata))
     with transaction(engine) as conn:
         begin_assets(conn, claimed.lease_token, [file for motion in motions for file in motion.files.values()])
-        problem = Problem("invalid-input", f"{PROMPT!r} cannot be danced")
+        problem = FailureReason("invalid-input", f"{PROMPT!r} cannot be danced")
         fail_items(conn, claimed.lease_token, [ItemFailure(item.id, problem, False) for item in bad])
         commit_motions(conn, claimed.lease_token, motions)
     return identifier
@@ -123,7 +123,7 @@ def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_s
         motion = items[0].motion
         assert motion is not None
         assert (motion.metadata, motion.seed) == ({"seed": 7}, 0)
-        assert items[2].problem == Problem("invalid-input", "erased with the prompt")
+        assert items[2].problem == FailureReason("invalid-input", "erased with the prompt")
         npz = next(file for file in motion.files if file.format == "npz")
         assert list_items(conn, "default", other).rows[0].prompt == "a person bows"
         assert audit(conn) == []

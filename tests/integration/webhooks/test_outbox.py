@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from marey.db import transaction
 from marey.evaluations import EvaluationState, cancel_evaluation, lock_evaluation, move_evaluation
-from marey.jobs import ItemFailure, Policy, Problem, cancel, fail_items, pause, resume, retry, sweep
+from marey.jobs import FailureReason, ItemFailure, Policy, cancel, fail_items, pause, resume, retry, sweep
 from marey.streams import NewStream, abandoned_streams, create_stream, end_stream
 from marey.tenants import DEFAULT_TENANT, create_key, tables
 from marey.webhooks import EventKind, delete_webhook
@@ -38,7 +38,7 @@ def test_a_job_that_ended_is_told_once_with_its_counters_and_without_its_prompts
     commit_all(engine, claimed, [item.id for item in claimed.items[:2]])
     assert messages_of(engine, webhook) == []
     with transaction(engine) as conn:
-        fail_items(conn, claimed.lease_token, [ItemFailure(claimed.items[2].id, Problem("x", "secret"), False)])
+        fail_items(conn, claimed.lease_token, [ItemFailure(claimed.items[2].id, FailureReason("x", "secret"), False)])
     (row,) = deliveries(engine, webhook)
     assert (row.kind, row.state, row.attempts) == ("job.ended", "pending", 0)
     counters = {"total": 3, "ready": 0, "leased": 0, "succeeded": 2, "failed": 1, "dead": 0, "cancelled": 0}

@@ -52,7 +52,7 @@ def decode(data: bytes, where: str, coordinates: Coordinates) -> MotionClip:
             manifest=values["manifest"],
         )
     except (ValueError, KeyError, TypeError) as error:
-        raise InvalidFile(f"is not a file of poses: {error}", where=where) from error
+        raise InvalidFile(f"not a file of poses: {error}", where=where) from error
 
 
 EXPORTER = Exporter(

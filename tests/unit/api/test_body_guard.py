@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.types import Message, Receive, Scope, Send
 
-from marey.http.bodies import SMALL_BODY, BodyGuard, Patience
+from marey.http.bodies import SMALL_BODY, BodyDeadline, BodyGuard
 from marey.http.body_budget import BodyBudget
 
 SIZE = SMALL_BODY + 1
@@ -40,7 +40,7 @@ def test_large_ones_wait_for_room_until_the_answer_and_small_ones_do_not() -> No
         await send({"type": "http.response.body", "body": b""})
 
     async def scenario() -> None:
-        guard = BodyGuard(app, Patience(60, 60))
+        guard = BodyGuard(app, BodyDeadline(60, 60))
         guard.room = BodyBudget(2**20, 2**20, seconds=0.05)
         first, running = request(guard, 2**20 - SIZE)
         second, also = request(guard, SIZE)

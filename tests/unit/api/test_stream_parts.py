@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from marey.api.streams.accept import first_frame, key_of
 from marey.api.streams.backpressure import BEHIND_FRAMES, LagTracker
-from marey.api.streams.messages import Rate
+from marey.api.streams.messages import MessageRateLimit
 from marey.api.streams.socket_writer import close_code
 from marey.core.errors import Busy, InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 
@@ -42,7 +42,7 @@ def test_a_client_that_catches_up_is_not_slow_and_one_that_falls_behind_is() -> 
 
 
 def test_a_rate_lets_a_second_of_messages_through_at_once_and_then_as_many_a_second() -> None:
-    rate = Rate(20)
+    rate = MessageRateLimit(20)
     start = rate._at
     assert [rate.allows(start) for _ in range(21)] == [True] * 20 + [False]
     assert not rate.allows(start + 0.04)

@@ -27,9 +27,9 @@ class Counting(Catalogue):
         super().__init__(config)
         self.missed = 0
 
-    def offer(self, name: str | None) -> GeneratorCapabilities:
+    def capabilities(self, name: str | None) -> GeneratorCapabilities:
         try:
-            return super().offer(name)
+            return super().capabilities(name)
         except NotFound:
             self.missed += 1
             raise

@@ -15,7 +15,7 @@ from marey.api.models.schemas import ModelsView
 from marey.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
-from marey.jobs.generators import offers
+from marey.jobs.generators import list_generators
 
 GOOD, BAD = "a-good", "b-broken"
 
@@ -114,7 +114,7 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "a folder that leads nowhere": (dangling, "not a model bundle"),
     "no lengths": (edit(parameters={}), "no number as 'min_frames'"),
     "lengths that are texts": (edit(parameters={"min_frames": "1", "max_frames": []}), "no number as 'min_frames'"),
-    "lengths that are none": (edit(parameters={"min_frames": 9, "max_frames": 1}), "makes motions of"),
+    "lengths that are none": (edit(parameters={"min_frames": 9, "max_frames": 1}), "invalid range of lengths"),
     "lengths of 400 digits": (edit(parameters={"min_frames": 10**400, "max_frames": 10**401}), "no number as 'min_"),
     "settings that are a number": (
         edit(parameters={"min_frames": 16, "max_frames": 196, "inference": 5}),
@@ -138,8 +138,8 @@ def test_a_broken_bundle_is_told_and_hides_no_other(
 ) -> None:
     spoil, reason = BROKEN[kind]
     spoil(config.models / BAD)
-    made = offers(config)
-    assert [offer.bundle.manifest.name for offer in made.found] == [GOOD]
+    made = list_generators(config)
+    assert [generator.bundle.manifest.name for generator in made.found] == [GOOD]
     assert [broken.name for broken in made.broken] == [BAD]
     assert reason in made.broken[0].reason
     assert "secret-server-path" not in made.broken[0].reason
@@ -152,16 +152,16 @@ def test_a_folder_whose_name_is_no_unicode_can_be_told(config: Settings, caplog:
     name = os.fsdecode(b"b-\xff")
     (config.models / BAD).rename(config.models / name)
     (config.models / name / "manifest.json").write_bytes(b"{}")
-    (broken,) = offers(config).broken
+    (broken,) = list_generators(config).broken
     assert broken.name == "b-\\udcff"
-    assert b"b-" in ModelsView.of(offers(config)).model_dump_json().encode()
+    assert b"b-" in ModelsView.of(list_generators(config)).model_dump_json().encode()
     assert "b-\\udcff" in caplog.text.encode().decode()
 
 
 def test_a_reason_is_logged_once(config: Settings, caplog: pytest.LogCaptureFixture) -> None:
     (config.models / BAD / "manifest.json").write_text("{")
     for _ in range(3):
-        offers(config)
+        list_generators(config)
     assert caplog.text.count("is left out") == 1
 
 

@@ -42,7 +42,7 @@ def test_an_installed_model_gives_ranges_and_its_bundle_the_defaults(config: Set
     [
         ({"guidance": 101.0}, "guidance: 101 is outside 0 to 100"),
         ({"steps": 2.5}, "steps: is 2.5, not a whole number"),
-        ({"heat": 1.0}, "'heat' is not a setting of hgm3-starter; known are steps, guidance"),
+        ({"heat": 1.0}, "unknown setting 'heat' of hgm3-starter; known: steps, guidance"),
     ],
 )
 def test_what_an_installed_model_cannot_be_set_to_is_told(
@@ -54,12 +54,12 @@ def test_what_an_installed_model_cannot_be_set_to_is_told(
 
 def test_of_a_model_that_is_not_installed_the_names_are_known(config: Settings) -> None:
     assert check_settings(bundle(config, FOREIGN), {"steps": 5000.0}) == {"steps": 5000}
-    with pytest.raises(InvalidInput, match="'guidance' is not a setting of toy-starter; known are steps, fps"):
+    with pytest.raises(InvalidInput, match="unknown setting 'guidance' of toy-starter; known: steps, fps"):
         check_settings(bundle(config, FOREIGN), {"guidance": 2.0})
 
 
 def test_a_row_holds_whole_settings_as_integers_however_they_were_written(config: Settings) -> None:
-    offer = capabilities_of(bundle(config, FOREIGN), config)
-    rows = list(new_items((Item("walk", settings={"steps": steps}), offer) for steps in (8, 8.0)))
+    generator = capabilities_of(bundle(config, FOREIGN), config)
+    rows = list(new_items((Item("walk", settings={"steps": steps}), generator) for steps in (8, 8.0)))
     assert [type(row.settings["steps"]) for row in rows] == [int, int]
     assert len({row.batch_key for row in rows}) == 1

@@ -11,31 +11,31 @@ from hypothesis import strategies as st
 from marey.checks.judge import Act, Side
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
-from marey.items.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
+from marey.items.expected import ACTIONS, SIDED, TRAVELS, ExpectedAction, format_expected, read_expected
 from marey.items.item import InvalidItems
 
-acts = st.one_of(
-    st.builds(ExpectedAct, st.sampled_from(TRAVELS), st.just(""), st.booleans()),
-    st.sampled_from([ExpectedAct("turn", side) for side in SIDED["turn"]]),
-    st.builds(ExpectedAct, st.sampled_from(["wave", "raise"]), st.sampled_from(["", *SIDED["wave"]])),
-    st.builds(ExpectedAct, st.sampled_from(["bow", "kick", "dance"])),
+actions = st.one_of(
+    st.builds(ExpectedAction, st.sampled_from(TRAVELS), st.just(""), st.booleans()),
+    st.sampled_from([ExpectedAction("turn", side) for side in SIDED["turn"]]),
+    st.builds(ExpectedAction, st.sampled_from(["wave", "raise"]), st.sampled_from(["", *SIDED["wave"]])),
+    st.builds(ExpectedAction, st.sampled_from(["bow", "kick", "dance"])),
 )
 
 
 def test_the_acts_and_sides_are_those_that_can_be_judged() -> None:
-    assert set(ACTS) == set(get_args(Act))
+    assert set(ACTIONS) == set(get_args(Act))
     assert {side for sides in SIDED.values() for side in sides} | {""} == set(get_args(Side))
 
 
-@given(st.lists(acts, min_size=1, max_size=4).map(tuple))
-def test_what_is_expected_is_read_back_as_it_was_written(expected: tuple[ExpectedAct, ...]) -> None:
+@given(st.lists(actions, min_size=1, max_size=4).map(tuple))
+def test_what_is_expected_is_read_back_as_it_was_written(expected: tuple[ExpectedAction, ...]) -> None:
     assert read_expected(format_expected(expected)) == expected
 
 
 def test_capitals_and_blanks_do_not_matter() -> None:
     assert read_expected("  Walk STRAIGHT then  wave left ") == (
-        ExpectedAct("walk", straight=True),
-        ExpectedAct("wave", "left"),
+        ExpectedAction("walk", straight=True),
+        ExpectedAction("wave", "left"),
     )
 
 

@@ -318,7 +318,7 @@ def test_unpaired_embeddings_are_refused():
         ({"pool": 32, "labels": np.zeros(96)}, "float64"),
         ({"pool": 32, "distinct_pools": True}, "need labels"),
         ({"pool": 32, "labels": np.arange(96) % 31, "distinct_pools": True}, "distinct labels: 31 is too few"),
-        ({"pool": 32, "distance": "manhattan"}, "no distance 'manhattan'"),
+        ({"pool": 32, "distance": "manhattan"}, "unknown distance 'manhattan'"),
     ],
 )
 def test_r_precision_refuses_what_it_cannot_answer(options, message):

@@ -89,7 +89,7 @@ def test_other_motion_under_the_names_of_the_clips_is_refused(
     real: RealClips, evaluator: TMREvaluator, tmp_path: Path
 ) -> None:
     other = PreparedData.open(write_prepared(tmp_path / "other", 240))
-    with pytest.raises(InvalidInput, match="is another motion than in the evaluator's reference"):
+    with pytest.raises(InvalidInput, match="differs from the evaluator's reference"):
         reconstruct(other, real, evaluator, GENERATOR, Perfect())
     small = PreparedData.open(write_prepared(tmp_path / "small", 24))
     with pytest.raises(InvalidInput, match="lacks 36 of 40 clips"):
@@ -129,7 +129,7 @@ def test_a_bundle_from_before_joints_were_measured_says_so(real: RealClips, eval
     old = RealClips({"test": type(split).of(clips, split.motion)})
     row = truth_row(Ruler(evaluator, old, ("test",), seed=0))
     assert row.values["jerk"].mean is None
-    assert "before it carried" in row.values["jerk"].note
+    assert "is older than measurements" in row.values["jerk"].note
 
 
 def test_what_the_joints_of_a_real_clip_say_is_what_the_checker_says(prepared: PreparedData, real: RealClips) -> None:

@@ -14,13 +14,21 @@ import pytest
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.evaluations import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem
-from marey.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
+from marey.evaluator.measuring import (
+    TOGETHER,
+    Broken,
+    EvaluatedMotions,
+    check_measured,
+    embed_prompts,
+    encoded,
+    measure,
+)
 from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
 from marey.evaluator.scoring import REPEATS, label_ceilings
 from marey.evaluator.tmr import TMREvaluator
-from marey.jobs import AssetDigest, ItemState, JobState, Problem
+from marey.jobs import AssetDigest, FailureReason, ItemState, JobState
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.motion.features import HUMANML3D_263
@@ -62,7 +70,7 @@ def source_of(
     return replace(source, **changes)
 
 
-def measured_of(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
+def measured_of(source: ScoreInput, evaluator: TMREvaluator) -> EvaluatedMotions:
     return measure(source.items, source.npz, evaluator)
 
 
@@ -72,12 +80,12 @@ def source(files: list[bytes], evaluator: TMREvaluator, real: RealClips) -> Scor
 
 
 @pytest.fixture(scope="module")
-def measured(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
+def measured(source: ScoreInput, evaluator: TMREvaluator) -> EvaluatedMotions:
     return measured_of(source, evaluator)
 
 
 @pytest.fixture(scope="module")
-def report(source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips) -> Report:
+def report(source: ScoreInput, measured: EvaluatedMotions, evaluator: TMREvaluator, real: RealClips) -> Report:
     return report_of(source, measured, evaluator, real)
 
 
@@ -120,7 +128,7 @@ def test_the_report_says_how_motions_came_and_what_made_them(report: Report, eva
 
 
 def test_a_report_is_heard_of_in_each_repeat_of_each_number_that_takes_long(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips
+    source: ScoreInput, measured: EvaluatedMotions, evaluator: TMREvaluator, real: RealClips
 ) -> None:
     heard: list[None] = []
     report_of(source, measured, evaluator, real, progress=lambda: heard.append(None))
@@ -189,7 +197,7 @@ def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
     assert values["clip_score_compositional"].n == 14
     assert values["r_precision_3_of_32_compositional"].n < 14  # those of them that came into pools of all 40
     assert values["obeyed"].n == 26
-    assert "no prompt says" in values["obeyed_compositional"].note
+    assert "no prompt has an expectation" in values["obeyed_compositional"].note
     assert found.row("ground_truth").values["clip_score_compositional"].mean == pytest.approx(
         values["clip_score_compositional"].mean, abs=0.01
     )
@@ -200,7 +208,7 @@ def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
 
 
 def test_the_same_evaluation_gives_the_same_numbers(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips, report: Report
+    source: ScoreInput, measured: EvaluatedMotions, evaluator: TMREvaluator, real: RealClips, report: Report
 ) -> None:
     again = report_of(source, measured_of(source, evaluator), evaluator, real)
     assert again.rows == report.rows
@@ -247,7 +255,7 @@ def test_a_motion_that_is_lost_or_broken_is_named_and_counts_in_no_number(
 
     items = list(base.items)
     items[3], items[7] = replace(items[3], npz=bad), replace(items[7], npz=lost)
-    problem = Problem("invalid-input", "too long", None, None)
+    problem = FailureReason("invalid-input", "too long", None, None)
     items[9] = replace(items[9], npz=None, state=ItemState.FAILED, problem=problem)
     source = replace(base, items=tuple(items), read=read)
     found = report_of(source, measured_of(source, evaluator), evaluator, real)
@@ -273,7 +281,7 @@ def test_motions_that_hold_nan_are_broken_and_more_than_one_percent_of_them_fail
         check_measured(found, asked=40)
 
 
-def test_a_hundredth_of_the_motions_may_be_missing(measured: Measured) -> None:
+def test_a_hundredth_of_the_motions_may_be_missing(measured: EvaluatedMotions) -> None:
     item = measured.motions[0].item
     motions = (measured.motions * 3)[:99]
     check_measured(replace(measured, motions=motions, broken=(Broken(item, "lost"),)), asked=100)
@@ -283,7 +291,7 @@ def test_a_hundredth_of_the_motions_may_be_missing(measured: Measured) -> None:
 
 
 def test_the_command_to_repeat_it_is_one_that_a_shell_reads_as_it_was(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips
+    source: ScoreInput, measured: EvaluatedMotions, evaluator: TMREvaluator, real: RealClips
 ) -> None:
     settings = {"guidance": 4.123456789, "steps": 10.0}
     request = replace(source.request, source="our prompts (new).csv", settings=settings)

@@ -16,7 +16,7 @@ from marey.core.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.t2m import T2MEvaluator
 from marey.evaluator.t2m_import import import_t2m, main
-from marey.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
 
 SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
@@ -60,7 +60,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The public folders in small, with random numbers."""
     root = tmp_path_factory.mktemp("t2m")
     torch.manual_seed(0)
-    motion, text = MotionEncoder(SMALL), TextEncoder(SMALL)
+    motion, text = T2MMotionEncoder(SMALL), T2MTextEncoder(SMALL)
     weights = {
         "movement_encoder": motion.movement.state_dict(),
         "motion_encoder": motion.motion.state_dict(),
@@ -181,7 +181,7 @@ def test_a_sentence_is_embedded_as_the_public_networks_do_written_out_step_by_st
 
 def test_names_and_shapes_are_those_of_the_public_checkpoint() -> None:
     with torch.device("meta"):
-        encoder, text = MotionEncoder(T2MConfig()), TextEncoder(T2MConfig())
+        encoder, text = T2MMotionEncoder(T2MConfig()), T2MTextEncoder(T2MConfig())
     ours = {"movement_encoder": encoder.movement, "text_encoder": text, "motion_encoder": encoder.motion}
     for name, network in ours.items():
         assert {key: tuple(value.shape) for key, value in network.state_dict().items()} == PUBLIC[name], name
@@ -220,7 +220,7 @@ def test_broken_short_and_long_motions_are_refused(evaluator: T2MEvaluator) -> N
     broken[3, 1] = np.nan
     with pytest.raises(InvalidInput, match="motion 0: 1 of 40 frames hold NaN"):
         evaluator.embed_motion([broken])
-    with pytest.raises(InvalidInput, match="has 3 frames; this evaluator knows 4 to 196"):
+    with pytest.raises(InvalidInput, match="has 3 frames; this evaluator reads 4 to 196"):
         evaluator.embed_motion([motion(3)])
     with pytest.raises(InvalidInput, match="has 200 frames"):
         evaluator.embed_motion([motion(200)])
@@ -321,7 +321,7 @@ def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(files: Path, tmp_
     for name in ("our_vab_data.npy", "our_vab_idx.pkl"):
         (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
     (tmp_path / "our_vab_words.pkl").write_bytes(pickle.dumps([Evil()]))
-    with pytest.raises(InvalidFile, match="is not a plain list or dictionary: asks for"):
+    with pytest.raises(InvalidFile, match="is not a plain list or dictionary: refused"):
         import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
     assert not (tmp_path / "touched").exists()
     assert not (tmp_path / "bundle").exists()

@@ -131,7 +131,7 @@ def test_data_or_texts_of_another_kind_are_refused(
     data = MotionData.load(prepared.path, torch.device("cpu"))
     with pytest.raises(InvalidInput, match="this configuration reads kit-251"):
         TMRStage(replace(TINY, layout="kit-251", features=251, fps=12.5), data, encoder)
-    with pytest.raises(InvalidFile, match="texts are 384 wide, this configuration reads 768"):
+    with pytest.raises(InvalidFile, match="texts have width 384; this configuration reads 768"):
         TMRStage(replace(TINY, text_width=768), data, encoder)
     with pytest.raises(InvalidInput, match="unknown stage 'tokenizer'"):
         train_stage("tokenizer", options(prepared, tmp_path, 1))
@@ -186,7 +186,7 @@ def test_a_reference_whose_halves_do_not_fit_is_refused(bundle: Bundle, tmp_path
         RealClips.of(Bundle.open(folder))
     rows["test"][0]["joints"] = [0.0]
     change(folder, FILE, json.dumps(rows).encode())
-    with pytest.raises(InvalidBundle, match="is not a reference"):
+    with pytest.raises(InvalidBundle, match="not a reference"):
         RealClips.of(Bundle.open(folder))
 
 
@@ -199,7 +199,7 @@ def test_a_bundle_of_another_layout_or_model_is_refused(bundle: Bundle, encoder:
         changed = Bundle(bundle.path, bundle.manifest.model_copy(update=changes))
         with pytest.raises(InvalidBundle, match=message):
             TMREvaluator.load(changed, device="cpu", encoder=encoder)
-    with pytest.raises(InvalidBundle, match="not an evaluator this version reads"):
+    with pytest.raises(InvalidBundle, match="not an evaluator that this version reads"):
         load_evaluator(Bundle(bundle.path, bundle.manifest.model_copy(update={"model": "other"})))
 
 
@@ -272,7 +272,7 @@ def test_a_broken_motion_is_refused_and_named(evaluator: TMREvaluator, motions: 
 def test_a_motion_of_another_width_or_length_is_refused(evaluator: TMREvaluator, motions: list[np.ndarray]) -> None:
     with pytest.raises(InvalidInput, match=r"motion 0: features have shape .*, not \(T, 263\)"):
         evaluator.embed_motion([motions[0][:, :67]])
-    with pytest.raises(InvalidInput, match="has 15 frames; this evaluator knows 16 to 196"):
+    with pytest.raises(InvalidInput, match="has 15 frames; this evaluator reads 16 to 196"):
         evaluator.embed_motion([motions[0][:15]])
     with pytest.raises(InvalidInput, match="has 197 frames"):
         evaluator.embed_motion([np.zeros((197, 263), np.float32)])

@@ -127,8 +127,8 @@ def test_equal_reports_give_equal_bytes() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"schema": "other"}, "no report of an evaluation"),
-        ({"version": 2}, "version 2; this reads version 1"),
+        ({"schema": "other"}, "not a report of an evaluation"),
+        ({"version": 2}, "version 2; this Marey reads version 1"),
         ({"motions": "many"}, "`motions`: input should be a valid integer"),
         ({"rows": 3}, "`rows`"),
         ({"created": "yesterday"}, "`created`"),

@@ -13,13 +13,13 @@ from marey.evaluator.report import (
     Baseline,
     Change,
     Exhibit,
+    GenerationSpeed,
     HeatCell,
     Metric,
     MotionScore,
     Repeats,
     Report,
     Row,
-    Speed,
     TrendPoint,
     Value,
     sentence_of,
@@ -40,7 +40,7 @@ NAN, INFINITE = float("nan"), float("inf")
         lambda x: Change("r1", "last run", 1, 1, x, x, "no difference found"),
         lambda x: TrendPoint(NOW, "1", "b", {"r1": x}),
         lambda x: Exhibit("p", 1, True, "", x),
-        lambda x: Speed(x, 1.0),
+        lambda x: GenerationSpeed(x, 1.0),
         lambda x: MotionScore(0, 0, None, x),
         lambda x: sample_report(settings={"guidance": x}),
     ],
@@ -74,7 +74,7 @@ def test_a_regression_needs_an_alarm_that_says_why_and_an_alarm_is_a_regression(
     for regressed, alarms in ((True, ()), (False, ("it fell",)), (None, ("it fell",))):
         with pytest.raises(InvalidInput, match="alarm"):
             dataclasses.replace(report, regressed=regressed, alarms=alarms)
-    with pytest.raises(InvalidInput, match="regressed against"):
+    with pytest.raises(InvalidInput, match="needs a baseline"):
         dataclasses.replace(report, regressed=False, alarms=(), changes=(), baselines=())
 
 
@@ -99,7 +99,7 @@ def test_a_verdict_against_the_metrics_direction_is_refused(
     ("changed", "message"),
     [
         ({"changes": (Change("nope", "last run", 1, 1, 0, 0, "no difference found"),)}, "unknown metric 'nope'"),
-        ({"baselines": ()}, "regressed against"),
+        ({"baselines": ()}, "needs a baseline"),
         ({"rows": (Row("ground_truth", "", "", {"nope": Value(1.0)}),)}, "missing row 'reconstruction'"),
         ({"trend": (TrendPoint(NOW, "1", "b", {"nope": 1.0}),)}, "unknown metric 'nope'"),
         ({"trend": (TrendPoint(NOW, "2", "b", {}), TrendPoint(NOW.replace(year=2025), "1", "b", {}))}, "oldest first"),

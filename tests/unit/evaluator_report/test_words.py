@@ -80,7 +80,7 @@ def test_a_difference_has_its_sign(value: float, text: str) -> None:
         (20, 20, "each of which generated every motion anew", False),
         (20, 1, "1 generated the motions anew, the others drew pools", True),
         (20, 0, "all drew pools out of the same motions", True),
-        (1, 1, "without interval", False),
+        (1, 1, "no interval", False),
     ],
 )
 def test_an_interval_says_what_it_is_over(count: int, anew: int, said: str, pools_only: bool) -> None:

@@ -61,7 +61,7 @@ def test_a_format_of_a_plugin_is_converted_to_and_from(tmp_path):
 def test_a_format_that_is_only_written_is_not_read(tmp_path):
     walker().save_npz(tmp_path / "a.npz")
     convert(tmp_path / "a.npz", tmp_path / "b.wr")
-    with pytest.raises(InvalidInput, match="only written"):
+    with pytest.raises(InvalidInput, match="can be written, but not read"):
         convert(tmp_path / "b.wr", tmp_path / "c.npz")
     with pytest.raises(InvalidInput, match=r"Known: \.bvh, \.npz, \.ty, \.wr\."):
         convert(tmp_path / "a.npz", tmp_path / "b.fbx")

@@ -17,7 +17,7 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.core.settings import Settings
 from marey.generation.handler import GeneratorHandler
-from marey.jobs import Claim, ClaimedItem, Stage
+from marey.jobs import Claim, ClaimedItem, ItemStage
 from marey.models.hgm3 import bundle as hgm3
 from marey.models.hgm3.generate import Generator as Hgm3Generator
 from marey.models.mogo import bundle as mogo
@@ -30,7 +30,7 @@ from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
 
 
-class Control:
+class FakeControl:
     """Counts steps and drops what it is told to."""
 
     def __init__(self, *dropped: UUID) -> None:
@@ -91,14 +91,14 @@ def make_item(
 
 def make_batch(handler: GeneratorHandler[Any], *items: ClaimedItem) -> Batch:
     width = handler.generator.limits.text_width
-    claim = Claim(uuid4(), "default", uuid4(), "hgm3", Stage.GENERATE, "k", "b", solo=False, items=items)
+    claim = Claim(uuid4(), "default", uuid4(), "hgm3", ItemStage.GENERATE, "k", "b", solo=False, items=items)
     return Batch(claim, items, {item.text_key: text_blob(item.prompt, width) for item in items})
 
 
-def run(handler: GeneratorHandler[Any], batch: Batch, control: Control | None = None) -> dict[UUID, Outcome]:
+def run(handler: GeneratorHandler[Any], batch: Batch, control: FakeControl | None = None) -> dict[UUID, Outcome]:
     outcomes: dict[UUID, Outcome] = {}
     for bucket in handler.buckets(batch):
-        for outcome in handler.run(Batch(batch.claim, tuple(bucket), batch.features), control or Control()):
+        for outcome in handler.run(Batch(batch.claim, tuple(bucket), batch.features), control or FakeControl()):
             assert outcome.item not in outcomes
             outcomes[outcome.item] = outcome
     return outcomes
@@ -168,7 +168,7 @@ def test_without_seconds_the_seed_decides_the_length_and_other_items_do_not(hand
 
 def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: GeneratorHandler[Any]) -> None:
     items = [make_item("a person bows", n, 2.0) for n in range(3)]
-    control = Control(items[1].id)
+    control = FakeControl(items[1].id)
     outcomes = run(handler, make_batch(handler, *items), control)
     assert set(outcomes) == {items[0].id, items[2].id}
     assert control.steps
@@ -177,7 +177,7 @@ def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: GeneratorHa
 
 def test_when_everything_is_cancelled_nothing_is_made(handler: GeneratorHandler[Any]) -> None:
     items = [make_item("a person bows", n, 2.0) for n in range(2)]
-    assert run(handler, make_batch(handler, *items), Control(*(item.id for item in items))) == {}
+    assert run(handler, make_batch(handler, *items), FakeControl(*(item.id for item in items))) == {}
 
 
 def test_broken_text_features_fail_their_item_alone(handler: GeneratorHandler[Any]) -> None:

@@ -35,7 +35,7 @@ def test_a_report_counts_each_prompt_and_seed(bundle: str, tmp_path: Path) -> No
     [
         (("--set", "steps"), "not a setting"),
         (("--set", "steps=many"), "not a setting"),
-        (("--set", "wings=2"), "'wings' is not a setting of tiny"),
+        (("--set", "wings=2"), "unknown setting 'wings' of tiny"),
         (("--set", "steps=101"), "steps: 101 is outside 1 to 100"),
         (("--prompts", "own"), "there is no set 'own'"),
         (("--steers", "2"), "has no live sessions"),

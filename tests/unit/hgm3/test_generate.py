@@ -16,12 +16,12 @@ from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
 from marey.models.hgm3.decoding import condition_level
-from marey.models.hgm3.generate import Generated, Generator, Settings
+from marey.models.hgm3.generate import Generated, Generator, SamplingSettings
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
 
 COUNT = 32
-FLAT = Settings(motion_steps=0, action_steps=0)
+FLAT = SamplingSettings(motion_steps=0, action_steps=0)
 
 
 def requests() -> list[Request]:
@@ -90,15 +90,17 @@ def test_a_request_dropped_on_two_threads_ends_and_the_others_stay_the_same(
     assert equal([reference[0], reference[2]], [made[0], made[2]])
 
 
-@pytest.mark.parametrize("plain", [Settings(skip_idle=False), Settings(trim_slots=False)])
-def test_savings_change_nothing(generator: Generator, reference: list[Generated | None], plain: Settings) -> None:
+@pytest.mark.parametrize("plain", [SamplingSettings(skip_idle=False), SamplingSettings(trim_slots=False)])
+def test_savings_change_nothing(
+    generator: Generator, reference: list[Generated | None], plain: SamplingSettings
+) -> None:
     assert equal(reference, generator.generate(requests(), plain))
 
 
 def test_min_progress_and_flat_conditions_are_other_ways_to_decode(
     generator: Generator, reference: list[Generated | None]
 ) -> None:
-    for settings in (Settings(min_progress=True), FLAT):
+    for settings in (SamplingSettings(min_progress=True), FLAT):
         assert not equal(reference, generator.generate(requests(), settings))
 
 
@@ -147,20 +149,26 @@ def test_lengths_out_of_range_are_refused(generator: Generator, frames: int) -> 
 
 @pytest.mark.parametrize("seed", [-1, 2**31])
 def test_seeds_out_of_range_are_refused(generator: Generator, seed: int) -> None:
-    with pytest.raises(InvalidInput, match="must lie between"):
+    with pytest.raises(InvalidInput, match="out of range"):
         generator.generate([Request(text_features(0), seed, 40)])
 
 
 @pytest.mark.parametrize(
-    "settings", [Settings(steps=0), Settings(top_k=0.0), Settings(guidance=-1.0), Settings(temperature=1000.0)]
+    "settings",
+    [
+        SamplingSettings(steps=0),
+        SamplingSettings(top_k=0.0),
+        SamplingSettings(guidance=-1.0),
+        SamplingSettings(temperature=1000.0),
+    ],
 )
-def test_settings_out_of_range_are_refused(generator: Generator, settings: Settings) -> None:
+def test_settings_out_of_range_are_refused(generator: Generator, settings: SamplingSettings) -> None:
     with pytest.raises(InvalidInput, match="must lie"):
         generator.generate([Request(text_features(0), 1, 40)], settings)
 
 
 def test_features_of_another_encoder_are_refused(generator: Generator) -> None:
-    with pytest.raises(InvalidInput, match="512 wide, this bundle reads 384"):
+    with pytest.raises(InvalidInput, match="width 512; this bundle reads 384"):
         generator.generate([Request(text_features(0, width=512), 1, 40)])
 
 
@@ -196,7 +204,7 @@ def test_conditions_follow_equation_14() -> None:
 
 
 def test_other_numbers_of_steps_keep_the_shares_of_the_conditions() -> None:
-    config = Settings(steps=20).inference(InferenceConfig())
+    config = SamplingSettings(steps=20).inference(InferenceConfig())
     assert (config.steps, config.motion_steps, config.action_steps) == (20, 4, 10)
 
 

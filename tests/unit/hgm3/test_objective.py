@@ -16,7 +16,7 @@ from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.decoding import DecodeOptions, Items
 from marey.models.hgm3.generate import Generator
 from marey.models.hgm3.model import MaskedTransformer
-from marey.models.hgm3.stage_masked import MaskedStage, Sample
+from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage
 from marey.models.hgm3.stage_residual import ResidualStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.training.loop import StepContext
@@ -45,7 +45,7 @@ def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedSta
     return stage
 
 
-def drawn_sample(stage: MaskedStage, batch: int = 4) -> Sample:
+def drawn_sample(stage: MaskedStage, batch: int = 4) -> MaskedSample:
     rng = np.random.default_rng(0)
     return stage.sample(stage.pairs.draw(rng, batch), rng)
 
@@ -57,7 +57,7 @@ def test_the_share_of_hard_tokens_rises_linearly_over_the_budget(prepared: Prepa
     used: list[float] = []
     masks = stage.masks
 
-    def watched(sample: Sample, nodes: torch.Tensor, alpha: float) -> torch.Tensor:
+    def watched(sample: MaskedSample, nodes: torch.Tensor, alpha: float) -> torch.Tensor:
         used.append(alpha)
         return masks(sample, nodes, alpha)
 

@@ -11,11 +11,11 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.checks.judge import Expectation, Verdict
+from marey.checks.judge import CheckVerdict, Expectation
 from marey.core.errors import InvalidFile
 from marey.data.prepared import PreparedData
 from marey.models.hgm3 import self_train as module
-from marey.models.hgm3.assembly import take_apart
+from marey.models.hgm3.assembly import unpack
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.config import TINY, HGM3Config
 from marey.models.hgm3.data import CaptionData
@@ -68,8 +68,8 @@ def obeying(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     """Lets the checker find that one action is obeyed, and no other."""
 
     def only(act: str) -> None:
-        def verdict(_joints: object, _fps: float, expected: Sequence[Expectation]) -> Verdict:
-            return Verdict([each.act for each in expected] == [act])
+        def verdict(_joints: object, _fps: float, expected: Sequence[Expectation]) -> CheckVerdict:
+            return CheckVerdict([each.act for each in expected] == [act])
 
         monkeypatch.setattr(module, "judge", verdict)
 
@@ -121,7 +121,7 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     obeying("bow")
-    take_apart(bundle, tmp_path)
+    unpack(bundle, tmp_path)
     generator = Generator.load(bundle, device="cpu")
     drawn = self_train(generator, Reader(), joined_data, 12)
     drawn.write(tmp_path, generator.networks.tokenizer, joined_data)

@@ -14,7 +14,7 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.generation.port import Request
-from marey.models.hgm3.assembly import assemble, take_apart
+from marey.models.hgm3.assembly import assemble, unpack
 from marey.models.hgm3.config import TINY, HGM3Config, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.generate import Generator
@@ -95,7 +95,7 @@ def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
 ) -> None:
     bundle = assemble(prepared.path, run, tmp_path / "first", TINY)
     again = tmp_path / "run"
-    assert take_apart(bundle, again) == TINY
+    assert unpack(bundle, again) == TINY
     copy = assemble(prepared.path, again, tmp_path / "second", TINY)
     for part in ("tokenizer", "masked", "predictor", "residual", "length"):
         theirs, ours = bundle.tensors(part), copy.tensors(part)
@@ -113,8 +113,8 @@ def test_a_bundle_is_not_taken_apart_into_a_run_that_has_stages(
     prepared: PreparedData, run: Path, tmp_path: Path
 ) -> None:
     bundle = assemble(prepared.path, run, tmp_path / "bundle", TINY)
-    with pytest.raises(InvalidInput, match="has a stage tokenizer already"):
-        take_apart(bundle, run)
+    with pytest.raises(InvalidInput, match="already has a stage tokenizer"):
+        unpack(bundle, run)
 
 
 def test_a_stage_says_which_one_it_needs_first(prepared: PreparedData, tmp_path: Path) -> None:
@@ -267,6 +267,6 @@ def test_configurations_survive_json() -> None:
         assert HGM3Config.from_dict(config.to_dict()) == config
     with pytest.raises(InvalidInput, match="unknown fields: depht"):
         HGM3Config.from_dict({"tokenizer": {"depht": 1}})
-    with pytest.raises(InvalidInput, match="no configuration"):
+    with pytest.raises(InvalidInput, match="unknown configuration"):
         named_config("large")
     assert named_config("tiny", mask="random").mining.mask == "random"

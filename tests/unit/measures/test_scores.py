@@ -27,9 +27,9 @@ def broken(**changes: Any) -> bytes:
     ("data", "said"),
     [
         (b"{", "is not JSON"),
-        (b"[]", "is no report"),
-        (broken(schema="other"), "is no report"),
-        (broken(version=2), "has version 2; this reads version 1"),
+        (b"[]", "is not a report"),
+        (broken(schema="other"), "is not a report"),
+        (broken(version=2), "has version 2; this Marey reads version 1"),
         (broken(scores=None), "`scores`"),
         (broken(scores=[{"index": 0, "variant": 0, "obeyed": 2, "retrieved": None}]), "a score of 2"),
         (broken(scores=[{"index": "0", "variant": 0, "obeyed": 1, "retrieved": None}]), "index is '0'"),

@@ -7,7 +7,7 @@ import torch
 from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 
 
 def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:
@@ -28,9 +28,9 @@ def opened(
     *,
     dtype: torch.dtype = torch.float32,
     group: int = 1,
-) -> Streams:
+) -> StreamBatch:
     """Room for sessions of a model of its own."""
-    return Streams(PackedModel(model, dtype=dtype, group=group), capacity, config)
+    return StreamBatch(PackedModel(model, dtype=dtype, group=group), capacity, config)
 
 
 def columns(frames: int, batch: int = 1, config: MOGOConfig = TINY) -> torch.Tensor:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.checks.prompts import HeldOutPrompt, evaluation_prompts
 from marey.cli.roles.adherence import judge_adherence
 from marey.models.mogo import adherence
 from marey.models.mogo.adherence import pairs_of, steered
@@ -18,7 +18,7 @@ from tests.support.bodies import bower, walker
 FPS = 20.0
 
 
-def asked(group: str) -> EvaluationPrompt:
+def asked(group: str) -> HeldOutPrompt:
     return next(p for p in evaluation_prompts() if p.group == group)
 
 
@@ -52,4 +52,4 @@ def test_a_report_holds_whole_motions_and_live_sessions(tmp_path: Path, monkeypa
     found = json.loads((tmp_path / "report" / "report.json").read_text())
     assert len(found["trials"]) == 4
     assert [len(sessions) for sessions in found["live"].values()] == [3, 2]
-    assert "obeyed within 2 s of a steer" in judged.markdown
+    assert "new prompt followed within 2 s of a steer" in judged.markdown

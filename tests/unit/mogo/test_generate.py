@@ -14,7 +14,7 @@ from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY
-from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.generate import Generator, SamplingSettings
 from marey.models.mogo.train import train_stage
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
@@ -52,7 +52,7 @@ def test_an_open_length_is_the_models_within_its_limits(generator: Generator) ->
 
 def test_prompt_seed_and_settings_make_a_difference(generator: Generator) -> None:
     made = [
-        generator.generate([Request(text_features(text), seed, 20)], Settings(temperature=heat))[0].tokens
+        generator.generate([Request(text_features(text), seed, 20)], SamplingSettings(temperature=heat))[0].tokens
         for text, seed, heat in ((0, 0, None), (1, 0, None), (0, 1, None), (0, 0, 0.1))
     ]
     assert all(not np.array_equal(made[0], other) for other in made[1:])
@@ -73,8 +73,10 @@ def test_a_request_out_of_range_is_refused(generator: Generator, request_of, whe
     assert error.value.where == where
 
 
-@pytest.mark.parametrize("settings", [Settings(top_k=0.0), Settings(temperature=-1.0), Settings(guidance=101.0)])
-def test_settings_out_of_range_are_refused(generator: Generator, settings: Settings) -> None:
+@pytest.mark.parametrize(
+    "settings", [SamplingSettings(top_k=0.0), SamplingSettings(temperature=-1.0), SamplingSettings(guidance=101.0)]
+)
+def test_settings_out_of_range_are_refused(generator: Generator, settings: SamplingSettings) -> None:
     with pytest.raises(InvalidInput):
         generator.generate([Request(text_features(0), 0, 20)], settings)
 
@@ -90,7 +92,7 @@ def test_a_run_becomes_a_bundle_that_generates(tmp_path: Path) -> None:
 
 
 def test_a_bundle_of_another_model_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidBundle, match="of hgm3, not of mogo"):
+    with pytest.raises(InvalidBundle, match="of model hgm3, not mogo"):
         Generator.load(hgm3_bundle(tmp_path / "other"), device="cpu")
 
 

@@ -11,7 +11,15 @@ import torch
 from marey.core.errors import InvalidInput
 from marey.models.mogo.attention import RelativeAttention
 from marey.models.mogo.config import PAPER, STARTER, TINY, MOGOConfig
-from marey.models.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
+from marey.models.mogo.model import (
+    NOT_ASKED,
+    DurationRegression,
+    RQHCTransformer,
+    Trunk,
+    corrupt,
+    in_force,
+    next_targets,
+)
 
 from .networks import columns, prompts, transformer
 
@@ -165,7 +173,7 @@ def test_frames_cut_off_move_the_prompt_away_and_no_further_than_was_trained() -
 
 
 def test_longer_sequences_than_were_trained_are_refused() -> None:
-    with pytest.raises(ValueError, match="25 frames are more than the 24"):
+    with pytest.raises(ValueError, match="25 frames exceed the 24"):
         transformer()(prompts(1), columns(25))
 
 
@@ -256,7 +264,7 @@ def test_the_trunk_has_the_size_it_is_named_for(config: MOGOConfig, millions: fl
 
 def test_an_act_takes_as_long_as_acts_that_were_said_alike() -> None:
     torch.manual_seed(0)
-    pace, features = Pace(TINY), torch.randn(2000, TINY.condition.text_width)
+    pace, features = DurationRegression(TINY), torch.randn(2000, TINY.condition.text_width)
     assert pace(features[:2]).tolist() == [TINY.max_frames] * 2  # 4 s, before it has learnt; no longer than is trained
     pace.fit(features, 20 * torch.exp(0.1 * features[:, 0]))
     said = torch.zeros(3, TINY.condition.text_width)

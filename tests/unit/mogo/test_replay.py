@@ -16,7 +16,7 @@ from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.replay import Replayed
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from tests.support.prepared import text_features
 
 from .networks import columns, opened, prompts, transformer
@@ -25,7 +25,7 @@ CUDA = torch.device("cuda", 0)
 on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
 
 
-def played(streams: Streams, device: str | torch.device = "cpu") -> torch.Tensor:
+def played(streams: StreamBatch, device: str | torch.device = "cpu") -> torch.Tensor:
     """Columns of sessions that join, are steered, leave, and make room for others."""
     asked = prompts(6)[:, 0].to(device)
     first = streams.start(asked[0], 1)
@@ -53,7 +53,7 @@ def test_rows_that_nobody_sits_in_change_nothing_where_they_are_computed_along(g
     assert torch.equal(played(along), played(alone))
 
 
-def refusing(error: type[RuntimeError], monkeypatch: pytest.MonkeyPatch) -> Streams:
+def refusing(error: type[RuntimeError], monkeypatch: pytest.MonkeyPatch) -> StreamBatch:
     """Streams whose step cannot be recorded."""
 
     def refuse(_: Replayed) -> None:
@@ -87,7 +87,7 @@ def test_no_room_for_a_recorded_step_is_an_error(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 def test_a_recorded_step_draws_what_the_step_itself_draws(dtype: torch.dtype) -> None:
     packed = PackedModel(transformer().to(CUDA), dtype=dtype)
-    recorded, direct = Streams(packed, 4), Streams(packed, 4)
+    recorded, direct = StreamBatch(packed, 4), StreamBatch(packed, 4)
     assert isinstance(recorded._draw, Replayed)
     with structlog.testing.capture_logs() as refused:
         recorded.prepare()
@@ -101,7 +101,7 @@ def test_a_recorded_step_draws_what_the_step_itself_draws(dtype: torch.dtype) ->
 @on_a_gpu
 def test_recorded_steps_outlive_those_that_were_recorded_before_them() -> None:
     packed = PackedModel(transformer().to(CUDA))
-    first, second = Streams(packed, 4), Streams(packed, 4)
+    first, second = StreamBatch(packed, 4), StreamBatch(packed, 4)
     first.prepare()
     wanted = played(second, CUDA)
     del first
@@ -115,7 +115,7 @@ def test_recorded_steps_outlive_those_that_were_recorded_before_them() -> None:
 @on_a_gpu
 def test_states_on_a_gpu_are_those_of_the_processor() -> None:
     model, tokens, asked = transformer(), columns(20)[0], prompts(1)[0, 0]
-    here, there = Streams(PackedModel(model), 1), Streams(PackedModel(model.to(CUDA)), 1)
+    here, there = StreamBatch(PackedModel(model), 1), StreamBatch(PackedModel(model.to(CUDA)), 1)
     here.start(asked, 1)
     there.start(asked.to(CUDA), 1)
     for column in tokens:

@@ -10,7 +10,7 @@ import torch
 from marey.core.errors import InvalidInput
 from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from marey.nn.sampling import guide
 from marey.streams.actions import ActionStart
 from tests.support.processors import PACKED_TYPES
@@ -27,7 +27,7 @@ def said(seed: int) -> torch.Tensor:
     return prompts(1, seed=seed)[0, 0]
 
 
-def run(streams: Streams, frames: int) -> dict[int, torch.Tensor]:
+def run(streams: StreamBatch, frames: int) -> dict[int, torch.Tensor]:
     """So many steps: the columns (frames, V) of each session that was there all the time."""
     steps = [streams.step() for _ in range(frames)]
     return {session: torch.stack([step[session] for step in steps]) for session in steps[-1]}

@@ -12,11 +12,11 @@ import torch
 from marey.core.errors import InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.models.mogo import steers
-from marey.models.mogo.assembly import assemble, take_apart
+from marey.models.mogo.assembly import assemble, unpack
 from marey.models.mogo.config import TINY, MOGOConfig
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.rollouts import Rollouts
-from marey.models.mogo.samples import MIN_FRAMES, Stretch
+from marey.models.mogo.samples import MIN_FRAMES, TokenSpan
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.steers import LEAST_ENTERED, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
@@ -71,7 +71,7 @@ def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
     for stage in ("tokenizer", "transformer"):
         train_stage(stage, options(prepared, run, 3))
     bundle = assemble(prepared.path, run, tmp_path / "first", TINY)
-    assert take_apart(bundle, again) == TINY
+    assert unpack(bundle, again) == TINY
     copy = assemble(prepared.path, again, tmp_path / "second", TINY)
     for stage in ("tokenizer", "transformer"):
         theirs, ours = bundle.tensors(stage), copy.tensors(stage)
@@ -81,8 +81,8 @@ def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
         train_stage(stage, replace(options(prepared, again, 1), warm=True))
         after = load_part(again / stage / "part").state
         assert 0 < farthest_move(before, after) < 0.1, stage  # from the weights that were there, not from random ones
-    with pytest.raises(InvalidInput, match="has a stage tokenizer already"):
-        take_apart(bundle, again)
+    with pytest.raises(InvalidInput, match="already has a stage tokenizer"):
+        unpack(bundle, again)
 
 
 def test_the_transformer_learns_the_clips_it_sees(prepared: PreparedData, tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_a_single_act_has_one_of_its_captions_and_is_sometimes_cut(stage: Transf
 
 
 def test_a_stretch_that_is_too_long_loses_its_end_and_a_seam_behind_it() -> None:
-    whole = Stretch(first=7, frames=40, skipped=0, before=1, after=2, seam=30, ends=True)
+    whole = TokenSpan(first=7, frames=40, skipped=0, before=1, after=2, seam=30, ends=True)
     assert whole.shortened(40) == whole
     assert whole.shortened(35) == replace(whole, frames=35, ends=False)
     assert whole.shortened(24) == replace(whole, frames=24, seam=0, ends=False)

@@ -67,7 +67,7 @@ def test_a_package_adds_a_model(installed) -> None:
 
 def test_a_model_that_is_not_there_is_told_with_those_that_are() -> None:
     assert find_model("nowhere") is None
-    with pytest.raises(NotFound, match="no model 'nowhere'") as told:
+    with pytest.raises(NotFound, match="unknown model 'nowhere'") as told:
         get_model("nowhere")
     assert all(name in (told.value.hint or "") for name in model_names())
 

@@ -6,7 +6,7 @@ from uuid import UUID, uuid4
 import pytest
 
 from marey.core.errors import Unreachable
-from marey.jobs import Claim, ClaimedItem, HeartbeatReply, Stage
+from marey.jobs import Claim, ClaimedItem, HeartbeatReply, ItemStage
 from marey.runtime.lease import Heartbeat, HeldLease
 
 
@@ -18,7 +18,7 @@ def make_claim(count: int) -> Claim:
         )
         for n in range(count)
     )  # fmt: skip
-    return Claim(uuid4(), "default", uuid4(), "toy", Stage.GENERATE, "b", "toy@0", solo=False, items=items)
+    return Claim(uuid4(), "default", uuid4(), "toy", ItemStage.GENERATE, "b", "toy@0", solo=False, items=items)
 
 
 class Database:

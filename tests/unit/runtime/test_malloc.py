@@ -67,12 +67,12 @@ def test_another_system_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_the_api_asks_for_it_before_it_starts_anything(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Asked(Exception):
+    class ModuleLoaded(Exception):
         pass
 
     def asked() -> None:
-        raise Asked
+        raise ModuleLoaded
 
     monkeypatch.setattr(process, "one_heap", asked)
-    with pytest.raises(Asked):
+    with pytest.raises(ModuleLoaded):
         app.serve()

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidFile
-from marey.streams.recording import Recording
+from marey.streams.recording import StreamRecording
 from tests.support.prepared import text_features
 
 
-def recording() -> Recording:
+def recording() -> StreamRecording:
     tokens = np.arange(24, dtype=np.int16).reshape(8, 3)
-    return Recording("stream-1", tokens, [(0, "a person walks"), (5, "a person “waves”")], text_features(0))
+    return StreamRecording("stream-1", tokens, [(0, "a person walks"), (5, "a person “waves”")], text_features(0))
 
 
 def test_a_recording_reads_back_as_it_was_written() -> None:
     written = recording()
-    read = Recording.from_blob(written.to_blob())
+    read = StreamRecording.from_blob(written.to_blob())
     assert read is not None
     assert (read.stream, list(read.prompts)) == (written.stream, list(written.prompts))
     assert np.array_equal(read.tokens, written.tokens)
@@ -29,7 +29,7 @@ def test_equal_recordings_are_equal_bytes() -> None:
 
 
 def test_text_features_are_no_recording() -> None:
-    assert Recording.from_blob(text_features(0).to_blob()) is None
+    assert StreamRecording.from_blob(text_features(0).to_blob()) is None
 
 
 @pytest.mark.parametrize(
@@ -37,4 +37,4 @@ def test_text_features_are_no_recording() -> None:
 )
 def test_a_damaged_recording_is_refused(damage: object) -> None:
     with pytest.raises(InvalidFile, match="not a recording"):
-        Recording.from_blob(damage(recording().to_blob()))  # pyright: ignore
+        StreamRecording.from_blob(damage(recording().to_blob()))  # pyright: ignore

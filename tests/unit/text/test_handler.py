@@ -11,7 +11,7 @@ import pytest
 
 from marey.bundles import BundleWriter, TextSpec
 from marey.core.errors import InvalidBundle
-from marey.jobs import Claim, ClaimedItem, Stage
+from marey.jobs import Claim, ClaimedItem, ItemStage
 from marey.runtime.handler import Batch, Failed, TextDone
 from marey.text.features import TextFeatures
 from marey.text.keys import feature_key, resolve
@@ -52,11 +52,11 @@ def items(*prompts: str, key: str | None = None) -> tuple[ClaimedItem, ...]:
 
 
 def batch(claimed: tuple[ClaimedItem, ...]) -> Batch:
-    claim = Claim(uuid4(), "default", uuid4(), "text", Stage.TEXT, "key", "tiny", solo=False, items=claimed)
+    claim = Claim(uuid4(), "default", uuid4(), "text", ItemStage.TEXT, "key", "tiny", solo=False, items=claimed)
     return Batch(claim, claimed, {})
 
 
-class Control:
+class FakeControl:
     """Says which items were cancelled, and counts progress."""
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Control:
 
 def test_each_prompt_gets_its_features_under_its_key(handler: TextHandler) -> None:
     claimed = items("a person walks forward", "someone bows")
-    control = Control()
+    control = FakeControl()
     outcomes = list(handler.run(batch(claimed), control))
     assert [(o.item, o.key) for o in outcomes if isinstance(o, TextDone)] == [(i.id, i.text_key) for i in claimed]
     read = TextFeatures.from_blob(outcomes[0].blob)  # type: ignore[union-attr]
@@ -83,7 +83,7 @@ def test_each_prompt_gets_its_features_under_its_key(handler: TextHandler) -> No
 
 def test_a_prompt_that_cannot_be_used_fails_alone_and_for_good(handler: TextHandler) -> None:
     claimed = (*items("a person walks"), *items("走", key="0" * 64), *items("someone bows"))
-    done, failed, last = handler.run(batch(claimed), Control())
+    done, failed, last = handler.run(batch(claimed), FakeControl())
     assert isinstance(done, TextDone)
     assert isinstance(last, TextDone)
     assert isinstance(failed, Failed)
@@ -92,14 +92,14 @@ def test_a_prompt_that_cannot_be_used_fails_alone_and_for_good(handler: TextHand
 
 
 def test_a_job_taken_with_other_weights_is_not_given_wrong_features(handler: TextHandler) -> None:
-    (failed,) = handler.run(batch(items("a person walks", key="0" * 64)), Control())
+    (failed,) = handler.run(batch(items("a person walks", key="0" * 64)), FakeControl())
     assert isinstance(failed, Failed)
     assert "another text encoder or labeller" in failed.problem.message
 
 
 def test_items_dropped_on_the_way_are_left_out(handler: TextHandler) -> None:
     claimed = items("a person walks", "someone bows", "a man kicks")
-    control = Control()
+    control = FakeControl()
     running: Iterator[object] = handler.run(batch(claimed), control)
     next(running)
     control.gone = {claimed[1].id}

@@ -18,7 +18,7 @@ from marey.text.keys import as_served, feature_key
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
 from marey.text.pipeline import TextPipeline
 from marey.text.rewriters import NotRewritten
-from tests.support.language_model import Asked, CompletionReply, LanguageModel
+from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 
 PROMPT = "plz make him stroll to the left"
 CAPTION = "A person strolls to the left."
@@ -158,7 +158,7 @@ def test_an_endpoint_that_fails_again_and_again_is_left_alone(
 def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageModel) -> None:
     prompts = [f"walk {number} steps" for number in range(3 * AT_ONCE)]
 
-    def answer(asked: Asked, before: int) -> CompletionReply:
+    def answer(asked: ChatRequest, before: int) -> CompletionReply:
         return CompletionReply(f"A person goes {asked.prompt}.", status=404 if asked.prompt == prompts[5] else 200)
 
     model.answer = answer

@@ -48,7 +48,7 @@ class Expectation:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CheckVerdict:
     """Verdict on a motion, with the reason of a failure."""
 
     passed: bool
@@ -201,7 +201,7 @@ _CHECKS: dict[str, Callable[[Stretch, Expectation], str]] = {
 # -- motions -------------------------------------------------------------------------------------------------------
 
 
-def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict:
+def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> CheckVerdict:
     """Judge a motion against its expected actions, in that order.
 
     Args:
@@ -212,9 +212,9 @@ def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict
     motion = Stretch(joints, fps)
     if len(expected) == 1:
         reason = _CHECKS[expected[0].act](motion, expected[0])
-        return Verdict(not reason, reason)
+        return CheckVerdict(not reason, reason)
     reason = _in_order(motion, list(expected))
-    return Verdict(not reason, reason)
+    return CheckVerdict(not reason, reason)
 
 
 def _in_order(motion: Stretch, expected: list[Expectation]) -> str:

@@ -17,7 +17,7 @@ from marey.checks.judge import Expectation
 
 
 @dataclass(frozen=True)
-class EvaluationPrompt:
+class HeldOutPrompt:
     """A held-out prompt.
 
     Attributes:
@@ -48,12 +48,12 @@ _FILES = {
 
 
 @lru_cache(maxsize=4)
-def evaluation_prompts(which: PromptSet = "evaluation") -> tuple[EvaluationPrompt, ...]:
+def evaluation_prompts(which: PromptSet = "evaluation") -> tuple[HeldOutPrompt, ...]:
     """One of the sets, in the order of its file."""
     name = f"{_FILES[which]}.toml"
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
     return tuple(
-        EvaluationPrompt(
+        HeldOutPrompt(
             text, group["name"], tuple(Expectation(**row) for row in group["expect"]), group.get("separate", False)
         )
         for group in table["group"]

@@ -1,4 +1,4 @@
-"""Assemble an evaluator bundle from the trained part of a run."""
+"""Assembly of an evaluator bundle from the trained part of a run."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from marey.evaluator.reference import SPLITS, RealClips, ReferenceClip, Referenc
 from marey.evaluator.sentences import open_encoder, spec_of
 from marey.evaluator.tmr import embed_motions
 from marey.training.assembly import gather
-from marey.training.staging import Recipe
+from marey.training.staging import TrainingRecipe
 
-RECIPE = Recipe(
+RECIPE = TrainingRecipe(
     read=EvaluatorConfig.from_dict,
     built_from={"tmr": ("layout", "features", "inputs", "frames_per_token", "max_frames", "text_width", "network")},
     shares={"tmr": 1.0},
@@ -39,7 +39,7 @@ def assemble(
 ) -> Bundle:
     """Write the bundle from the part of a run, with a reference of the data's validation and test clips.
 
-    Without `card` one is written from the metrics.
+    Without `card` the card is generated from the metrics.
 
     Raises:
         NotFound: the stage has not finished, or the text encoder's weights are not on this machine.
@@ -67,22 +67,22 @@ def assemble(
 
 
 def renew_reference(bundle: Bundle, prepared: Path, output: Path, *, overwrite: bool = False) -> Bundle:
-    """Write a bundle's networks again with the reference of these data: your own test clips, or new measurements of the
-    old ones. The result is another exact bundle, and its numbers compare with its own alone.
+    """Write a bundle's networks again with a reference from these data: your own test clips, or new measurements. The
+    result is another exact bundle, and its numbers compare with its own alone.
 
-    The card is written anew; metrics stay those of the training.
+    The card is generated again; metrics stay those of the training.
 
     Raises:
-        InvalidBundle: not this kind of evaluator, or damaged.
+        InvalidBundle: another kind of evaluator, or damaged.
         InvalidInput: data of another layout.
-        NotFound, InvalidFile: there are no such data, or they are damaged.
+        NotFound, InvalidFile: the data do not exist or are damaged.
     """
     config, motion, text = load_networks(bundle)
     data = PreparedData.open(prepared)
     if (data.manifest.layout, data.manifest.fps) != (config.layout, config.fps):
         raise InvalidInput(f"holds {data.manifest.layout}, this evaluator reads {config.layout}", where=str(prepared))
     known = bundle.manifest
-    assert known.text is not None  # `write_bundle` puts it in
+    assert known.text is not None  # `write_bundle` sets it
     reference = reference_of(data, motion, config)
     manifest = {"licence": known.licence, "data": known.data, "metrics": known.metrics, "training": known.training}
     return write_bundle(
@@ -99,14 +99,14 @@ def renew_reference(bundle: Bundle, prepared: Path, output: Path, *, overwrite: 
 
 
 def _as_stored(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Weights rounded as a bundle rounds them: the reference is embedded by what will be loaded."""
+    """Round weights as a bundle rounds them: the reference is embedded by the weights that will be loaded."""
     return {
         name: value if name in ("motion.mean", "motion.std") else value.half().float() for name, value in state.items()
     }
 
 
 def reference_of(data: PreparedData, motion: MotionEncoder, config: EvaluatorConfig) -> RealClips:
-    """The reference that a bundle with these networks stores for the captioned clips of prepared data.
+    """Compute the reference that a bundle with these networks stores for the captioned clips of prepared data.
 
     Joints are decoded from the features, as those of generated motions are.
     """

@@ -47,9 +47,9 @@ def write_bundle(
 
     Args:
         path: the bundle's folder; its last name is the bundle's.
-        config: what the networks are built from.
+        config: configuration of the networks.
         parts: state dicts of `motion` and `text`.
-        statistics: mean and std (D,) that motions are normalised with.
+        statistics: mean and std (D,) that normalise motions.
         reference: captions and embeddings of real clips.
         text: the encoder, with its hash.
         card: the model card.

@@ -11,11 +11,12 @@ from marey.evaluator.reference import RealClips
 
 TEXT = """# {name}: motions and captions in one space, to evaluate text-to-motion models
 
-TMR (Petrovich et al. 2023) as sized in the appendix B.2 of SnapMoGen (2025), Marey's `{config}`: a motion encoder and
-a text encoder of {layers} layers, {width} wide, {heads} heads, feed-forward {feedforward}. Mean vectors are the
-embeddings, their cosine is the score. The decoder that training needed is not in here. It reads {layout} at {fps:g}
-fps, {least} to {most} frames, the first {inputs} numbers of a frame, normalised with this bundle's own statistics,
-{frames} frames a token; sentences as token states of `{encoder}` ({width_text} wide, sha256 {sha256}).
+TMR (Petrovich et al. 2023) as sized in the appendix B.2 of SnapMoGen (2025), Marey's `{config}`: a
+motion encoder and a text encoder of {layers} layers, width {width}, {heads} heads, feed-forward {feedforward}. Mean
+vectors are the embeddings, their cosine is the score. The bundle does not contain the decoder that
+training needed. It reads {layout} at {fps:g} fps, {least} to {most} frames, the first {inputs} numbers of a
+frame, normalised with this bundle's own statistics, {frames} frames a token; sentences as token states
+of `{encoder}` (width {width_text}, sha256 {sha256}).
 
 ## Terms
 
@@ -23,46 +24,47 @@ fps, {least} to {most} frames, the first {inputs} numbers of a frame, normalised
 
 {sources}
 
-The captions in `reference.json` are free (MIT): sentences of Marey's own grammar, and for CMU's trials sentences made
-of their short public descriptions.
+The captions in `reference.json` are free (MIT): sentences of Marey's own grammar, and for CMU's
+trials sentences made of their short public descriptions.
 
-## How well it retrieves
+## Retrieval
 
 {metrics}
 
-`r1` to `r3`: R-precision in pools of 32 test clips, text to motion, where a motion of the text's own label is a hit;
-`distinct`: in pools where no label occurs twice. Median ranks are among all test clips, where only the pair is a hit,
-text to motion and back. Captions and pools are drawn 20 times. A label is actions, sides and style
-(`workers/marey/evaluator/labels.py`).
+`r1` to `r3`: R-precision in pools of 32 test clips, text to motion, where a motion of the text's own
+label is a hit; `distinct`: in pools where no label occurs twice. Median ranks are among all test
+clips, where only the pair is a hit, text to motion and back. Captions and pools are drawn 20 times.
+A label is actions, sides and style (`workers/marey/evaluator/labels.py`).
 
-## The reference
+## Reference
 
 {reference}
 
-Each with captions, label, length, the embedding of its motion, and what its joints say: whether the checker of prompts
-sees what the captions ask for, foot skate, jerk, bone drift, floor penetration. So a server without the data can
-evaluate. Neither joints nor features of captured motion are in here.
+Each clip has captions, label, length, the embedding of its motion, the verdict of the prompt
+checker, foot skate, jerk, bone drift and floor penetration. A server without the data can therefore
+evaluate. The bundle holds no joints and no features of captured motion.
 
 ## Limits
 
-- Captions are of one grammar, on few actions, in English. It cannot judge actions that the data do not show.
-- About one caption in seven of single actions leaves the style out; a motion of another style then counts as a wrong
-  answer.
-- Its numbers are comparable with numbers of this very bundle alone, never with those of papers.
+- Captions are of one grammar, on few actions, in English. It cannot judge actions that the data do
+  not show.
+- About one caption in seven of clips with one action leaves the style out; a motion of another
+  style then counts as a wrong answer.
+- Its numbers are comparable with numbers of exactly this bundle, never with those of papers.
 """
 
 
 def card_of(
     name: str, config: EvaluatorConfig, text: TextSpec, manifest: Mapping[str, Any], reference: RealClips
 ) -> str:
-    """The card.
+    """Generate the card.
 
     Args:
-        name: of the bundle.
-        config: what the networks are built from.
+        name: name of the bundle.
+        config: configuration of the networks.
         text: the encoder, with its hash.
         manifest: licence, data and metrics, as the bundle's manifest has them.
-        reference: what the bundle knows of real clips.
+        reference: the bundle's real clips.
     """
     network = config.network
     test = {key.rpartition("/")[2]: value for key, value in manifest["metrics"].items() if "/test/" in key}

@@ -1,6 +1,6 @@
 """Compare two evaluations of the same prompts: changes and alarms.
 
-Alarms go by prompt checks and R-precision (`marey.measures.comparing`); a distance of distributions raises none.
+Alarms depend on prompt checks and R-precision (`marey.measures.comparing`), never on a distance of distributions.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from marey.measures.comparing import compare
 
 @dataclass(frozen=True)
 class Earlier:
-    """A run to compare with."""
+    """An earlier run to compare with."""
 
     baseline: Baseline
     scores: Sequence[MotionScore]
 
 
 def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tuple[Change, ...]:
-    """Changes of all metrics that can be paired.
+    """Return the changes of all metrics that can be paired.
 
     Raises:
         InvalidInput: the runs have no motions in common.
@@ -43,5 +43,5 @@ def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tu
 
 
 def alarms(found: Sequence[Change], metrics: Mapping[str, Metric]) -> tuple[str, ...]:
-    """One sentence for each regression."""
+    """Return one sentence for each regression."""
     return tuple(sentence_of(change, metrics[change.metric]) for change in found if change.verdict == "worse")

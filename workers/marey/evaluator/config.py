@@ -24,44 +24,44 @@ class NetworkConfig:
 
 @dataclass(frozen=True)
 class LossConfig:
-    """Weights beside the reconstruction's 1 (SnapMoGen App. B.2)."""
+    """Weights of the losses beside the reconstruction's 1 (SnapMoGen App. B.2)."""
 
     divergence: float = 1e-5  # λ_KL
     latent: float = 1e-5  # λ_E
     contrast: float = 0.1  # λ_NCE
-    temperature: float = 0.1  # of InfoNCE: TMR's, the appendix gives none
+    temperature: float = 0.1  # of InfoNCE: TMR's, the appendix does not give one
 
 
 @dataclass(frozen=True)
 class EvaluatorConfig(ModelConfig):
-    """Everything that decides the shapes of one bundle."""
+    """Configuration of one bundle."""
 
     name: str = "paper"
     layout: str = "humanml3d-263"
     features: int = 263  # D
     fps: float = 20.0
     inputs: int = 67
-    """I, the first numbers of a frame that are read: root and joint positions. The 6-D block behind them is no local
-    rotation on this layout, and velocities follow from positions."""
+    """I, the first numbers of a frame that the network reads: root and joint positions. The 6-D block behind them is
+    not a local rotation in this layout, and velocities follow from positions."""
     min_frames: int = 16
     max_frames: int = 196
     frames_per_token: int = 1
-    """Frames that stand side by side in one token of the motion encoder (ours; 1 is the paper's). Nothing is thrown
-    away, and the transformers, which are nearly all the work, read that many times fewer tokens."""
+    """Frames that are concatenated to one token of the motion encoder (ours; 1 is the paper's). No number is dropped,
+    and the transformers, which are nearly all of the work, read that many times fewer tokens."""
     text_width: int = 768  # W, of T5-base in the paper
     network: NetworkConfig = NetworkConfig()
     loss: LossConfig = LossConfig()
     train_tmr: StageConfig = StageConfig(batch=64, learning_rate=1e-4)  # the batch is App. B.2's, the rate TMR's
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts the layout."""
+        """Refuse values that contradict the layout."""
         known = layout(self.layout)
         if (known.dim, known.fps) != (self.features, self.fps) or not 0 < self.inputs <= self.features:
             raise InvalidInput(f"does not fit {self.layout}: {known.dim} numbers at {known.fps:g} fps", where="layout")
 
     @property
     def width(self) -> int:
-        """E, numbers of an embedding."""
+        """Return E, the width of an embedding."""
         return self.network.width
 
 
@@ -71,7 +71,7 @@ STARTER = EvaluatorConfig(
     name="starter",
     frames_per_token=4,
     text_width=384,
-    # 128 wide: with five times as many test clips (928 of 640) the covariance that FID needs is not of too few samples
+    # 128 wide: with five times as many test clips (928 of 640) the covariance in FID has enough samples
     network=NetworkConfig(layers=4, width=128, feedforward=512),
     train_tmr=StageConfig(batch=64, learning_rate=5e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
 )
@@ -88,9 +88,9 @@ CONFIGS: dict[str, EvaluatorConfig] = {c.name: c for c in (PAPER, STARTER, TINY)
 
 
 def named_config(name: str) -> EvaluatorConfig:
-    """A configuration by name.
+    """Return a configuration by name.
 
     Raises:
-        InvalidInput: no such configuration.
+        InvalidInput: the name is unknown.
     """
     return named(CONFIGS, name)

@@ -28,7 +28,7 @@ class _Loaded:
 
 
 class EvaluatorHandler:
-    """Measures with one loaded evaluator."""
+    """Measure evaluations with one loaded evaluator."""
 
     queue = EVALUATOR_QUEUE
     batch_size = 1
@@ -43,13 +43,13 @@ class EvaluatorHandler:
 
         Raises:
             NotFound, InvalidBundle, Refused: see `find_bundle`.
-            InvalidInput: there is no such device.
+            InvalidInput: unknown device.
         """
         found = find_bundle(bundle)
         self._loaded = _Loaded(found, load_evaluator(found, device=self._device), RealClips.of(found))
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
-        """One item at a time."""
+        """Return one bucket per item."""
         return [[item] for item in batch.items]
 
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
@@ -57,7 +57,7 @@ class EvaluatorHandler:
         assert self._loaded is not None  # the loop loads before it runs
         item, source = batch.items[0], batch.scoring
         if source is None:
-            yield Failed(item.id, NotFound("this item scores no evaluation", where=f"item {item.id}"))
+            yield Failed(item.id, NotFound("no evaluation is scored by this item", where=f"item {item.id}"))
             return
         try:
             yield _scored(item, source, self._loaded, control)

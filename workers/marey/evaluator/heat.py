@@ -10,8 +10,8 @@ from marey.items.expected import JOIN
 
 
 def heat_of(rows: Iterable[tuple[str | None, str, bool | None]]) -> tuple[HeatCell, ...]:
-    """Heat map cells of motions, each with its expected actions, style and verdict; motions without a check are
-    skipped. Sequences are grouped by their number of actions."""
+    """Return the heat map's cells of motions, each with its expected actions, style and verdict; motions without a
+    check are skipped. Sequences are grouped by their number of actions."""
     cells: dict[tuple[str, str], list[bool]] = defaultdict(list)
     for expected, style, obeyed in rows:
         if expected is not None and obeyed is not None:
@@ -21,5 +21,5 @@ def heat_of(rows: Iterable[tuple[str | None, str, bool | None]]) -> tuple[HeatCe
 
 
 def style_of(label: str) -> str:
-    """The style in a real clip's label."""
+    """Return the style in a real clip's label."""
     return label.rpartition(", ")[2]

@@ -1,11 +1,12 @@
 """Labels of clips: clips with equal labels are correct answers to each other's captions.
 
-A label holds what captions distinguish: the actions in order, the measured side of each, and the style by the name that
-the captions use. It is not the archive's content label: that names the data set ("1/walk", "2/walk"), one action twice
-("bye", "wave-right-hand"), and a side that the motion may contradict, none of which a caption says. Numbers that some
-captions give (steps, metres, degrees) make no label, nor do the styles of later actions, which the clips do not carry:
-there labels are coarser than the finest captions, so that no true answer counts as a wrong one. They are finer than
-the captions that leave the style out, one in seven of those of one action, a third of the sequences': an answer in
+A label holds the properties that captions distinguish: the actions in order, the measured side of each, and the style
+by the captions' name for it. It is not the archive's content label, which captions do not reflect: that names the data
+set ("1/walk", "2/walk"), lists one action twice ("bye", "wave-right-hand"), and has a side that the motion may
+contradict. Numbers in some captions (steps, metres, degrees) are not part of a label, nor are styles of later actions,
+which the clips do not carry: there labels are coarser than the finest captions, so that no correct answer counts as
+wrong. They are finer than captions without a style, one in seven of those of one action and a third of the sequences':
+there an answer in another style counts as wrong.
 another style counts as wrong there.
 """
 
@@ -24,7 +25,7 @@ FREE_TEXT = "cmu"
 
 
 def label_of(clip: Clip) -> str:
-    """`raise left, active`; `bow + turn right, normal` for a sequence."""
+    """Return a clip's label: `raise left, active`; `bow + turn right, normal` for a sequence."""
     if clip.acts == (FREE_TEXT,):
         return f"{clip.dataset}: {clip.content}"
     sides = clip.sides or ("",) * len(clip.acts)
@@ -33,6 +34,6 @@ def label_of(clip: Clip) -> str:
 
 
 def label_ids(labels: Sequence[str]) -> NDArray[np.int64]:
-    """(N,) one number a different label."""
+    """Return numbers (N,), equal for equal labels."""
     numbers = {label: number for number, label in enumerate(sorted(set(labels)))}
     return np.array([numbers[label] for label in labels], np.int64)

@@ -15,12 +15,12 @@ def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path
     Args:
         bundle: a verified bundle, or its name or path.
         device: `auto`, `cpu`, `cuda`, `cuda:N`.
-        captions: HumanML3D's folder of caption files; only the public T2M evaluator, which reads words with
-            part-of-speech tags, needs it, and only for text.
+        captions: HumanML3D's folder of caption files; needed for text by the public T2M evaluator alone, which reads
+            words with part-of-speech tags.
 
     Raises:
         NotFound, InvalidBundle, Refused: see `find_bundle` and the evaluators' `load`.
-        InvalidInput: no such device.
+        InvalidInput: unknown device.
     """
     verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
     manifest = verified.manifest
@@ -35,5 +35,5 @@ def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path
         tagger = None if captions is None else TaggedCaptions.read(captions)
         return T2MEvaluator.load(verified, device=device, tagger=tagger)
     raise InvalidBundle(
-        f"is a {manifest.kind} of {manifest.model}, not an evaluator this version reads", where=str(verified.path)
+        f"is a {manifest.kind} of {manifest.model}, not an evaluator that this version reads", where=str(verified.path)
     )

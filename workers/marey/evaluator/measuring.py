@@ -1,7 +1,7 @@
 """Measure each motion of an evaluation: the checker's verdict, quality, and embedding.
 
-There are two rows. `raw` are the features as the network generated them; `exported` are features encoded
-again from the joints of the npz, after rotations were solved and feet locked: what users get.
+There are two rows. `raw` are the features as the network generated them; `exported` are features encoded again from the
+joints of the npz, after rotations were solved and feet locked: the files that users get.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.judge import Act, Expectation, Side, Verdict, judge
+from marey.checks.judge import Act, CheckVerdict, Expectation, Side, judge
 from marey.checks.quality import Quality, quality
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.evaluations import MAX_MISSING, MadeItem
@@ -31,19 +31,19 @@ TOGETHER = 64
 
 @dataclass(frozen=True)
 class Checked:
-    """Measurements on the joints of a motion; `verdict` is None if nothing is expected of it."""
+    """Measurements on the joints of a motion; `verdict` is None if no action is expected."""
 
-    verdict: Verdict | None
+    verdict: CheckVerdict | None
     quality: Quality
 
     @property
     def obeyed(self) -> bool | None:
-        """Return True if the motion does what is expected; None if nothing is expected."""
+        """Return True if the motion passed its check; None if no action is expected."""
         return None if self.verdict is None else self.verdict.passed
 
 
 @dataclass(frozen=True)
-class Motion:
+class EvaluatedMotion:
     """One motion and its measurements, as generated and as exported."""
 
     item: MadeItem
@@ -53,17 +53,17 @@ class Motion:
 
 @dataclass(frozen=True)
 class Broken:
-    """A generated motion that cannot be measured."""
+    """A generated motion without a measurement."""
 
     item: MadeItem
     reason: str
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class EvaluatedMotions:
     """All motions of an evaluation, in input order, repeats within prompt."""
 
-    motions: tuple[Motion, ...]
+    motions: tuple[EvaluatedMotion, ...]
     raw: Embeddings  # (N, E)
     exported: Embeddings  # (N, E)
     text: Embeddings  # (N, E) of each motion's prompt
@@ -71,12 +71,12 @@ class Measured:
 
     @property
     def indices(self) -> NDArray[np.int64]:
-        """(N,) prompt of each motion."""
+        """Return the prompt (N,) of each motion."""
         return np.array([motion.item.index for motion in self.motions], np.int64)
 
     @property
     def variants(self) -> NDArray[np.int64]:
-        """(N,) repeat of each motion."""
+        """Return the repeat (N,) of each motion."""
         return np.array([motion.item.variant for motion in self.motions], np.int64)
 
 
@@ -86,14 +86,14 @@ def measure(
     evaluator: Evaluator,
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Measured:
-    """Measure every motion that was made.
+) -> EvaluatedMotions:
+    """Measure every generated motion.
 
     Args:
-        items: of the generation; those without a motion are passed over.
-        read: the npz of an item.
+        items: items of the generation; those without a motion are skipped.
+        read: returns the npz of an item.
         evaluator: embeds motions and prompts.
-        progress: called with (motions done, motions in all).
+        progress: called with (motions done, number of motions).
 
     Raises:
         InvalidInput: the motions are of another feature layout or frame rate than the evaluator reads.
@@ -101,7 +101,7 @@ def measure(
     """
     made = [item for item in items if item.npz is not None]
     space = layout(evaluator.layout)
-    found: list[Motion] = []
+    found: list[EvaluatedMotion] = []
     broken: list[Broken] = []
     raw, exported = [np.zeros((0, evaluator.width), np.float32)], [np.zeros((0, evaluator.width), np.float32)]
     done = 0
@@ -115,7 +115,7 @@ def measure(
             clips.append(clip)
             raw_joints = space.decode(clip.features)
             found.append(
-                Motion(
+                EvaluatedMotion(
                     item,
                     raw=check(raw_joints, space.fps, item.expected),
                     exported=check(clip.joints, clip.fps, item.expected),
@@ -125,7 +125,7 @@ def measure(
         exported.append(evaluator.embed_motion([encoded(space, clip) for clip in clips]))
         done += len(some)
         progress(done, len(made))
-    return Measured(
+    return EvaluatedMotions(
         tuple(found),
         np.concatenate(raw),
         np.concatenate(exported),
@@ -134,12 +134,12 @@ def measure(
     )
 
 
-def check_measured(measured: Measured, asked: int) -> None:
+def check_measured(measured: EvaluatedMotions, asked: int) -> None:
     """Refuse a report if too many motions are missing: its numbers would describe another set.
 
     Args:
-        measured: what could be measured, and what was made but could not.
-        asked: motions that were asked for.
+        measured: measured motions, and generated ones that could not be measured.
+        asked: number of requested motions.
 
     Raises:
         InvalidFile: some are lost, damaged, or hold NaN, and with those more than `MAX_MISSING` are missing.
@@ -147,8 +147,8 @@ def check_measured(measured: Measured, asked: int) -> None:
     broken, missing = measured.broken, asked - len(measured.motions)
     if broken and missing > MAX_MISSING * asked:
         raise InvalidFile(
-            f"{missing} of {asked} motions cannot be measured, {missing / asked:.1%} where {MAX_MISSING:.0%} may be; "
-            f"the first of {len(broken)} that are broken: {broken[0].reason}",
+            f"{missing} of {asked} motions cannot be measured, {missing / asked:.1%} the limit is {MAX_MISSING:.0%}; "
+            f"the first of {len(broken)} broken ones: {broken[0].reason}",
             where=f"prompt {broken[0].item.index}, repeat {broken[0].item.variant}",
             hint="Check the store and the generator's bundle, then evaluate again.",
         )
@@ -158,16 +158,16 @@ def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Che
     """Measure a motion (T, 22, 3) in metres and judge it by the expectation (`marey.items.expected`)."""
     verdict = None
     if expected is not None:
-        acts = read_expected(expected)
-        wanted = [Expectation(cast("Act", each.act), cast("Side", each.side), each.straight) for each in acts]
+        actions = read_expected(expected)
+        wanted = [Expectation(cast("Act", each.action), cast("Side", each.side), each.straight) for each in actions]
         verdict = judge(joints, fps, wanted)
     return Checked(verdict, quality(joints, fps))
 
 
 def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
-    """Features (T, D) of a clip at the layout's rate.
+    """Encode a clip as features (T, D) at the layout's rate.
 
-    An encoder needs the step behind the last frame: it goes on as the step before did.
+    An encoder needs the step after the last frame: the previous step is repeated.
     """
     joints = np.asarray(clip.joints, np.float64)
     return space.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
@@ -176,7 +176,7 @@ def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
 def _read(
     item: MadeItem, read: Callable[[MadeItem], bytes], evaluator: Evaluator, space: FeatureLayout
 ) -> MotionClip | Broken:
-    """The clip of an item, at the evaluator's rate; `Broken` where it is lost, damaged or holds NaN."""
+    """Return the clip of an item, at the evaluator's rate; `Broken` if it is lost, damaged or holds NaN."""
     try:
         clip = parse_npz(read(item), where=f"prompt {item.index}, repeat {item.variant}")
     except (InvalidFile, NotFound) as error:
@@ -186,13 +186,13 @@ def _read(
             f"the motions have {clip.features.shape[1]} features at {clip.features_fps:g} fps; "
             f"{evaluator.name} reads {space.dim} at {space.fps:g} fps ({space.name})",
             where=f"prompt {item.index}, repeat {item.variant}",
-            hint="Take an evaluator of the generator's feature layout.",
+            hint="Choose an evaluator of the generator's feature layout.",
         )
     return clip if clip.fps == space.fps else resample(clip, space.fps)
 
 
 def embed_prompts(prompts: Sequence[str], evaluator: Evaluator, progress: ProgressCallback = no_progress) -> Embeddings:
-    """Embeddings (N, E) of prompts; equal prompts are embedded once."""
+    """Return embeddings (N, E) of prompts; equal prompts are embedded once."""
     distinct = list(dict.fromkeys(prompts))
     rows = {prompt: row for row, prompt in enumerate(distinct)}
     found = [np.zeros((0, evaluator.width), np.float32)]

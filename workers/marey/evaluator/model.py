@@ -4,12 +4,11 @@
     text   ── SentenceEncoder ── Gaussian over latents ──┴── MotionDecoder ── the motion, from either (training alone)
 
 Both encoders are ACTOR's (Petrovich et al. 2021): a transformer over two learned tokens and the sequence, whose first
-two outputs are mean and log-variance. The appendix appends the two tokens, TMR puts them in front; attention does not
-care. Mean vectors are the embeddings. Weights start as torch's layers do, as TMR's: at the 0.02 of the generators the
-learned tokens attend so little to the sequence that all embeddings begin alike.
+two outputs are mean and log-variance. The appendix appends the two tokens, TMR prepends them; attention does not depend
+on the order. Mean vectors are the embeddings. Weights are initialised as torch's layers, as in TMR: with the
+generators' 0.02 the learned tokens attend so little to the sequence that all embeddings start nearly equal.
 
-Shapes: B batch, T frames, n motion tokens, S text tokens, D features, I those that are read, W text width, E latent
-width.
+Shapes: B batch, T frames, n motion tokens, S text tokens, D features, I read features, W text width, E latent width.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from marey.nn.packed import pack_linears
 from marey.nn.transformer import Transformer, sinusoidal_positions
 
 DISTRIBUTION = 2
-"""Learned tokens in front of a sequence: mean and log-variance."""
+"""Learned tokens before a sequence: mean and log-variance."""
 MAX_TEXT_TOKENS = 512
 """T5's limit, the longest of the text encoders'."""
 
@@ -38,12 +37,12 @@ class Gaussian:
     log_variance: Tensor
 
     def sample(self) -> Tensor:
-        """One latent (B, E) each, differentiable."""
+        """Draw one latent (B, E) each, differentiable."""
         return self.mean + torch.randn_like(self.mean) * (0.5 * self.log_variance).exp()
 
 
 class DistributionEncoder(nn.Module):
-    """A sequence of vectors to one Gaussian."""
+    """Encoder of a sequence of vectors as one Gaussian."""
 
     positions: Tensor
 
@@ -56,12 +55,12 @@ class DistributionEncoder(nn.Module):
         self.register_buffer("positions", positions, persistent=False)
 
     def forward(self, x: Tensor, valid: Tensor) -> Gaussian:
-        """(B, S, inputs) and (B, S) bool, the true ones first and at least one, to Gaussians."""
+        """Encode (B, S, inputs), with a mask (B, S) bool of at least one leading True, as Gaussians."""
         mean, log_variance = self._outputs(x, valid, DISTRIBUTION).unbind(1)
         return Gaussian(mean, log_variance)
 
     def mean(self, x: Tensor, valid: Tensor) -> Tensor:
-        """The means (B, E) alone."""
+        """Return the means (B, E) alone."""
         return self._outputs(x, valid, 1)[:, 0]
 
     def pack(self) -> None:
@@ -77,7 +76,7 @@ class DistributionEncoder(nn.Module):
 
 
 class MotionEncoder(nn.Module):
-    """Raw features to a Gaussian; it carries the statistics that it normalises with."""
+    """Encoder of raw features as a Gaussian; it holds the statistics that normalise them."""
 
     mean: Tensor  # (D,) of the evaluator's own training data, never a generator's
     std: Tensor  # (D,)
@@ -92,20 +91,20 @@ class MotionEncoder(nn.Module):
         self.encoder = DistributionEncoder(self.inputs * self.frames, longest, config.network)
 
     def forward(self, features: Tensor, lengths: Tensor) -> Gaussian:
-        """(B, T, D or at least I) raw features and (B,) frames; what lies beyond a motion's own frames is not read."""
+        """Encode raw features (B, T, D or at least I) with frames (B,); frames beyond a motion's end are not read."""
         return self.encoder(*self._tokens(features, lengths))
 
     def embed(self, features: Tensor, lengths: Tensor) -> Tensor:
-        """Mean vectors (B, E) of `forward`'s input."""
+        """Return mean vectors (B, E) of `forward`'s input."""
         return self.encoder.mean(*self._tokens(features, lengths))
 
     def normalize(self, features: Tensor) -> Tensor:
-        """(…, D or at least I) raw features to (…, I): zero mean, unit deviation of each group."""
+        """Normalise raw features (…, D or at least I) to (…, I): zero mean, unit deviation of each group."""
         kept = slice(self.inputs)
         return (features[..., kept] - self.mean[kept]) / self.std[kept]
 
     def _tokens(self, features: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, n, frames · I) and (B, n) bool; in a motion's last token, missing frames are the mean pose."""
+        """Return (B, n, frames · I) and (B, n) bool; in a motion's last token, missing frames are the mean pose."""
         batch, size = features.shape[:2]
         tokens = -(-size // self.frames)
         x = features.new_zeros(batch, tokens * self.frames, self.inputs)
@@ -114,7 +113,7 @@ class MotionEncoder(nn.Module):
 
 
 class SentenceEncoder(nn.Module):
-    """Token states of a text encoder to a Gaussian."""
+    """Encoder of a text encoder's token states as a Gaussian."""
 
     text_mean: Tensor  # (W,) of the training captions; standardising them is ours, as in the generators
     text_std: Tensor  # (W,)
@@ -126,11 +125,11 @@ class SentenceEncoder(nn.Module):
         self.encoder = DistributionEncoder(config.text_width, MAX_TEXT_TOKENS, config.network)
 
     def forward(self, states: Tensor, lengths: Tensor) -> Gaussian:
-        """(B, S, W) token states and (B,) how many of them exist."""
+        """Encode token states (B, S, W) of which (B,) exist."""
         return self.encoder(*self._tokens(states, lengths))
 
     def embed(self, states: Tensor, lengths: Tensor) -> Tensor:
-        """Mean vectors (B, E) of `forward`'s input."""
+        """Return mean vectors (B, E) of `forward`'s input."""
         return self.encoder.mean(*self._tokens(states, lengths))
 
     def _tokens(self, states: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
@@ -140,7 +139,7 @@ class SentenceEncoder(nn.Module):
 
 
 class MotionDecoder(nn.Module):
-    """A latent to the motion it stands for, all frames at once (ACTOR, TMR).
+    """Decoder from a latent to its motion, all frames at once (ACTOR, TMR).
 
     TMR's decoder attends from positions to the latent. Attention to a single vector is the same linear map of it at
     every position, so that is added once, and self-attention follows (ours).
@@ -161,7 +160,7 @@ class MotionDecoder(nn.Module):
         self.register_buffer("positions", sinusoidal_positions(longest, network.width), persistent=False)
 
     def forward(self, latents: Tensor, lengths: Tensor) -> Tensor:
-        """(B, E) and (B,) frames to normalised features (B, n · frames, I); meaningless beyond a motion's own
+        """Decode (B, E) with frames (B,) to normalised features (B, n · frames, I); undefined beyond a motion's own
         frames."""
         tokens = -(-lengths // self.frames)
         size = int(tokens.max())
@@ -171,7 +170,7 @@ class MotionDecoder(nn.Module):
 
 
 class TMR(nn.Module):
-    """Everything that is trained; a bundle ships the two encoders."""
+    """All trained networks; a bundle holds the two encoders."""
 
     def __init__(self, config: EvaluatorConfig) -> None:
         super().__init__()

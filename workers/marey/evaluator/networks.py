@@ -16,7 +16,7 @@ KIND = "evaluator"
 
 
 class Readable(Protocol):
-    """A configuration that says what motions its networks read, and how wide embeddings are."""
+    """A configuration with the layout of motions and the width of embeddings."""
 
     @property
     def layout(self) -> str: ...
@@ -31,7 +31,7 @@ M = TypeVar("M", bound=nn.Module)
 T = TypeVar("T", bound=nn.Module)
 
 
-class Loaded(Generic[C, M, T]):
+class LoadedNetworks(Generic[C, M, T]):
     """The parts of `Evaluator` that a bundle determines, with its two encoders on their device."""
 
     def __init__(self, bundle: Bundle, config: C, motion: M, text: T, device: torch.device) -> None:
@@ -71,8 +71,8 @@ def open_networks(
 
     Args:
         bundle: a verified bundle.
-        model: that it must be of.
-        read: its configuration.
+        model: required model of the bundle.
+        read: parses its configuration.
         motion: builds the motion encoder, whose `mean` and `std` are the bundle's statistics.
         text: builds the text encoder.
 

@@ -1,9 +1,9 @@
-"""Port of evaluators: motions and sentences embedded in one space where matches are near.
+"""Interface of evaluators: motions and sentences embedded in one space where matches are near.
 
-There are two adapters: `marey.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `marey.evaluator.t2m` (the
-public network of Guo et al. 2022). Both take what people have, strings and raw features: which text encoder or word
-vectors read the strings, and which mean and deviation normalise the features, is part of the evaluator. The statistics
-of the model that generated the motion are never the right ones.
+There are two implementations: `marey.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `marey.evaluator.t2m` (the
+public network of Guo et al. 2022). Both take strings and raw features: the text encoder or word vectors that read the
+strings, and the mean and deviation that normalise the features, are part of the evaluator. The statistics of the model
+that generated the motion are never the right ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Embeddings = NDArray[np.float32]
 
 
 class Evaluator(Protocol):
-    """A loaded evaluator. Numbers of different ones are different quantities: a number names its evaluator."""
+    """A loaded evaluator. Numbers of different evaluators are different quantities: a number names its evaluator."""
 
     @property
     def name(self) -> str:
@@ -44,16 +44,16 @@ class Evaluator(Protocol):
 
     @property
     def width(self) -> int:
-        """E, numbers of an embedding."""
+        """E, the width of an embedding."""
         ...
 
     @property
     def distance(self) -> Distance:
-        """The distance of its space; retrieval by another one is not this evaluator's."""
+        """The distance of its space; retrieval uses no other."""
         ...
 
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
-        """Embeddings of motions, row by row in the order given, none depending on the motions beside it.
+        """Embed motions, row by row in the order given, independent of each other.
 
         Args:
             motions: each (T, D), raw features of `layout` in its own units (metres), as generated or captured, NOT
@@ -68,10 +68,10 @@ class Evaluator(Protocol):
         ...
 
     def embed_text(self, sentences: Sequence[str]) -> Embeddings:
-        """Embeddings of sentences, row by row in the order given, none depending on the sentences beside it.
+        """Embed sentences, row by row in the order given, independent of each other.
 
         Args:
-            sentences: as a person types them.
+            sentences: prompts as users write them.
 
         Returns:
             (N, E).
@@ -87,7 +87,7 @@ def no_progress() -> None:
 
 
 def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest: int) -> None:
-    """Refuse motions that an embedding would say nothing about.
+    """Validate motions before they are embedded.
 
     Raises:
         InvalidInput: not (T, `width`), T outside `shortest` to `longest`, or numbers that are not finite.
@@ -98,14 +98,14 @@ def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest:
             raise InvalidInput(f"features have shape {motion.shape}, not (T, {width})", where=where)
         if not shortest <= len(motion) <= longest:
             raise InvalidInput(
-                f"has {len(motion)} frames; this evaluator knows {shortest} to {longest}",
+                f"has {len(motion)} frames; this evaluator reads {shortest} to {longest}",
                 where=where,
-                hint="Judge a longer motion by windows of itself.",
+                hint="Evaluate a longer motion in windows.",
             )
         broken = np.flatnonzero(~np.isfinite(motion).all(1))
         if broken.size:
             raise InvalidInput(
                 f"{broken.size} of {len(motion)} frames hold NaN or infinite numbers, the first is {broken[0]}",
                 where=where,
-                hint="Check the model that generated it: a broken motion has no embedding.",
+                hint="Check the model that generated it: a broken motion cannot be embedded.",
             )

@@ -1,8 +1,8 @@
-"""Reconstruction of real clips by a generator's tokenizer: the upper bound for the transformers behind it.
+"""Reconstruction of real clips by a generator's tokenizer: the upper bound for the generator's transformers.
 
-An evaluating server has no captured motion, so this is measured where the prepared data are and kept beside the
+A server that evaluates has no captured motion, so this is measured where the prepared data are and stored beside the
 evaluator's bundle, in `reconstructions/{exact generator}.json`: outside the bundle's own hash, which is older than the
-generators that it judges, and bound to both by their exact references.
+generators that it evaluates, and bound to both by their exact references.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from marey.nn.motion_tokenizer import MotionTokenizer
 FOLDER = "reconstructions"
 BATCH = 32
 SAME = 0.02
-"""How far the embedding of a clip may lie from the stored one, as a share of its length: half precision and other
-machines make .002 of it, another clip over .5."""
+"""Largest distance of a clip's embedding from the stored one, relative to its length: half precision and other machines
+give .002, another clip over .5."""
 
 Features = NDArray[np.float32]
 
 
 class Reconstruction(BaseModel):
-    """Metrics of the real clips of an evaluator's reference after a tokenizer's encoding and decoding."""
+    """Metrics of the real clips of an evaluator's reference after encoding and decoding by a tokenizer."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -53,16 +53,16 @@ class Reconstruction(BaseModel):
     clips: Mapping[str, int]
     """By source of prompts (`marey.evaluations.BUNDLE_SOURCES`)."""
     error_mm: Mapping[str, float]
-    """Mean joint error with the pelvis laid over the true one, by source."""
+    """Mean joint error with aligned pelvis, by source."""
     values: Mapping[str, Mapping[str, Value]]
-    """The row by source and metric."""
+    """Row by source and metric."""
 
     def note(self, source: str) -> str:
         """Describe the row in a few words."""
-        return f"{self.clips[source]} real clips through the tokenizer, {self.error_mm[source]:.1f} mm off"
+        return f"{self.clips[source]} real clips through the tokenizer, {self.error_mm[source]:.1f} mm error"
 
     def save(self, evaluator: Bundle) -> Path:
-        """Keep it beside the evaluator's bundle; the file."""
+        """Write it beside the evaluator's bundle; return the file."""
         file = _file(evaluator, self.generator)
         file.parent.mkdir(exist_ok=True)
         file.write_text(self.model_dump_json(indent=1, exclude_defaults=True) + "\n", encoding="utf-8")
@@ -70,7 +70,7 @@ class Reconstruction(BaseModel):
 
 
 def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | None:
-    """The reconstruction of an exact generator measured by this exact evaluator; None if there is none.
+    """Return the reconstruction of an exact generator measured by this exact evaluator; None if there is none.
 
     Raises:
         InvalidFile: it is damaged, or was measured by another evaluator.
@@ -93,7 +93,7 @@ def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | N
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """A reconstruction with its prompt checks by action and style, for a report of its own."""
+    """A reconstruction with its prompt checks by action and style, for its own report."""
 
     reconstruction: Reconstruction
     heat: tuple[HeatCell, ...]
@@ -111,12 +111,12 @@ def reconstruct(
     """Encode and decode the clips of the reference, and measure them as generated motion is.
 
     Args:
-        data: the prepared folder that the clips of the reference are from.
+        data: the prepared folder of the reference's clips.
         real: the evaluator's reference.
-        evaluator: embeds.
-        generator: exact reference of the bundle that the tokenizer is of.
+        evaluator: embeds the motions.
+        generator: exact reference of the tokenizer's bundle.
         tokenizer: in evaluation mode, on the CPU.
-        progress: called with (clips done, clips in all).
+        progress: called with (clips done, number of clips).
 
     Raises:
         InvalidInput: the data lack a clip, or hold other motion under its name; another feature layout.
@@ -154,7 +154,7 @@ def reconstruct(
 
 @torch.inference_mode()
 def rebuilt(tokenizer: MotionTokenizer, clips: Sequence[Features]) -> list[Features]:
-    """Clips (T, D), T a multiple of the frames of a token, encoded and decoded."""
+    """Encode and decode clips (T, D), T a multiple of the frames of a token."""
     rate = tokenizer.frames_per_token
     lengths = torch.tensor([len(clip) for clip in clips])
     batch = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(clip) for clip in clips], batch_first=True)
@@ -171,21 +171,21 @@ def _measured(ruler: Ruler, motion: Embeddings, checked: Sequence[Checked]) -> d
 
 
 def _features(data: PreparedData, split: ReferenceSplit, rate: int, evaluator: Evaluator) -> list[Features]:
-    """Raw features (T, D) of the clips of a reference, T cut to whole tokens."""
+    """Return raw features (T, D) of the clips of a reference, T cut to whole tokens."""
     known = {clip.id: clip for clip in data.clips}
     if lacking := [clip.id for clip in split.clips if clip.id not in known]:
         raise InvalidInput(
             f"lacks {len(lacking)} of {len(split.clips)} clips of the evaluator's reference, {lacking[0]} first",
             where=str(data.path),
-            hint="Give the prepared folder that the evaluator's bundle was made with.",
+            hint="Give the prepared folder of the evaluator's bundle.",
         )
     whole = [np.array(data.features(known[clip.id])[: clip.frames], np.float32) for clip in split.clips]
     away = np.linalg.norm(evaluator.embed_motion(whole) - split.motion, axis=1) / np.linalg.norm(split.motion, axis=1)
     if away.max() > SAME:
         raise InvalidInput(
-            f"{split.clips[int(away.argmax())].id} is another motion than in the evaluator's reference",
+            f"{split.clips[int(away.argmax())].id} differs from the evaluator's reference",
             where=str(data.path),
-            hint="Give the prepared folder that the evaluator's bundle was made with.",
+            hint="Give the prepared folder of the evaluator's bundle.",
         )
     return [clip[: len(clip) - len(clip) % rate] for clip in whole]
 
@@ -193,7 +193,7 @@ def _features(data: PreparedData, split: ReferenceSplit, rate: int, evaluator: E
 def _joints(
     space: FeatureLayout, split: ReferenceSplit, truth: Sequence[Features], made: Sequence[Features]
 ) -> tuple[list[Checked], NDArray[np.float64]]:
-    """Measurements on the joints of each clip, and the joint error in metres."""
+    """Return measurements on the joints of each clip, and the joint error in metres."""
     checked: list[Checked] = []
     errors: list[float] = []
     for clip, before, after in zip(split.clips, truth, made, strict=True):
@@ -205,7 +205,7 @@ def _joints(
 
 
 def _rows(real: RealClips, sources: Mapping[str, Sequence[str]]) -> dict[str, NDArray[np.int64]]:
-    """Rows of each source's clips among those of all splits, joined in the order of the sources."""
+    """Return rows of each source's clips among those of all splits, joined in the order of the sources."""
     at, first = {}, 0
     for name in (name for name in sources if name in real.splits):
         count = len(real.split(name).clips)

@@ -1,6 +1,5 @@
-"""The reference of an evaluator's bundle, so that a server without capture data can evaluate: captions to generate
-from, and label, length, motion embedding, verdict and quality of each real clip. It holds neither joints nor
-features."""
+"""The reference of an evaluator's bundle, with which a server without capture data can evaluate: captions to generate
+from, and label, length, motion embedding, verdict and quality of each real clip. It holds no joints and no features."""
 
 from __future__ import annotations
 
@@ -34,19 +33,19 @@ class ReferenceClip(BaseModel):
     """See `marey.evaluator.labels`."""
     acts: tuple[str, ...]
     sides: tuple[str, ...]
-    """Side of each action, as the kinematic checks expect it."""
+    """Side of each action, for the kinematic checks."""
     frames: int
     captured: bool
-    """Neither a mirror image nor looped or spliced."""
+    """False for mirror images, loops and splices."""
     captions: tuple[str, ...]
     obeyed: bool | None = None
-    """The checker's verdict on the captions' actions; None = it checks no such action."""
+    """The checker's verdict on the captions' actions; None = no check exists for such an action."""
     quality: Quality | None = None
-    """None in bundles that were made before it was measured."""
+    """None in bundles from before it was measured."""
 
     @classmethod
     def of(cls, clip: Clip, joints: NDArray[np.float32], fps: float, max_frames: int) -> ReferenceClip:
-        """The stored facts of a prepared clip whose joints are (T, J, 3)."""
+        """Collect the stored facts of a prepared clip whose joints are (T, J, 3)."""
         sides = clip.sides or ("",) * len(clip.acts)
         checked = check(joints, fps, expected_of(clip.acts, sides))
         return cls(
@@ -72,16 +71,16 @@ class ReferenceSplit:
     clips: tuple[ReferenceClip, ...]
     motion: NDArray[np.float32]  # (N, E), stored in half precision
     prompts: tuple[str, ...]
-    """The caption of each clip that evaluations generate from, as `marey.bundles.reference` chooses it."""
+    """The caption of each clip that evaluations generate from, as chosen by `marey.bundles.reference`."""
 
     @property
     def labels(self) -> NDArray[np.int64]:
-        """(N,) one number a different label, as the metrics take them."""
+        """Return numbers (N,), equal for equal labels, as the metrics take them."""
         return label_ids([clip.label for clip in self.clips])
 
     @classmethod
     def of(cls, clips: Sequence[ReferenceClip], motion: NDArray[np.float32]) -> ReferenceSplit:
-        """Clips with the embeddings (N, E) of their motions."""
+        """Select clips with the embeddings (N, E) of their motions."""
         prompts = (clip.captions[number % len(clip.captions)] for number, clip in enumerate(clips))
         return cls(tuple(clips), motion, tuple(prompts))
 
@@ -93,17 +92,17 @@ class RealClips:
     splits: Mapping[str, ReferenceSplit]
 
     def split(self, name: str) -> ReferenceSplit:
-        """One split.
+        """Return one split.
 
         Raises:
-            NotFound: it is not there, or had no clips.
+            NotFound: it does not exist, or had no clips.
         """
         if name not in self.splits:
             raise NotFound(f"no split {name!r}", where="reference", hint=f"There are {', '.join(self.splits)}.")
         return self.splits[name]
 
     def joined(self, names: Sequence[str]) -> ReferenceSplit:
-        """Several splits as one, in the given order.
+        """Return several splits as one, in the given order.
 
         Raises:
             NotFound: see `split`.
@@ -116,7 +115,7 @@ class RealClips:
         )
 
     def add_to(self, writer: BundleWriter) -> None:
-        """Add the reference to a bundle that is being written."""
+        """Add the reference to a new bundle."""
         rows = {name: list(split.clips) for name, split in self.splits.items()}
         writer.add_json(
             FILE, {name: [c.model_dump(mode="json", exclude_none=True) for c in clips] for name, clips in rows.items()}
@@ -125,15 +124,15 @@ class RealClips:
 
     @classmethod
     def of(cls, bundle: Bundle) -> RealClips:
-        """The reference of an evaluator's bundle.
+        """Read the reference of an evaluator's bundle.
 
         Raises:
-            InvalidBundle: it has none, or one whose halves do not fit each other.
+            InvalidBundle: it has none, or its clips and embeddings differ in number.
         """
         try:
             clips = _CLIPS.validate_python(bundle.read_json(FILE))
         except ValidationError as error:
-            message = f"is not a reference: {error.errors()[0]['msg']}"
+            message = f"not a reference: {error.errors()[0]['msg']}"
             raise InvalidBundle(message, where=str(bundle.path / FILE)) from error
         motion = bundle.tensors(PART)
         if {name: len(rows) for name, rows in clips.items()} != {name: len(rows) for name, rows in motion.items()}:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from marey.evaluations import TEST_SPLIT, EarlierRun
 from marey.evaluator.comparing import Earlier, alarms, changes
 from marey.evaluator.heat import heat_of, style_of
-from marey.evaluator.measuring import Measured, Motion
+from marey.evaluator.measuring import EvaluatedMotion, EvaluatedMotions
 from marey.evaluator.port import Evaluator, ProgressCallback, no_progress
 from marey.evaluator.reconstruction import Reconstruction
 from marey.evaluator.reference import RealClips
@@ -22,13 +22,13 @@ from marey.evaluator.report import (
     ArtifactReference,
     Baseline,
     Exhibit,
+    GenerationSpeed,
     HeatCell,
     Metric,
     MotionScore,
     Repeats,
     Report,
     Row,
-    Speed,
     TrendPoint,
     from_json,
 )
@@ -45,7 +45,7 @@ TRENDS = (OBEYED, RETRIEVED, "fid", "kid", "skate", "jerk")
 
 def report_of(
     source: ScoreInput,
-    measured: Measured,
+    measured: EvaluatedMotions,
     evaluator: Evaluator,
     real: RealClips,
     reconstruction: Reconstruction | None = None,
@@ -55,16 +55,16 @@ def report_of(
     """Build the report of an evaluation.
 
     Args:
-        source: what was asked for, and the runs to compare with.
+        source: the request, and the runs to compare with.
         measured: its motions.
-        evaluator: what embedded them.
-        real: the clips that the evaluator's bundle knows. Those that the prompts describe are the ground truth; of own
-            prompts, the split `test`.
-        reconstruction: what was measured of the generator's tokenizer.
-        progress: called while it is measured, which takes minutes for many motions.
+        evaluator: the evaluator that embedded them.
+        real: real clips of the evaluator's bundle. The ground truth is the clips of the prompts; for custom prompts,
+            the split `test`.
+        reconstruction: measurements of the generator's tokenizer.
+        progress: called during measurement, which takes minutes for many motions.
 
     Raises:
-        InvalidInput: a run to compare with is of other prompts.
+        InvalidInput: a run to compare with has other prompts.
         NotFound: the reference lacks a split.
         Unreachable: the store does not answer.
     """
@@ -112,21 +112,23 @@ def report_of(
 
 
 def summary_of(report: Report) -> dict[str, float | None]:
-    """The judged row by metric: what lists and trends show."""
+    """Return the judged row by metric, for lists and trends."""
     values = report.row(report.judged).values
     return {key: value.mean for key, value in values.items()}
 
 
-def _labels(source: ScoreInput, measured: Measured, real: RealClips) -> NDArray[np.int64]:
-    """(N,) of each motion's prompt: the real clip's label, or, of own prompts, the prompt itself."""
+def _labels(source: ScoreInput, measured: EvaluatedMotions, real: RealClips) -> NDArray[np.int64]:
+    """Return the label (N,) of each motion's prompt: the real clip's, or for custom prompts the prompt itself."""
     if source.request.splits:
         return real.joined(source.request.splits).labels[measured.indices]
     numbers: dict[str, int] = {}
     return np.array([numbers.setdefault(m.item.prompt, len(numbers)) for m in measured.motions], np.int64)
 
 
-def _scores(measured: Measured, embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
-    """Scores of each motion that later runs are paired with."""
+def _scores(
+    measured: EvaluatedMotions, embeddings: EmbeddedSet, evaluator: Evaluator, seed: int
+) -> tuple[MotionScore, ...]:
+    """Return the scores of each motion, for the pairs of later runs."""
     found = retrieved(embeddings, evaluator, seed)
     return tuple(
         MotionScore(
@@ -149,7 +151,7 @@ def _reconstruction(found: Reconstruction | None, ruler: Ruler, metrics: Sequenc
 
 
 def _earlier(source: ScoreInput) -> tuple[Earlier, ...]:
-    """The last run and the pinned one, where their reports are still there."""
+    """Return the last run and the pinned one, if their reports still exist."""
     runs: list[tuple[Against, EarlierRun | None]] = [
         ("last run", source.previous),
         ("pinned baseline", source.baseline),
@@ -172,8 +174,8 @@ def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...
     )
 
 
-def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[HeatCell, ...]:
-    """The heat map; by style only if the prompts are captions of clips with known style."""
+def _heat(source: ScoreInput, measured: EvaluatedMotions, real: RealClips) -> tuple[HeatCell, ...]:
+    """Return the heat map; by style only if the prompts are captions of clips with known style."""
     splits = source.request.splits
     styles = [style_of(clip.label) for clip in real.joined(splits).clips] if splits else []
     return heat_of(
@@ -183,9 +185,9 @@ def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[Heat
 
 
 def _exhibits(
-    source: ScoreInput, measured: Measured, scores: Sequence[MotionScore]
+    source: ScoreInput, measured: EvaluatedMotions, scores: Sequence[MotionScore]
 ) -> tuple[tuple[Exhibit, ...], tuple[Exhibit, ...]]:
-    """The best and the worst motions; a prompt is shown once."""
+    """Return the best and the worst motions; a prompt is shown once."""
     order = sorted(range(len(scores)), key=lambda row: _rank(scores[row]))
     worst = _distinct(order, measured)[:MOST_EXHIBITS]
     shown = {measured.motions[row].item.index for row in worst}
@@ -198,48 +200,48 @@ def _exhibits(
 
 
 def _rank(score: MotionScore) -> float:
-    """Sort key of exhibits: adherence first; if nothing is expected, retrieval alone."""
+    """Return the sort key of exhibits: adherence first; without an expectation, retrieval alone."""
     return (0.0 if score.obeyed is None else score.obeyed) + 0.5 * (score.retrieved or 0.0)
 
 
-def _distinct(order: Sequence[int], measured: Measured) -> list[int]:
+def _distinct(order: Sequence[int], measured: EvaluatedMotions) -> list[int]:
     first: dict[int, int] = {}
     for row in order:
         first.setdefault(measured.motions[row].item.index, row)
     return list(first.values())
 
 
-def _exhibit(source: ScoreInput, motion: Motion, score: float) -> Exhibit:
+def _exhibit(source: ScoreInput, motion: EvaluatedMotion, score: float) -> Exhibit:
     verdict = motion.exported.verdict
     return Exhibit(
         prompt=motion.item.prompt,
         seed=motion.item.seed,
         passed=verdict is None or verdict.passed,
-        reason="nothing is checked" if verdict is None else verdict.reason,
+        reason="no expectation" if verdict is None else verdict.reason,
         score=round(score, 3),
         clip=parse_npz(source.npz(motion.item)),
     )
 
 
-def _speed(source: ScoreInput, measured: Measured) -> Speed | None:
-    """Speed of the whole job, waiting included, as users experience it."""
+def _speed(source: ScoreInput, measured: EvaluatedMotions) -> GenerationSpeed | None:
+    """Return the speed of the whole job, waiting included, as users experience it."""
     job = source.generation
     elapsed = [motion.item.elapsed for motion in measured.motions if motion.item.elapsed is not None]
     if job.started is None or job.finished is None or not elapsed:
         return None
     seconds = (job.finished - job.started).total_seconds()
     note = "at background priority, from the first claim to the last commit"
-    return Speed(len(measured.motions) / max(seconds, 1e-3), statistics.median(elapsed), note)
+    return GenerationSpeed(len(measured.motions) / max(seconds, 1e-3), statistics.median(elapsed), note)
 
 
 def bundle_of(reference: str) -> ArtifactReference:
-    """An exact bundle, as a report names it."""
+    """Return the report's reference to an exact bundle."""
     name, _, sha256 = reference.partition("@")
     return ArtifactReference(name, sha256)
 
 
 def _command(source: ScoreInput) -> str:
-    """The command line that repeats the evaluation; file names are quoted."""
+    """Return the command that repeats the evaluation; file names are quoted."""
     request = source.request
     words = ["marey", "eval", "run", "--bundle", request.bundle, "--evaluator", str(request.evaluator)]
     words += ["--split", request.source, "--repeats", str(request.repeats), "--seed", str(request.seed)]
@@ -249,8 +251,8 @@ def _command(source: ScoreInput) -> str:
     return shlex.join(words)
 
 
-def _software(measured: Measured, source: ScoreInput) -> Mapping[str, str]:
-    """Software versions of the workers that generated, from their motions; several versions are noted."""
+def _software(measured: EvaluatedMotions, source: ScoreInput) -> Mapping[str, str]:
+    """Return software versions of the generating workers, from their motions; several versions are noted."""
     found: dict[str, set[str]] = defaultdict(set)
     for motion in measured.motions[:: max(1, len(measured.motions) // 8)]:
         manifest = parse_npz(source.npz(motion.item)).manifest
@@ -259,7 +261,7 @@ def _software(measured: Measured, source: ScoreInput) -> Mapping[str, str]:
     return {name: ", ".join(sorted(versions)) for name, versions in sorted(found.items())}
 
 
-def _notes(source: ScoreInput, measured: Measured) -> tuple[str, ...]:
+def _notes(source: ScoreInput, measured: EvaluatedMotions) -> tuple[str, ...]:
     notes = [f"Not measured: prompt {b.item.index}, repeat {b.item.variant}: {b.reason}" for b in measured.broken[:20]]
     unmade = [item for item in source.items if item.npz is None]
     for item in unmade[:20]:

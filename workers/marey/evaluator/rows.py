@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from marey.checks.quality import Quality
 from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
-from marey.evaluator.measuring import Measured, embed_prompts
+from marey.evaluator.measuring import EvaluatedMotions, embed_prompts
 from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
 from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import Row, Value
@@ -30,10 +30,10 @@ from marey.evaluator.scoring import (
 from marey.measures.comparing import OBEYED, RETRIEVED
 
 UNMEASURED = "this generator's tokenizer was not measured on real motion (run `marey train evaluator reconstruct`)"
-OLD_BUNDLE = "the evaluator's bundle was made before it carried what the joints of real clips say"
+OLD_BUNDLE = "the evaluator's bundle is older than measurements on the joints of real clips"
 
 Found = Sequence[tuple[bool | None, Quality]]
-"""Verdict (None = nothing is expected) and quality of each motion."""
+"""Verdict (None = no expectation) and quality of each motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,11 @@ class Ruler:
     """Measurement context shared by all rows of a report.
 
     Attributes:
-        evaluator: embeds.
+        evaluator: embeds the motions.
         real: clips that distributions are compared with.
-        splits: whose, in the order of the prompts; two of them have columns of their own for the compositional one.
-        seed: of the draws.
+        splits: splits of the real clips, in the order of the prompts; with two, the compositional one has its own
+            columns.
+        seed: of the random draws.
         progress: called in every repeat.
     """
 
@@ -57,12 +58,12 @@ class Ruler:
     def values(
         self, embeddings: EmbeddedSet, found: Found | None, prompts: NDArray[np.int64], *, distances: bool
     ) -> dict[str, Value]:
-        """All values of a row.
+        """Compute all values of a row.
 
         Args:
             embeddings: of N motions.
             found: measurements on their joints; None = unknown.
-            prompts: (N,) the prompt of each motion, which with several splits tells the split.
+            prompts: (N,) prompt of each motion, which determines its split if there are several.
             distances: measure the distances of distributions to the real motions.
         """
         values = self._values(embeddings, found, self.splits, distances)
@@ -86,7 +87,7 @@ class Ruler:
 
 
 def truth_row(ruler: Ruler) -> Row:
-    """Real motion with its own captions, measured by the same network and checker."""
+    """Return the row of real motion with its own captions, measured by the same network and checker."""
     split = ruler.real.joined(ruler.splits)
     rows = np.arange(len(split.clips))
     found = [(clip.obeyed, clip.quality) for clip in split.clips if clip.quality is not None]
@@ -106,14 +107,14 @@ def truth_row(ruler: Ruler) -> Row:
 
 
 def reconstruction_row(values: Mapping[str, Value] | None, note: str) -> Row:
-    """Real motion through the generator's tokenizer: the upper bound of any generator behind it."""
+    """Return the row of real motion through the generator's tokenizer: the upper bound of the generator."""
     if values is None:
         values = {key: Value.missing(UNMEASURED) for key in (OBEYED, RETRIEVED, "fid")}
     return Row(RECONSTRUCTION, "Reconstruction", note, values)
 
 
-def generated_rows(measured: Measured, sets: tuple[EmbeddedSet, EmbeddedSet], ruler: Ruler) -> tuple[Row, Row]:
-    """The rows `raw` and `exported` of measured motions, from their two embedded sets."""
+def generated_rows(measured: EvaluatedMotions, sets: tuple[EmbeddedSet, EmbeddedSet], ruler: Ruler) -> tuple[Row, Row]:
+    """Return the rows `raw` and `exported` of measured motions, from their two embedded sets."""
     raw, exported = (
         ruler.values(embeddings, found, measured.indices, distances=True)
         for embeddings, found in zip(
@@ -137,9 +138,9 @@ def generated_rows(measured: Measured, sets: tuple[EmbeddedSet, EmbeddedSet], ru
 
 
 def embedded_sets(
-    measured: Measured, labels: NDArray[np.int64], progress: ProgressCallback = no_progress
+    measured: EvaluatedMotions, labels: NDArray[np.int64], progress: ProgressCallback = no_progress
 ) -> tuple[EmbeddedSet, EmbeddedSet]:
-    """Embedded sets of the raw and the exported motions; `labels` (N,) are those of their prompts."""
+    """Return embedded sets of the raw and the exported motions; `labels` (N,) are those of their prompts."""
     raw, exported = (
         EmbeddedSet(motion, measured.text, labels, measured.variants, progress)
         for motion in (measured.raw, measured.exported)
@@ -148,16 +149,17 @@ def embedded_sets(
 
 
 def real_set(split: ReferenceSplit, motion: Embeddings, ruler: Ruler) -> EmbeddedSet:
-    """Embedded set of a split's clips (N, E) with the clips' captions."""
+    """Return the embedded set of a split's clips (N, E) with the clips' captions."""
     text = embed_prompts(split.prompts, ruler.evaluator, ruler.progress)
     return EmbeddedSet(motion, text, split.labels, np.zeros(len(split.clips), np.int64), ruler.progress)
 
 
 def _ceilings(labels: NDArray[np.int64], seed: int) -> dict[int, str]:
-    """Upper bound of R-precision for clips with these labels (N,), by pool size; for pools that they fill."""
+    """Describe the upper bound of R-precision for clips with these labels (N,), by pool size, for pools that they
+    fill."""
     return {
         pool: (
-            f"A motion of the prompt's own label counts as found, so a model that knows every label, and nothing more, "
+            f"A motion of the prompt's own label counts as found, so a model that knows only the labels "
             f"has 100 % in pools of {pool}. Were the clip of the prompt alone to count, it would have "
             f"{', '.join(f'{ceiling:.1f} % at {k}' for k, ceiling in label_ceilings(labels, pool, seed).items())}."
         )

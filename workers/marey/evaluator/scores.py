@@ -12,7 +12,7 @@ from marey.evaluator.metrics.retrieval import ALL_TOP, Distance, all_ranks, r_pr
 POOL = 32
 TOP = (1, 2, 3)
 REPEATS = 20
-"""Captions and pools are drawn anew that often, as in the public protocol; the mean is reported."""
+"""Number of new draws of captions and pools, as in the public protocol; the mean is reported."""
 
 
 @dataclass(frozen=True)
@@ -25,17 +25,17 @@ class EmbeddedSplit:
     labels: NDArray[np.int64]  # (N,)
 
     def drawn(self, rng: np.random.Generator) -> NDArray[np.float32]:
-        """(N, E) one caption of each clip."""
+        """Return embeddings (N, E) of one caption of each clip."""
         first = np.concatenate([[0], np.cumsum(self.counts)[:-1]])
         return self.text[first + np.floor(rng.random(len(self.counts)) * self.counts).astype(np.int64)]
 
 
 def retrieval_scores(split: EmbeddedSplit, distance: Distance) -> dict[str, float]:
-    """R-precision and median ranks, text to motion where nothing else is said.
+    """Compute R-precision and median ranks, text to motion unless stated.
 
-    `r1` … `r3`: pools of 32, a motion of the text's own label is a hit. `distinct_r1` …: pools in which no label
-    occurs twice. `median_rank`, `median_rank_back`: among all N, the pair alone is a hit (TMR's "all" protocol), and
-    from motion to text. What a split is too small for is left out: 32 clips, 32 labels, 11 clips.
+    `r1` … `r3`: pools of 32, a motion of the text's own label is a hit. `distinct_r1` …: pools in which no label occurs
+    twice. `median_rank`, `median_rank_back`: among all N, only the pair is a hit (TMR's "all" protocol), and from
+    motion to text. Metrics that need a larger split are left out: 32 clips, 32 labels, 11 clips.
     """
     rng = np.random.default_rng(0)
     clips, labels = len(split.labels), split.labels

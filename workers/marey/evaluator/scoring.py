@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from marey.checks.quality import Quality
 from marey.core.errors import InvalidInput
 from marey.evaluations import COMPOSITIONAL
-from marey.evaluator.measuring import Measured
+from marey.evaluator.measuring import EvaluatedMotions
 from marey.evaluator.metrics import distribution
 from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid
 from marey.evaluator.metrics.intervals import redraw, repeated
@@ -32,7 +32,7 @@ from marey.measures.comparing import OBEYED
 
 REPEATS = 20
 POOLS = (32, 100)
-"""T2M's pool, and SnapMoGen's."""
+"""Pools of T2M and of SnapMoGen."""
 TOP = (1, 2, 3)
 KID_SUBSETS, KID_SIZE = 50, 100
 PAIRS_OF_A_PROMPT = 10
@@ -40,7 +40,7 @@ COMPOSITIONAL_COLUMNS = (OBEYED, *(f"r_precision_{k}_of_{POOLS[0]}" for k in TOP
 """Metrics with columns of their own for the compositional split: those that 342 motions can support."""
 JOINTS = "joints, without a network"
 QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 1000.0}
-"""Numbers of `Quality`, and what makes them the unit they are printed in: per cent, m/s³, mm, mm."""
+"""Numbers of `Quality`, and their factors to the printed unit: per cent, m/s³, mm, mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +57,18 @@ class EmbeddedSet:
     )
 
     def only(self, rows: NDArray[np.bool_]) -> EmbeddedSet:
-        """Some of the motions."""
+        """Return a subset of the motions."""
         return EmbeddedSet(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows], self.progress)
 
     def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
-        """For each of the 20 repeats the rows that it takes, and its random numbers."""
+        """Return for each of the 20 repeats its rows and its random generator."""
         generated = repeats_of(self.variants)
         for number, rng in enumerate(redraw(lambda rng: rng, repeats=REPEATS, seed=seed)):
             yield np.flatnonzero(self.variants == number % generated), rng
             self.progress()
 
     def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
-        """For each repeat its rows, and retrieval among them; drawn once, however often it is asked for.
+        """Return for each repeat its rows and the retrieval among them; drawn once and cached.
 
         Raises:
             InvalidInput: fewer motions than a pool.
@@ -85,19 +85,19 @@ class EmbeddedSet:
 
 
 def repeats_of(variants: NDArray[np.int64]) -> int:
-    """Number of generated repeats of motions whose repeats are `variants` (N,)."""
+    """Return the number of generated repeats of motions whose repeats are `variants` (N,)."""
     return int(variants.max(initial=0)) + 1
 
 
 def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...]:
-    """The columns, in order: of all motions, then again of the compositional split alone where it is one of several.
+    """Return the columns in order: of all motions, then again of the compositional split alone if it is one of several.
 
     Args:
-        evaluator: what embeds.
-        splits: that distances are taken to the real motions of.
+        evaluator: embeds the motions.
+        splits: splits whose real motions distances refer to.
     """
     by, those = evaluator.name, f"the real motions of the split {' and '.join(splits)}"
-    nearest = "How often a motion of what the prompt asked for is among the {} nearest of {}."
+    nearest = "How often a motion of the prompt's content is among the {} nearest of {}."
     pools = [
         Metric(_key(pool, k), f"R-precision {k} of {pool}", "%", "higher", 1, nearest.format(k, pool), by)
         for pool in POOLS
@@ -105,7 +105,7 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
     ]
     whole = (
         Metric(
-            OBEYED, "Prompt adherence", "%", "higher", 1, "Motions that do what their prompt says, in order.", JOINTS
+            OBEYED, "Prompt adherence", "%", "higher", 1, "Motions that show their prompt's actions, in order.", JOINTS
         ),
         *pools,
         Metric("clip_score", "CLIP score", "", "higher", 3, "Mean cosine of prompt and motion.", by),
@@ -129,12 +129,12 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
 
 
 def compositional(values: Mapping[str, Value]) -> dict[str, Value]:
-    """Values of the compositional split alone, under the keys of its own columns."""
+    """Return the values of the compositional split alone, under the keys of its own columns."""
     return {_compositional_key(key): value for key, value in values.items() if key in COMPOSITIONAL_COLUMNS}
 
 
 def embedded(embeddings: EmbeddedSet, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
-    """All values that come from embeddings; `real` (M, E) None leaves distances to real motions out."""
+    """Return all values that come from embeddings; with `real` (M, E) None, without distances to real motions."""
     found: dict[str, Value] = {}
     for pool in POOLS:
         found |= retrieval(embeddings, evaluator, pool, seed)
@@ -151,11 +151,11 @@ def embedded(embeddings: EmbeddedSet, real: Embeddings | None, evaluator: Evalua
     return found
 
 
-def multimodality(measured: Measured, seed: int) -> Value:
-    """MultiModality of the exported motions: prompts whose repeats were all made, against each other."""
+def multimodality(measured: EvaluatedMotions, seed: int) -> Value:
+    """Return MultiModality of the exported motions, over prompts with all repeats."""
     repeats = repeats_of(measured.variants)
     if repeats <= PAIRS_OF_A_PROMPT:
-        return Value.missing(f"needs more than {PAIRS_OF_A_PROMPT} motions of each prompt, there are {repeats}")
+        return Value.missing(f"needs more than {PAIRS_OF_A_PROMPT} motions per prompt; there are {repeats}")
     _, counts = np.unique(measured.indices, return_counts=True)
     whole = measured.exported[np.repeat(counts == repeats, counts)].reshape(-1, repeats, measured.exported.shape[1])
     if not len(whole):
@@ -167,15 +167,15 @@ def multimodality(measured: Measured, seed: int) -> Value:
 
 
 def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np.int64]) -> dict[str, Value]:
-    """All values that come from joints alone; their intervals are over the repeats that were generated.
+    """Return all values that come from joints alone; their intervals are over the generated repeats.
 
     Args:
-        found: verdict (None = nothing is expected) and quality of N motions.
-        variants: (N,) the repeat that each was generated in.
+        found: verdict (None = no expectation) and quality of N motions.
+        variants: (N,) repeat of each motion.
     """
     checked = np.array([obeyed is not None for obeyed, _ in found], bool)
     passed = np.array([100.0 * bool(obeyed) for obeyed, _ in found])
-    values = {OBEYED: _over_repeats(variants, passed, checked, "no prompt says what is expected of its motion")}
+    values = {OBEYED: _over_repeats(variants, passed, checked, "no prompt has an expectation")}
     for name, factor in QUALITY.items():
         numbers = np.array([factor * getattr(quality, name) for _, quality in found])
         values[name] = _over_repeats(variants, numbers, np.ones(len(numbers), bool), "there is no motion")
@@ -183,8 +183,8 @@ def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np
 
 
 def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
-    """(N,) share of the draws in which each motion was among the three nearest of its pool of 32; NaN = never drawn,
-    as all of them are where there are fewer motions than a pool.
+    """Return the share (N,) of draws in which each motion was among the three nearest of its pool of 32; NaN = never
+    drawn, as for all motions if there are fewer than a pool.
 
     Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
     """
@@ -202,9 +202,9 @@ def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArr
 def retrieval(
     embeddings: EmbeddedSet, evaluator: Evaluator, pool: int, seed: int, *, of: NDArray[np.bool_] | None = None
 ) -> dict[str, Value]:
-    """R-precision in pools of `pool`; with `of` (N,) that of some of the motions in pools of all.
+    """Return R-precision in pools of `pool`; with `of` (N,) that of some of the motions in pools of all.
 
-    A split of few labels has to be judged in pools of others: by itself any motion finds its label there.
+    A split of few labels must be judged in pools with others: alone, any motion finds its label there.
     """
     try:
         pools = embeddings.pools(evaluator, pool, seed)
@@ -221,7 +221,7 @@ def retrieval(
 
 
 def _distances(embeddings: EmbeddedSet, real: Embeddings, seed: int) -> dict[str, Value]:
-    """FID once a generated repeat, for it draws nothing; KID by subsets."""
+    """Return FID once per generated repeat, since it draws nothing; KID by subsets."""
     statistics, sizes = GaussianStatistics.of(real, name="real"), np.bincount(embeddings.variants, minlength=1)
     size = min(KID_SIZE, len(real), int(sizes.min()))
     try:
@@ -252,7 +252,7 @@ def _drawn(
 def _over_repeats(
     variants: NDArray[np.int64], numbers: NDArray[np.float64], which: NDArray[np.bool_], why: str
 ) -> Value:
-    """Mean of `numbers` (N,) where `which` (N,), in each repeat that was generated."""
+    """Return the mean of `numbers` (N,) where `which` (N,), in each generated repeat."""
     kinds = [which & (variants == k) for k in range(repeats_of(variants))]
     if not all(kind.any() for kind in kinds):
         return Value.missing(why)
@@ -267,8 +267,8 @@ def _interval(found: Sequence[float], count: int, *, dimensions: int | None = No
 
 
 def label_ceilings(labels: NDArray[np.int64], pool: int, seed: int) -> dict[int, float]:
-    """R-precision in per cent by k of an oracle that knows every label (N,) and nothing else, where only the pair
-    counts; mean over the repeats.
+    """Return R-precision in per cent by k of an oracle that knows only the labels (N,), where only the pair counts;
+    mean over the repeats.
 
     Raises:
         InvalidInput: fewer labels than a pool.
@@ -278,7 +278,7 @@ def label_ceilings(labels: NDArray[np.int64], pool: int, seed: int) -> dict[int,
 
 
 def keys_of(pool: int) -> tuple[str, ...]:
-    """The metrics of R-precision in pools of so many."""
+    """Return the metrics of R-precision in pools of `pool`."""
     return tuple(_key(pool, k) for k in TOP)
 
 

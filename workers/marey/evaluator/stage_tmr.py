@@ -26,11 +26,11 @@ from marey.training.motions import MotionData
 from marey.training.pairs import pieces_of
 
 STATISTICS_CAPTIONS = 1024
-"""Training captions that the statistics of text features are taken of: 19,000 tokens, their standard error is 1 %."""
+"""Number of training captions for the statistics of text features: 19,000 tokens, with a standard error of 1 %."""
 
 
 @dataclass(frozen=True)
-class Batch:
+class CaptionedBatch:
     """Clips, each with one of its captions."""
 
     features: Tensor  # (B, T, I), raw
@@ -49,7 +49,7 @@ class TMRStage:
         """Build the networks and choose the clips.
 
         Raises:
-            InvalidInput: the data's layout is another, or there is no clip to train on.
+            InvalidInput: the data have another layout, or no clip to train on.
             InvalidFile: texts of another encoder's width.
         """
         _check(config, data, encoder)
@@ -72,7 +72,7 @@ class TMRStage:
         self._set_text_statistics()
 
     def rows(self, split: str) -> NDArray[np.int64]:
-        """Clips of a split that have captions and are long enough."""
+        """Return clips of a split that have captions and are long enough."""
         usable = [
             i
             for i, clip in enumerate(self.clips)
@@ -81,11 +81,11 @@ class TMRStage:
         return np.array(usable, np.int64)
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """One group."""
+        """Return one group."""
         return [list(self.module.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """One batch, each clip with a caption at random."""
+        """Return the loss of one batch, each clip with a random caption."""
         size = self.optimisation.batch
         clips: NDArray[np.int64] = context.rng.choice(self.train, size=size, p=self.weights)
         own = [self.clips[int(i)].captions for i in clips]
@@ -98,7 +98,7 @@ class TMRStage:
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """The terms of the loss over validation clips, each with its first caption, and retrieval among them."""
+        """Return the terms of the loss over validation clips, each with its first caption, and retrieval among them."""
         rows = self.rows("val")
         found: list[dict[str, Tensor]] = []
         for part in _parts(rows, self.optimisation.batch):
@@ -113,12 +113,12 @@ class TMRStage:
         return retrieval_scores(self.embed(rows), "cosine") if len(rows) else {}
 
     def test(self) -> dict[str, float]:
-        """Retrieval on the test split."""
+        """Return retrieval scores on the test split."""
         return {f"test/{name}": value for name, value in self.retrieval("test").items()}
 
     @torch.no_grad()
     def embed(self, rows: NDArray[np.int64]) -> EmbeddedSplit:
-        """Embeddings of clips and of all their captions."""
+        """Return embeddings of clips and of all their captions."""
         size = self.optimisation.batch
         motion = [_in_pieces(self.module.motion, *self._motions(part)).mean for part in _parts(rows, size)]
         said = [caption for i in rows for caption in self.clips[int(i)].captions]
@@ -136,12 +136,12 @@ class TMRStage:
         lengths = self.lengths[chosen]
         return self.data.windows(self.starts[chosen], int(lengths.max())), lengths
 
-    def _batch(self, clips: NDArray[np.int64], said: Sequence[str]) -> Batch:
+    def _batch(self, clips: NDArray[np.int64], said: Sequence[str]) -> CaptionedBatch:
         labels = self.labels[torch.from_numpy(clips).to(self.labels.device)]
-        return Batch(*self._motions(clips), *self.captions.batch(said), labels)
+        return CaptionedBatch(*self._motions(clips), *self.captions.batch(said), labels)
 
-    def _terms(self, batch: Batch) -> dict[str, Tensor]:
-        """The loss and its terms (App. B.2); latents are samples in training, means in validation."""
+    def _terms(self, batch: CaptionedBatch) -> dict[str, Tensor]:
+        """Return the loss and its terms (App. B.2); latents are samples in training, means in validation."""
         weights = self.config.loss
         motion = _in_pieces(self.module.motion, batch.features, batch.lengths)
         text = _in_pieces(self.module.text, batch.states, batch.words)
@@ -155,8 +155,8 @@ class TMRStage:
         loss = loss + weights.divergence * terms["divergence"] + weights.latent * terms["latent"]
         return {"loss": loss, **terms}
 
-    def _reconstruction(self, batch: Batch, latents: Sequence[Gaussian]) -> Tensor:
-        """L_rec: smooth L1 of the motion decoded from either latent, mean over existing frames, both added."""
+    def _reconstruction(self, batch: CaptionedBatch, latents: Sequence[Gaussian]) -> Tensor:
+        """Return L_rec: smooth L1 of the motion decoded from either latent, mean over existing frames, summed."""
         drawn = [each.sample() if self.module.training else each.mean for each in latents]
         target = self.module.motion.normalize(batch.features)
         total = target.new_zeros(())
@@ -182,7 +182,7 @@ Encode = Callable[[Tensor, Tensor], Gaussian]
 
 
 def _in_pieces(encode: Encode, x: Tensor, lengths: Tensor) -> Gaussian:
-    """Gaussians of sequences (B, S, …) of `lengths` (B,), encoded in pieces of alike length."""
+    """Return Gaussians of sequences (B, S, …) of `lengths` (B,), encoded in pieces of similar length."""
     pieces = pieces_of(lengths)
     found = [encode(x[rows, : int(lengths[rows].max())], lengths[rows]) for rows in pieces]
     back = torch.argsort(torch.cat(pieces))
@@ -205,6 +205,6 @@ def _check(config: EvaluatorConfig, data: MotionData, encoder: TextEncoder) -> N
         )
     if encoder.width != config.text_width:
         raise InvalidFile(
-            f"texts are {encoder.width} wide, this configuration reads {config.text_width}",
+            f"texts have width {encoder.width}; this configuration reads {config.text_width}",
             hint="Run `marey data text` with the encoder of the configuration.",
         )

@@ -1,11 +1,11 @@
-"""The public T2M evaluator (Guo et al. 2022) behind the port: Euclidean distance between embeddings of 512 numbers.
+"""The public T2M evaluator (Guo et al. 2022): Euclidean distance between embeddings of 512 numbers.
 
-Never run with the public weights: none are on the machines this was written on. It is tested with random weights under
-the public names and shapes, against the networks written out step by step. What to compare first, once there are
+It has never run with the public weights, which were not available during development. It is tested with random weights
+under the public names and shapes, against the networks written out step by step. To compare first, once there are
 weights: the ground-truth row of HumanML3D's test split, R@1 .511, R@2 .703, R@3 .797, matching score 2.974, diversity
 9.503.
 
-Where the public code returns embeddings sorted by motion length, these come in the order of what was given.
+The public code returns embeddings sorted by motion length; here they have the order of the input.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import torch
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.evaluator.metrics.retrieval import Distance
-from marey.evaluator.networks import Loaded, open_networks
+from marey.evaluator.networks import LoadedNetworks, open_networks
 from marey.evaluator.port import Embeddings, Motion, check_motions
-from marey.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_model import FRAMES, T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
 from marey.nn.devices import choose_device
 
@@ -29,7 +29,7 @@ WORDS_FILE, WORDS_PART = "words.json", "words"
 BATCH = 32
 
 
-class T2MEvaluator(Loaded[T2MConfig, MotionEncoder, TextEncoder]):
+class T2MEvaluator(LoadedNetworks[T2MConfig, T2MMotionEncoder, T2MTextEncoder]):
     """A loaded bundle, as `marey.evaluator.t2m_import` writes it. Not thread-safe."""
 
     distance: Distance = "euclidean"
@@ -38,13 +38,13 @@ class T2MEvaluator(Loaded[T2MConfig, MotionEncoder, TextEncoder]):
         self,
         bundle: Bundle,
         config: T2MConfig,
-        motion: MotionEncoder,
-        text: TextEncoder,
+        motion: T2MMotionEncoder,
+        text: T2MTextEncoder,
         words: WordVectors,
         device: torch.device,
         tagger: Tagger | None,
     ) -> None:
-        """Put an evaluator together; most callers want `load`."""
+        """Create an evaluator from its parts; most callers use `load`."""
         super().__init__(bundle, config, motion, text, device)
         self.words, self.tagger = words, tagger
 
@@ -55,19 +55,19 @@ class T2MEvaluator(Loaded[T2MConfig, MotionEncoder, TextEncoder]):
         Args:
             bundle: a verified bundle.
             device: `auto`, `cpu`, `cuda`, `cuda:N`.
-            tagger: where parts of speech come from; motions can be embedded without.
+            tagger: source of parts of speech; motions can be embedded without.
 
         Raises:
             InvalidBundle: not this evaluator, or damaged.
-            InvalidInput: no such device.
+            InvalidInput: unknown device.
         """
-        config, motion, text = open_networks(bundle, MODEL, T2MConfig.from_dict, MotionEncoder, TextEncoder)
+        config, motion, text = open_networks(bundle, MODEL, T2MConfig.from_dict, T2MMotionEncoder, T2MTextEncoder)
         return cls(bundle, config, motion, text, _words(bundle, config), choose_device(device), tagger)
 
     @torch.inference_mode()
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
-        """See `Evaluator`; motions of 4 to 196 frames, of which the last one to three are not read where they make no
-        whole step of four."""
+        """See `Evaluator`; motions of 4 to 196 frames; the last one to three are not read if they are no complete step
+        of four."""
         check_motions(motions, self.config.features, self.config.min_frames, FRAMES)
         found = np.zeros((len(motions), self.width), np.float32)
         for low in range(0, len(motions), BATCH):

@@ -6,11 +6,11 @@ CHECKPOINTS is the public folder `checkpoints/t2m`, with `text_mot_match/model/f
 `Comp_v6_KLD005/meta/mean.npy` and `std.npy`; GLOVE the public folder `glove` with `our_vab_data.npy`,
 `our_vab_words.pkl` and `our_vab_idx.pkl`.
 
-The checkpoint is read with `weights_only=True`, which refuses anything but tensors and plain values. The two pickles
-of words are read by an unpickler that knows no classes and so can make strings, numbers, lists and dictionaries alone.
-What is loaded for an evaluation later is the bundle: safetensors and JSON, with hashes.
+The checkpoint is read with `weights_only=True`, which refuses anything but tensors and plain values. The two pickles of
+words are read by an unpickler without classes, which creates strings, numbers, lists and dictionaries alone.
+Evaluations later load the bundle: safetensors and JSON, with hashes.
 
-Never run on the public files: see `marey.evaluator.t2m`.
+It has never run on the public files: see `marey.evaluator.t2m`.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ from marey.core.arrays import read_npy
 from marey.core.characters import escape
 from marey.core.errors import InvalidFile, MareyError
 from marey.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
-from marey.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import END, START, UNKNOWN
 from marey.motion.features import layout
 from marey.nn.bundling import stored
 
 LICENCE = "LicenseRef-AMASS-NC"
-"""The code is MIT; the weights are published without terms of their own, and come of HumanML3D, made of AMASS."""
+"""The code is MIT; the weights have no stated terms, and derive from HumanML3D, which is made of AMASS."""
 
 
 def import_t2m(checkpoints: Path, glove: Path, output: Path, config: T2MConfig | None = None) -> Bundle:
-    """Make a bundle of the public files.
+    """Convert the public files to a bundle.
 
     Args:
         checkpoints: see the top of this module.
-        glove: see there.
+        glove: see the top of this module.
         output: the bundle's folder.
         config: other sizes, or another layout (KIT-ML's); None = the public ones.
 
     Raises:
-        InvalidFile: a file is missing, damaged, or holds something else.
+        InvalidFile: a file is missing, damaged, or of another kind.
         Conflict: the bundle already exists.
     """
     config = config or T2MConfig()
-    motion, text = MotionEncoder(config), TextEncoder(config)
+    motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
     file = checkpoints / "text_mot_match" / "model" / "finest.tar"
     weights = _checkpoint(file)
     for name, network in (
@@ -116,7 +116,7 @@ def _statistic(file: Path, config: T2MConfig) -> NDArray[np.float32]:
 
 
 def _read_words(folder: Path, config: T2MConfig) -> tuple[list[str], NDArray[np.float32]]:
-    """The vocabulary and its vectors, row by row."""
+    """Return the vocabulary and its vectors, row by row."""
     data = folder / "our_vab_data.npy"
     vectors, words, index = _array(data), _plain(folder / "our_vab_words.pkl"), _plain(folder / "our_vab_idx.pkl")
     if not isinstance(words, list) or not isinstance(index, dict) or not {START, END, UNKNOWN} <= set(words):
@@ -135,8 +135,8 @@ class _PlainValues(pickle.Unpickler):
     """Unpickler that knows no class: strings, numbers, lists and dictionaries load, everything else is refused."""
 
     def find_class(self, module_name: str, global_name: str, /) -> Any:
-        """Refuse."""
-        raise pickle.UnpicklingError(f"asks for {module_name}.{global_name}")
+        """Refuse every class."""
+        raise pickle.UnpicklingError(f"refused: {module_name}.{global_name}")
 
 
 def _plain(file: Path) -> Any:
@@ -161,7 +161,7 @@ its numbers are believed, its ground-truth row should be compared with the publi
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command line of this module; returns the exit code."""
+    """Run the command line of this module; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m marey.evaluator.t2m_import", description="See the module.")
     parser.add_argument("checkpoints", type=Path)
     parser.add_argument("--glove", type=Path, required=True)

@@ -19,11 +19,12 @@ from torch import Tensor, nn
 from marey.core.configs import ModelConfig
 
 FRAMES = 196
-"""The public code pads every normalised motion with zeros to so many frames. It matters: the two convolutions reach two
-frames past a motion's last step, where zeros become a bias, so less padding would give other embeddings."""
+"""The public code pads every normalised motion with zeros to this many frames. The padding matters: the two
+convolutions reach two frames past a motion's last step, where zeros become a bias, so less padding would change
+embeddings."""
 FRAMES_PER_STEP = 4
 CONTACTS = 4
-"""The last numbers of a frame, foot contacts, are not read."""
+"""Number of last columns, the foot contacts, that are not read."""
 SLOPE = 0.2
 
 
@@ -61,12 +62,12 @@ class MovementEncoder(nn.Module):
         self.out_net = nn.Linear(width, width)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, T, D) normalised to (B, T / 4, movement)."""
+        """Encode normalised (B, T, D) as (B, T / 4, movement)."""
         return self.out_net(self.main(features[..., :-CONTACTS].transpose(1, 2)).transpose(1, 2))
 
 
 class RecurrentEncoder(nn.Module):
-    """A bidirectional GRU with a learned start; its last states, both directions, to one embedding."""
+    """A bidirectional GRU with a learned start; its last states, both directions, give one embedding."""
 
     def __init__(self, inputs: int, hidden: int, width: int) -> None:
         super().__init__()
@@ -78,8 +79,8 @@ class RecurrentEncoder(nn.Module):
         self.hidden = nn.Parameter(torch.randn(2, 1, hidden))
 
     def forward(self, x: Tensor, lengths: Tensor) -> Tensor:
-        """(B, S, inputs) and (B,) at least 1 to (B, E), in the order given; the public code wants and gives them sorted
-        by length."""
+        """Encode (B, S, inputs) with lengths (B,), at least 1, as (B, E), in the order given; the public code requires
+        and returns them sorted by length."""
         packed = nn.utils.rnn.pack_padded_sequence(
             self.input_emb(x), lengths.cpu(), batch_first=True, enforce_sorted=False
         )
@@ -87,22 +88,22 @@ class RecurrentEncoder(nn.Module):
         return self.output_net(last.transpose(0, 1).flatten(1))
 
 
-class TextEncoder(RecurrentEncoder):
-    """Words and their parts of speech."""
+class T2MTextEncoder(RecurrentEncoder):
+    """Encoder of words and their parts of speech."""
 
     def __init__(self, config: T2MConfig) -> None:
         super().__init__(config.word_width, config.text_hidden, config.width)
         self.pos_emb = nn.Linear(config.tags, config.word_width)
 
     def embed(self, words: Tensor, tags: Tensor, lengths: Tensor) -> Tensor:
-        """Word vectors (B, S, 300), one-hot parts of speech (B, S, 15) and (B,) words to (B, E)."""
+        """Encode word vectors (B, S, 300), one-hot parts of speech (B, S, 15) and lengths (B,) as (B, E)."""
         return self(words + self.pos_emb(tags), lengths)
 
 
-class MotionEncoder(nn.Module):
-    """Movement encoder and GRU, with the statistics that motions are normalised with."""
+class T2MMotionEncoder(nn.Module):
+    """Movement encoder and GRU, with the statistics that normalise motions."""
 
-    mean: Tensor  # (D,) of the evaluator's own training (Comp_v6_KLD005), which are no generator's
+    mean: Tensor  # (D,) of the evaluator's own training (Comp_v6_KLD005), which differ from every generator's
     std: Tensor
 
     def __init__(self, config: T2MConfig) -> None:
@@ -113,9 +114,9 @@ class MotionEncoder(nn.Module):
         self.motion = RecurrentEncoder(config.movement, config.motion_hidden, config.width)
 
     def forward(self, features: Tensor, lengths: Tensor) -> Tensor:
-        """(B, T, D) raw features, T at most 196, and (B,) frames, at least 4, to (B, E).
+        """Encode raw features (B, T, D), T at most 196, with frames (B,), at least 4, as (B, E).
 
-        Of a motion's frames the last incomplete step is not read, as the public loader cuts it off.
+        The last incomplete step of a motion is not read, as the public loader cuts it off.
         """
         steps = lengths // FRAMES_PER_STEP
         size = features.shape[1]

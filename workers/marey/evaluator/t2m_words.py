@@ -1,7 +1,7 @@
 """Words as the public T2M evaluator reads them: GloVe vectors and parts of speech.
 
 The tags come with HumanML3D's captions (spaCy's, made by its authors: `caption#word/TAG word/TAG …#start#end`); some
-words have tags of their own, which outrank those. Vectors and lists: `EricGuo5513/momask-codes` (MIT),
+words have tags of their own, which take precedence. Vectors and lists: `EricGuo5513/momask-codes` (MIT),
 utils/word_vectorizer.py.
 """
 
@@ -39,13 +39,13 @@ Tagged = Sequence[tuple[str, str]]
 
 
 class Tagger(Protocol):
-    """Port of taggers: words and part-of-speech tags of a sentence."""
+    """Interface of taggers: words and part-of-speech tags of a sentence."""
 
     def tag(self, sentence: str) -> Tagged:
-        """Words and tags, in order.
+        """Return words and tags, in order.
 
         Raises:
-            InvalidInput: they are not known.
+            InvalidInput: the tags are unknown.
         """
         ...
 
@@ -54,15 +54,15 @@ class Tagger(Protocol):
 class TaggedCaptions:
     """Tags of known captions: the only ones with which numbers are comparable to published ones.
 
-    There is no tagger for other sentences here: published numbers used spaCy's tags, and another tagger's would give
-    other embeddings without anybody noticing.
+    There is no tagger for other sentences: published numbers used spaCy's tags, and another tagger's would silently
+    give other embeddings.
     """
 
     found: Mapping[str, Tagged]
 
     @classmethod
     def read(cls, folder: Path) -> TaggedCaptions:
-        """All captions of a folder of HumanML3D's (or KIT-ML's) `texts/*.txt`.
+        """Read all captions of a folder of HumanML3D's (or KIT-ML's) `texts/*.txt`.
 
         Raises:
             InvalidFile: a line is not `caption#words#start#end`, or there are none.
@@ -84,16 +84,16 @@ class TaggedCaptions:
             raise InvalidInput(
                 "is not one of the captions whose words are tagged",
                 where=sentence[:60],
-                hint="The T2M evaluator reads the data set's own captions; take another evaluator for other prompts.",
+                hint="The T2M evaluator reads the data set's own captions; choose another evaluator for other prompts.",
             )
         return words
 
 
 def read_line(line: str, *, where: str) -> tuple[str, Tagged]:
-    """A caption and its tagged words from a line `caption#word/TAG word/TAG …#start#end`.
+    """Parse a caption and its tagged words from a line `caption#word/TAG word/TAG …#start#end`.
 
     Raises:
-        InvalidFile: it is none.
+        InvalidFile: another format.
     """
     fields = line.strip().split("#")
     words = [token.rpartition("/") for token in fields[1].split()] if len(fields) == 4 else []
@@ -110,7 +110,7 @@ class WordVectors:
     vectors: NDArray[np.float32]  # (V, 300)
 
     def read(self, tagged: Tagged) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Vectors (S, 300) and one-hot tags (S, 15) of a sentence between its start and its end, at most 20 + 2.
+        """Return vectors (S, 300) and one-hot tags (S, 15) of a sentence between its start and its end, at most 20 + 2.
 
         An unknown word loses its tag too; a word of `OWN_TAGS` has that one, an unknown tag is OTHER.
         """

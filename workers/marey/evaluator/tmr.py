@@ -1,4 +1,4 @@
-"""The TMR-style evaluator behind the port: strings and raw features in, mean vectors out, compared by cosine."""
+"""The TMR-style evaluator: strings and raw features in, mean vectors out, compared by cosine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from marey.evaluator.bundle import load_networks
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.metrics.retrieval import Distance
 from marey.evaluator.model import MotionEncoder, SentenceEncoder
-from marey.evaluator.networks import Loaded
+from marey.evaluator.networks import LoadedNetworks
 from marey.evaluator.port import Embeddings, Motion, check_motions
 from marey.evaluator.sentences import check_encoder, open_encoder, padded, token_states
 from marey.items.prompts import check_prompt
@@ -24,7 +24,7 @@ from marey.text.encoders import TextEncoder
 BATCH = 64
 
 
-class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
+class TMREvaluator(LoadedNetworks[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
     """A loaded bundle. Not thread-safe.
 
     On a CPU matrices are packed, and the bits of an embedding do not depend on the rest of its batch.
@@ -41,7 +41,7 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
         encoder: TextEncoder,
         device: torch.device,
     ) -> None:
-        """Put an evaluator together; most callers want `load`."""
+        """Create an evaluator from its parts; most callers use `load`."""
         super().__init__(bundle, config, motion, text, device)
         self.encoder = encoder
         self.motion.encoder.pack()
@@ -54,12 +54,12 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
         Args:
             bundle: a verified bundle.
             device: `auto`, `cpu`, `cuda`, `cuda:N`.
-            encoder: one that is loaded already; None = from wherever its weights are on this machine.
+            encoder: a loaded one; None = load its weights on this machine.
 
         Raises:
             InvalidBundle: not this kind of evaluator, damaged, or trained with another text encoder.
             NotFound: the text encoder's weights are not installed.
-            InvalidInput: no such device.
+            InvalidInput: unknown device.
         """
         config, motion, text = load_networks(bundle)
         spec = bundle.manifest.text
@@ -69,7 +69,7 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
         return cls(bundle, config, motion, text, encoder, choose_device(device))
 
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
-        """See `Evaluator`; motions of 16 to 196 frames at 20 fps, or what the configuration says."""
+        """See `Evaluator`; motions of 16 to 196 frames at 20 fps, or as configured."""
         config = self.config
         check_motions(motions, config.features, config.min_frames, config.max_frames)
         return embed_motions(self.motion, motions)
@@ -87,7 +87,7 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
 
 @torch.inference_mode()
 def embed_motions(encoder: MotionEncoder, motions: Sequence[Motion]) -> Embeddings:
-    """Mean vectors (N, E) of raw features (T, D) that `check_motions` has let through, in the order given."""
+    """Return mean vectors (N, E) of raw features (T, D) that passed `check_motions`, in the order given."""
     device = encoder.mean.device
     found = np.zeros((len(motions), encoder.width), np.float32)
     for rows in _alike([len(motion) for motion in motions]):
@@ -99,7 +99,7 @@ def embed_motions(encoder: MotionEncoder, motions: Sequence[Motion]) -> Embeddin
 
 
 def _alike(lengths: Sequence[int]) -> list[list[int]]:
-    """Rows in batches of alike length."""
+    """Group rows into batches of similar length."""
     order = sorted(range(len(lengths)), key=lambda row: lengths[row])
     return [order[at : at + BATCH] for at in range(0, len(order), BATCH)]
 

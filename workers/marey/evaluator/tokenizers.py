@@ -1,4 +1,4 @@
-"""The report of a tokenizer alone: real motion beside what encoding and decoding leave of it."""
+"""The report of a tokenizer alone: real motion beside its reconstruction."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from marey.evaluator.scoring import REPEATS, metrics_of
 def tokenizer_report(
     rebuilt: Rebuilt, evaluator: Evaluator, real: RealClips, data: PreparedData, *, licence: str
 ) -> Report:
-    """A report whose judged row is the reconstruction of every test and compositional clip.
+    """Build a report whose judged row is the reconstruction of every test and compositional clip.
 
     Args:
-        rebuilt: what was measured.
-        evaluator: what measured it.
+        rebuilt: the measurements.
+        evaluator: the evaluator that measured.
         real: the clips.
-        data: the prepared folder that they came from.
+        data: the prepared folder of the clips.
         licence: of the tokenizer's weights.
     """
     found = rebuilt.reconstruction

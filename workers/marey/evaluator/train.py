@@ -16,11 +16,11 @@ from marey.training.texts import CaptionTexts
 
 
 def train_stage(name: str, options: TrainOptions[EvaluatorConfig]) -> dict[str, float]:
-    """Train the stage, `tmr`, and write its part; returns its metrics, those of the test split among them.
+    """Train the stage `tmr` and write its part; return its metrics, including those of the test split.
 
     Raises:
         NotFound: captions have no text features, or their encoder's weights are not on this machine.
-        InvalidInput: no such stage, or data of another layout.
+        InvalidInput: unknown stage, or data of another layout.
         InvalidFile: texts of another width than the configuration's.
     """
     RECIPE.check_name(name)
@@ -30,7 +30,7 @@ def train_stage(name: str, options: TrainOptions[EvaluatorConfig]) -> dict[str, 
     encoder = open_encoder(CaptionTexts.load(data.prepared).spec)
     torch.manual_seed(options.seed)
     stage, sha256 = TMRStage(options.config, data, encoder), data.prepared.sha256
-    del data  # the stage has kept what it reads, a quarter of the features
+    del data  # the stage keeps only what it reads, a quarter of the features
     metrics = RECIPE.train(stage, options) | stage.test()
     finish(stage.module, options, stage.name, metrics, sha256)
     return metrics

@@ -1,4 +1,4 @@
-"""Motions made in this process, without a server. Needs the extra `worker`.
+"""Motion generation in this process, without a server. Needs the extra `worker`.
 
     from marey.generate import load
 
@@ -6,7 +6,7 @@
     (clip,) = model.generate(["a person waves"], seed=1)
     clip.save_npz("wave.npz")
 
-What `__all__` names is public and documented in `docs/reference/python-api.md`; the modules of this package are not.
+Names in `__all__` are public and documented in `docs/reference/python-api.md`; the modules of this package are not.
 Names are imported when they are first used.
 """
 

@@ -1,4 +1,4 @@
-"""`marey.generate`: load a model, make clips."""
+"""`marey.generate`: load a model, generate clips."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Row = Item | Mapping[str, object] | str
 
 
 class LocalModel:
-    """A model in the memory of this process. Not for several threads.
+    """A model in the memory of this process. Not thread-safe.
 
     Attributes:
-        name: of its bundle.
+        name: name of its bundle.
         reference: its exact bundle, as `hgm3-starter@0123456789ab`.
-        model: the kind of model, as `hgm3`.
-        licence: the terms of its weights and of what they make.
-        is_random: the weights were never trained: motions show the machinery, not the prompts.
+        model: name of the model, as `hgm3`.
+        licence: terms of its weights and of generated motions.
+        is_random: True for weights that were never trained: motions do not follow the prompts.
     """
 
     def __init__(self, bundle: Bundle, studio: OneShot) -> None:
@@ -51,22 +51,22 @@ class LocalModel:
         fps: float | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Sequence[MotionClip]:
-        """Make motions; the same prompts, seeds and settings give the same clips as a server's.
+        """Generate motions; equal prompts, seeds and settings give the same clips as a server.
 
         Args:
             prompts: one or several; a row's own values override the arguments below.
             seed: of variant 0 of each prompt, variant k has seed + k; None = drawn.
             seconds: length; None = the model decides.
             variants: motions of each prompt; None = 1.
-            fps: frame rate of the clips; None = the model's.
+            fps: frames a second of the clips; None = the model's.
             settings: of sampling, as `{"guidance": 4.5}`.
 
         Returns:
-            A clip for each variant of each prompt, in that order.
+            One clip per variant of each prompt, in that order: metres, Y up, facing +Z in frame 0.
 
         Raises:
-            InvalidItems: with every problem of every prompt; nothing is made then.
-            InvalidInput: there is no prompt.
+            InvalidItems: with every problem of every prompt; nothing is generated then.
+            InvalidInput: no prompts.
         """
         return [*self.stream(prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, settings=settings)]
 
@@ -80,7 +80,7 @@ class LocalModel:
         fps: float | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Iterator[MotionClip]:
-        """Make motions as `generate` does, and give each as it is made."""
+        """Generate motions as `generate` does, and yield each when it is ready."""
         sampling = {**(settings or {}), **({} if fps is None else {OUTPUT_FPS: fps})}
         defaults = {"seed": seed, "seconds": seconds, "variants": variants, "settings": sampling or None}
         rows = [prompts] if isinstance(prompts, str) else prompts
@@ -91,7 +91,7 @@ class LocalModel:
             yield clip
 
     def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
-        """The problems of a row that this model alone has: lengths it cannot make, settings it does not have."""
+        """Yield the problems of a row that concern this model: lengths out of its range, unknown settings."""
         from marey.bundles.limits import check_seconds, check_settings
 
         for field, check in (("seconds", check_seconds), ("settings", check_settings)):
@@ -114,8 +114,8 @@ def load(bundle: str | os.PathLike[str], *, device: str | None = None, threads: 
         threads: of the CPU; None = that of MAREY_THREADS, by default all cores.
 
     Raises:
-        InvalidInput: the extra `worker` is not installed, or there is no such device.
-        NotFound, InvalidBundle: there is no such bundle, or it is damaged or not one that makes motions.
+        InvalidInput: the extra `worker` is not installed, or the device is unknown.
+        NotFound, InvalidBundle: the bundle is unknown, damaged, or not a generator.
     """
     try:
         from marey.bundles import choose_bundle
@@ -129,13 +129,13 @@ def load(bundle: str | os.PathLike[str], *, device: str | None = None, threads: 
         raise InvalidBundle(
             f"is a bundle of {found.manifest.model!r}, which does not run here",
             where=str(found.path),
-            hint=f"Models that do: {', '.join(model_names())}.",
+            hint=f"Models that run here: {', '.join(model_names())}.",
         )
     return LocalModel(found, OneShot(found, config))
 
 
 def _raw(row: Row, defaults: Mapping[str, object]) -> object:
-    """A row with the defaults for what it does not say; settings one by one."""
+    """Return a row with defaults for its missing fields; settings are merged one by one."""
     own: object = {"prompt": row} if isinstance(row, str) else row.as_json() if isinstance(row, Item) else row
     if not isinstance(own, Mapping):
         return own

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wanted:
-    """One motion to make without a server."""
+    """One motion to generate without a server."""
 
     prompt: str
     seed: int
@@ -34,10 +34,10 @@ class OneShot:
     """A model in this process, as `marey generate` and `marey.generate` run it."""
 
     def __init__(self, bundle: Bundle, config: Settings) -> None:
-        """Load the bundle and what reads its prompts.
+        """Load the bundle and its text pipeline.
 
         Raises:
-            InvalidInput: the extra `worker` is not installed, or there is no such device.
+            InvalidInput: the extra `worker` is not installed, or the device is unknown.
             NotFound, InvalidBundle: weights are missing or damaged.
         """
         try:
@@ -55,10 +55,10 @@ class OneShot:
         self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads)
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
-        """Each motion with the seconds it took, in the order given.
+        """Yield each motion with its seconds of computation, in the order given.
 
         Raises:
-            InvalidInput: a length this bundle cannot make; before anything is made.
+            InvalidInput: a length out of the bundle's range; raised before anything is generated.
         """
         from marey.generation.export import finish, split_settings
         from marey.generation.port import Request
@@ -69,7 +69,7 @@ class OneShot:
             Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps))
             for w, text in zip(wanted, features, strict=True)
         ]
-        requests = [self._generator.settled(request) for request in requests]
+        requests = [self._generator.resolve_length(request) for request in requests]
         start = 0
         for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
             rows = list(group)

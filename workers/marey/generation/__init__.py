@@ -1,1 +1,1 @@
-"""What all generators share: requests, the handler of a queue, the way from features to files."""
+"""Code that all generators share: requests, the handler of a queue, the export of features to files."""

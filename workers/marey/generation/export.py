@@ -1,4 +1,4 @@
-"""From generated features to files: the last step of an item, the same in a worker and in `marey generate`."""
+"""Export of generated features to files: the last step of an item, the same in a worker and in `marey generate`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from marey.runtime.handler import Export, ExportedFile
 
 
 def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
-    """An item's settings as the network's own and the output's frame rate (None = the model's)."""
+    """Split an item's settings into the network's own and the output's frame rate (None = the model's)."""
     return {k: v for k, v in values.items() if k != OUTPUT_FPS}, values.get(OUTPUT_FPS)
 
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
-    """Where a motion comes from: everything that decides it, nothing that differs between two equal runs."""
+    """Return the provenance of a motion: everything that decides it, nothing that differs between two equal runs."""
     bundle, text, recording = generator.bundle, request.text, request.recording
     streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
     return {
@@ -36,14 +36,14 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
         "random_weights": bundle.manifest.random,
         "licence": bundle.manifest.licence,
         "seed": request.seed,
-        "settings": generator.described(settings),
+        "settings": generator.describe_settings(settings),
         "software": software_of(generator),
         **streamed,
     }
 
 
 def software_of(generator: Generator[Any]) -> dict[str, Any]:
-    """What equal tokens depend on besides the inputs: device kind, number type, threads, versions."""
+    """Return the inputs of equal tokens beside the request: device kind, number type, threads, versions."""
     return {
         "marey": version("marey"),
         "torch": torch.__version__,
@@ -62,11 +62,11 @@ def finish(
     fps: float | None = None,
     clean: bool = True,
 ) -> MotionClip:
-    """The finished clip: decoded, feet cleaned, rotations solved, resampled.
+    """Finish a clip: decode, clean the feet, solve rotations, resample.
 
     Args:
         fps: output rate; None = the model's.
-        clean: lock feet where they stand.
+        clean: lock feet in contact.
     """
     manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean}
     return finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)

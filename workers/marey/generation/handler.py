@@ -1,4 +1,4 @@
-"""The work of a generator's queue: claimed items to motions."""
+"""Handler of a generator's queue: turns claimed items into motions."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from typing import Generic
 from uuid import UUID
 
 from marey.core.errors import MareyError
-from marey.core.settings import Settings as Configuration
+from marey.core.settings import Settings
 from marey.exporters import exporters
 from marey.generation.export import export_clip, finish, split_settings
 from marey.generation.port import Generated, Generator, Request, S
 from marey.jobs import ClaimedItem
 from marey.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
-from marey.streams.recording import Recording
+from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
 
 
 class GeneratorHandler(Generic[S]):
-    """Generates with one loaded bundle."""
+    """Generate motions with one loaded bundle."""
 
-    def __init__(self, queue: str, load: Callable[..., Generator[S]], batch_size: int, chosen: Configuration) -> None:
-        """Nothing is loaded yet.
+    def __init__(self, queue: str, load: Callable[..., Generator[S]], batch_size: int, chosen: Settings) -> None:
+        """Create the handler; `load` loads the bundle.
 
         Args:
-            queue: the model, which is the queue's name.
-            load: a bundle's reference to its generator; takes `device` and `threads`.
-            batch_size: items of one claim, at most.
+            queue: the model's name, which is also the queue's.
+            load: function from a bundle's reference to its generator; takes `device` and `threads`.
+            batch_size: largest number of items of a claim.
             chosen: device and threads.
 
         Raises:
-            PluginError: an export format cannot be used; found now, before an item fails for it.
+            PluginError: an export format cannot be loaded; checked here, before an item fails because of it.
         """
         exporters()
         self.queue = queue
@@ -46,27 +46,27 @@ class GeneratorHandler(Generic[S]):
 
     @property
     def generator(self) -> Generator[S]:
-        """The loaded bundle; the loop loads before it runs."""
+        """The loaded bundle; the loop calls `load` before `run`."""
         assert self._generator is not None
         return self._generator
 
     def load(self, bundle: str) -> None:
-        """Load `bundle`; the one before is let go first, so that both never stand in memory together.
+        """Load `bundle`; the previous one is released first, so that memory never holds both.
 
         Raises:
             NotFound, InvalidBundle, Refused: see `find_bundle`.
-            InvalidInput: there is no such device.
+            InvalidInput: unknown device.
         """
         self._generator = None
         self._generator = self._load(bundle, device=self._device, threads=self._threads)
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
-        """Items of equal padded length together, short ones first: a forward holds one bucket."""
+        """Group items by padded length, shortest first: a forward pass holds one bucket."""
         self._requests = {}
         buckets: dict[int, list[ClaimedItem]] = defaultdict(list)
         for item in batch.items:
             try:
-                request = self.generator.settled(self._request(item, batch.features[item.text_key]))
+                request = self.generator.resolve_length(self._request(item, batch.features[item.text_key]))
                 self._requests[item.id] = request
                 buckets[self.generator.bucket(request)].append(item)
             except MareyError as error:
@@ -99,24 +99,24 @@ class GeneratorHandler(Generic[S]):
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
         fps = self.generator.limits.fps
         frames = None if item.seconds is None else round(item.seconds * fps)
-        recording = Recording.from_blob(blob)
+        recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
         return Request(text, item.seed, frames, recording)
 
 
 class _Rows:
-    """The generator counts rows of its batch, the loop knows items."""
+    """Adapter between the rows of the generator and the items of the loop."""
 
     def __init__(self, items: Sequence[ClaimedItem], control: BatchControl) -> None:
         self._rows = {item.id: row for row, item in enumerate(items)}
         self._control = control
 
     def progress(self, done: int, total: int) -> None:
-        """A decode step was done."""
+        """Report a finished decode step."""
         self._control.progress(done, total)
 
     def dropped(self) -> set[int]:
-        """Rows nobody wants any more."""
+        """Return the rows of cancelled items."""
         return {self._rows[item] for item in self._control.dropped() if item in self._rows}
 
 

@@ -1,4 +1,4 @@
-"""What the handler, the command line and the exports know of a model's generator."""
+"""Interface of a model's generator, as the handler, the command line and the exports use it."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from marey.core.errors import InvalidInput
 from marey.items.item import MAX_SEED
 from marey.motion.features import FeatureLayout
 from marey.nn.devices import choose_device, fast_bf16
-from marey.streams.recording import Recording
+from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
 
 
 @dataclass(frozen=True)
 class Request:
-    """One motion to make."""
+    """Request for one motion."""
 
     text: TextFeatures
     seed: int
     frames: int | None = None  # at the model's fps; None = the model decides
-    recording: Recording | None = None  # of a live stream: drawn already, only to be decoded
+    recording: StreamRecording | None = None  # of a live stream: tokens exist, only decoding is left
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a bundle can make."""
+    """Range of lengths and seeds that a bundle accepts."""
 
     min_frames: int
     max_frames: int
@@ -39,7 +39,7 @@ class Limits:
     text_width: int
 
     def check(self, request: Request) -> None:
-        """Nothing, if a request lies within them.
+        """Check that a request is within the limits.
 
         Raises:
             InvalidInput: a length or seed out of range, or features of another encoder.
@@ -48,13 +48,13 @@ class Limits:
         frames = request.frames if request.recording is None else None
         if frames is not None and not low <= frames <= high:
             seconds = f"{low / self.fps:g} to {high / self.fps:g} seconds"
-            raise InvalidInput(f"{frames} frames is out of range: this bundle makes {seconds}", where="frames")
+            raise InvalidInput(f"{frames} frames is out of range; this bundle generates {seconds}", where="frames")
         if not 0 <= request.seed <= MAX_SEED:
-            raise InvalidInput(f"{request.seed} must lie between 0 and {MAX_SEED}", where="seed")
+            raise InvalidInput(f"{request.seed} is out of range; allowed: 0 to {MAX_SEED}", where="seed")
         width = request.text.nodes.shape[1]
         if width != self.text_width:
             raise InvalidInput(
-                f"text features are {width} wide, this bundle reads {self.text_width}",
+                f"text features have width {width}; this bundle reads {self.text_width}",
                 where="text",
                 hint="They come from another encoder. Parse the prompt again for this bundle.",
             )
@@ -63,17 +63,20 @@ class Limits:
 def open_bundle(
     bundle: Bundle | str, device: str, threads: int, dtype: torch.dtype | None
 ) -> tuple[Bundle, torch.device, torch.dtype]:
-    """What every generator's `load` begins with: the verified bundle, its device and the type of its matrices.
+    """Open a verified bundle and choose its device and number type: the first step of every generator's `load`.
 
     Args:
         bundle: a verified bundle, or its name or path.
         device: `auto`, `cpu`, `cuda`, `cuda:N`.
-        threads: of torch; 0 leaves torch's own choice.
+        threads: of torch; 0 = torch's default.
         dtype: None = bfloat16 where the device multiplies it fast, else float32.
+
+    Returns:
+        the bundle, the device and the type of the matrices.
 
     Raises:
         NotFound, InvalidBundle, Refused: see `find_bundle`.
-        InvalidInput: no such device.
+        InvalidInput: unknown device.
     """
     if threads > 0:
         torch.set_num_threads(threads)
@@ -82,31 +85,31 @@ def open_bundle(
     return verified, chosen, dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
 
 
-class Control(Protocol):
-    """What a caller may do while a batch is made."""
+class GenerationControl(Protocol):
+    """Progress reports and cancellation of a running batch."""
 
     def progress(self, done: int, total: int) -> None:
-        """Called after each step of the batch."""
+        """Report progress; called after each step of the batch."""
         ...
 
     def dropped(self) -> set[int]:
-        """Indices of requests to leave out from now on (cancelled)."""
+        """Return indices of requests to leave out from now on (cancelled)."""
         ...
 
 
 class NoControl:
-    """Nobody listens, nobody is left out."""
+    """Control that ignores progress and cancels nothing."""
 
     def progress(self, done: int, total: int) -> None:
-        """Nothing."""
+        """Ignore the report."""
 
     def dropped(self) -> set[int]:
-        """Nobody."""
+        """Return the empty set."""
         return set()
 
 
 class Generated(Protocol):
-    """One motion as the network made it: before decoding to joints and clean-up."""
+    """One motion as the network generated it, before decoding to joints and clean-up."""
 
     @property
     def tokens(self) -> NDArray[np.int16]:
@@ -120,23 +123,23 @@ class Generated(Protocol):
 
 
 S = TypeVar("S")
-"""A model's own settings of drawing, uniform over a batch."""
+"""A model's own sampling settings, uniform over a batch."""
 
 
 def read_settings(kind: Callable[..., S], values: Mapping[str, Any], known: Iterable[str]) -> S:
-    """The settings in `values`.
+    """Build a model's settings from `values`.
 
     Raises:
-        InvalidInput: one that is not among `known`.
+        InvalidInput: a name that is not among `known`.
     """
     for name in values:
         if name not in known:
-            raise InvalidInput(f"is not a setting of this model; known are {', '.join(known)}", where=name)
+            raise InvalidInput(f"unknown setting; this model has {', '.join(known)}", where=name)
     return kind(**values)
 
 
 class Generator(Protocol[S]):
-    """A loaded bundle. Not thread-safe; one a process."""
+    """A loaded bundle. Not thread-safe; one per process."""
 
     bundle: Bundle
     layout: FeatureLayout
@@ -144,22 +147,22 @@ class Generator(Protocol[S]):
     dtype: torch.dtype
     limits: Limits
     batch: int
-    """Motions made side by side, at most."""
+    """Largest number of motions of one forward pass."""
 
     def settings(self, values: Mapping[str, Any]) -> S:
-        """An item's settings, checked.
+        """Check an item's settings.
 
         Raises:
-            InvalidInput: not a setting of this model, or out of range.
+            InvalidInput: an unknown setting, or a value out of range.
         """
         ...
 
-    def described(self, settings: S) -> dict[str, Any]:
-        """Everything that decides how tokens are drawn: the bundle's own values with these changes."""
+    def describe_settings(self, settings: S) -> dict[str, Any]:
+        """Return all settings that decide how tokens are drawn: the bundle's, with these changes."""
         ...
 
-    def settled(self, request: Request) -> Request:
-        """The request with its length decided, where the model decides lengths beforehand.
+    def resolve_length(self, request: Request) -> Request:
+        """Return the request with its length set, where the model decides lengths beforehand.
 
         Raises:
             InvalidInput: as `Limits.check`.
@@ -167,15 +170,18 @@ class Generator(Protocol[S]):
         ...
 
     def bucket(self, request: Request) -> int:
-        """Settled requests of one bucket share a forward; a smaller bucket costs less."""
+        """Return the bucket of a request with a set length; requests of one bucket share a forward pass.
+
+        A smaller bucket costs less.
+        """
         ...
 
     def generate(
-        self, requests: Sequence[Request], settings: S | None = None, *, control: Control | None = None
+        self, requests: Sequence[Request], settings: S | None = None, *, control: GenerationControl | None = None
     ) -> Sequence[Generated | None]:
-        """One motion a request; None where `control` dropped it.
+        """Generate one motion per request; None where `control` dropped it.
 
-        The tokens of an item do not depend on the others, on their number or order.
+        The tokens of an item do not depend on the number or order of the others.
 
         Raises:
             InvalidInput: as `Limits.check`.

@@ -1,1 +1,1 @@
-"""Generators: one folder a model."""
+"""Generators: one folder per model."""

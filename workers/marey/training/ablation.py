@@ -14,7 +14,7 @@ from marey.training.adherence import measure
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:
-    """Prompt adherence, foot skate and jerk of one bundle."""
+    """Measure prompt adherence, foot skate and jerk of one bundle."""
     report = measure(generator, texts, evaluation_prompts(), seeds=[0], settings=settings)
     physical = mean_quality(t.quality for t in report.trials)
     rates = {name: rate.share for name, rate in report.summary.items()}
@@ -22,7 +22,7 @@ def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -
 
 
 def table(results: Mapping[str, Sequence[Mapping[str, float]]]) -> str:
-    """Means over training seeds with 95 % intervals (normal, 1.96 s/√n) as Markdown; one row a variant,
+    """Tabulate means over training seeds with 95 % intervals (normal, 1.96 s/√n) as Markdown; one row per variant,
     empty where a number was not measured."""
     names = list(dict.fromkeys(name for rows in results.values() for name in rows[0]))
     lines = ["| variant | seeds | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]

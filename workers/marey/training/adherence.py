@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.checks.judge import judge, straightness
-from marey.checks.prompts import EvaluationPrompt
+from marey.checks.prompts import HeldOutPrompt
 from marey.checks.quality import Quality, quality
 from marey.checks.rates import Rate, expectations, mean_quality, name_of
 from marey.core.errors import InvalidBundle
@@ -41,28 +41,28 @@ class Trial:
     seconds: float
     passed: bool
     reason: str
-    straight: bool | None  # None where no straight way was asked for
+    straight: bool | None  # None if the prompt does not ask for a straight path
     quality: Quality
 
 
 @dataclass(frozen=True)
-class Report:
-    """Rates of one bundle under one way of drawing."""
+class AdherenceReport:
+    """Rates of one bundle under one set of sampling settings."""
 
     bundle: str
     settings: Mapping[str, Any]
-    prompts: tuple[EvaluationPrompt, ...]
+    prompts: tuple[HeldOutPrompt, ...]
     trials: tuple[Trial, ...]
 
-    def rate(self, wanted: Callable[[EvaluationPrompt], bool]) -> Rate:
-        """Share of passed trials among the prompts that `wanted` picks."""
+    def rate(self, wanted: Callable[[HeldOutPrompt], bool]) -> Rate:
+        """Return the share of passed trials among the prompts that `wanted` selects."""
         texts = {p.text for p in self.prompts if wanted(p)}
         passed = [t.passed for t in self.trials if t.prompt in texts]
         return Rate(len(passed), sum(passed))
 
     @property
     def summary(self) -> dict[str, Rate]:
-        """The numbers that the bars are set on."""
+        """Return the rates that have targets."""
         straight = [t.straight for t in self.trials if t.straight is not None]
         return {
             "one action": self.rate(lambda p: not p.separate and len(p.expected) == 1),
@@ -74,12 +74,12 @@ class Report:
 
     @property
     def groups(self) -> dict[str, Rate]:
-        """Rates by group of prompts."""
+        """Return rates by group of prompts."""
         names = dict.fromkeys(t.group for t in self.trials)
         return {name: self.rate(lambda p, name=name: p.group == name) for name in names}
 
     def markdown(self) -> str:
-        """Tables for a card or a page of results."""
+        """Return tables for a card or a page of results."""
         physical = mean_quality(t.quality for t in self.trials)
         lines = [
             f"Bundle `{self.bundle}`, {len(self.trials)} motions.",
@@ -95,7 +95,7 @@ class Report:
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> dict[str, object]:
-        """Everything, each trial included."""
+        """Return all data, each trial included."""
         return {
             "bundle": self.bundle,
             "settings": dict(self.settings),
@@ -105,37 +105,37 @@ class Report:
         }
 
 
-def validation_prompts(folder: Path) -> tuple[EvaluationPrompt, ...]:
-    """Each caption that validation clips have and a check exists for, in the order of the clips."""
-    found: dict[str, EvaluationPrompt] = {}
+def validation_prompts(folder: Path) -> tuple[HeldOutPrompt, ...]:
+    """Return each caption of validation clips that has a check, in the order of the clips."""
+    found: dict[str, HeldOutPrompt] = {}
     for clip in PreparedData.open(folder).split("val"):
         expected = expectations(clip.acts, clip.sides)
         if expected is None or not clip.captions:
             continue
         text = clip.captions[len(found) % len(clip.captions)]
         separate = any(e.act in ("kick", "punch", "slash", "dance") for e in expected)
-        found.setdefault(text, EvaluationPrompt(text, name_of(expected), expected, separate))
+        found.setdefault(text, HeldOutPrompt(text, name_of(expected), expected, separate))
     return tuple(found.values())
 
 
 def measure(
     generator: Generator[S],
     texts: Sequence[TextFeatures],
-    prompts: Sequence[EvaluationPrompt],
+    prompts: Sequence[HeldOutPrompt],
     *,
     seeds: Iterable[int],
     settings: S,
     frames: int | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Report:
+) -> AdherenceReport:
     """Generate every prompt with every seed and judge it.
 
     Args:
         generator: the loaded bundle.
         texts: features of each prompt, in the order of `prompts`.
         prompts: prompts with their expectations.
-        seeds: one motion a prompt and seed.
-        settings: way of drawing.
+        seeds: seeds, one motion per prompt and seed.
+        settings: sampling settings.
         frames: length of every motion; None = the length estimator's.
         progress: called with motions done and wanted.
     """
@@ -147,13 +147,15 @@ def measure(
         part = jobs[start : start + generator.batch]
         trials += _judged(generator, part, settings)
         progress(len(trials), len(jobs))
-    return Report(generator.bundle.reference, generator.described(settings), tuple(prompts), tuple(trials))
+    return AdherenceReport(
+        generator.bundle.reference, generator.describe_settings(settings), tuple(prompts), tuple(trials)
+    )
 
 
-def _judged(generator: Generator[S], jobs: Sequence[tuple[EvaluationPrompt, Request]], settings: S) -> Iterator[Trial]:
+def _judged(generator: Generator[S], jobs: Sequence[tuple[HeldOutPrompt, Request]], settings: S) -> Iterator[Trial]:
     results = generator.generate([request for _, request in jobs], settings)
     for (prompt, request), made in zip(jobs, results, strict=True):
-        assert made is not None  # nothing drops rows here
+        assert made is not None  # no rows are dropped here
         clip = finish(generator, request, made, settings)
         verdict = judge(clip.joints, clip.fps, prompt.expected)
         wants_straight = len(prompt.expected) == 1 and prompt.expected[0].straight
@@ -170,7 +172,7 @@ def _judged(generator: Generator[S], jobs: Sequence[tuple[EvaluationPrompt, Requ
 
 
 def pipeline_of(generator: Generator[Any]) -> TextPipeline:
-    """Text pipeline of a bundle. Raise InvalidBundle if the bundle declares none."""
+    """Return the text pipeline of a bundle. Raises InvalidBundle if the bundle declares none."""
     text = generator.bundle.manifest.text
     if text is None:
         raise InvalidBundle("declares no text pipeline", where=str(generator.bundle.path))
@@ -179,21 +181,21 @@ def pipeline_of(generator: Generator[Any]) -> TextPipeline:
 
 def judge_bundle(
     generator: Generator[Any],
-    prompts: Sequence[EvaluationPrompt],
+    prompts: Sequence[HeldOutPrompt],
     *,
     seeds: int,
     seconds: float | None = None,
     settings: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Report:
+) -> AdherenceReport:
     """Judge a bundle on prompts, each with the seeds from 0 on; see `measure`.
 
     Args:
         seconds: length of every motion; None = the model's own choice.
-        settings: of sampling, by name.
+        settings: sampling settings by name.
 
     Raises:
-        InvalidInput: the model has no such setting, or it is out of range.
+        InvalidInput: an unknown setting, or a value out of range.
         InvalidBundle: the bundle declares no text pipeline.
     """
     return measure(
@@ -207,8 +209,8 @@ def judge_bundle(
     )
 
 
-def failures_of(report: Report) -> dict[str, list[str]]:
-    """Prompts that were not adhered to, with seed and reason, by group."""
+def failures_of(report: AdherenceReport) -> dict[str, list[str]]:
+    """List failed prompts, with seed and reason, by group."""
     failures = defaultdict[str, list[str]](list)
     for trial in report.trials:
         if not trial.passed:

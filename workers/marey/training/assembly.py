@@ -15,24 +15,24 @@ from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix, tier_of
 from marey.data.prepared import PreparedData
-from marey.training.parts import Part, save_part
-from marey.training.staging import ModelConfig, Recipe
+from marey.training.parts import TrainedPart, save_part
+from marey.training.staging import TrainableConfig, TrainingRecipe
 from marey.training.texts import CaptionTexts
 
-C = TypeVar("C", bound=ModelConfig)
+C = TypeVar("C", bound=TrainableConfig)
 
 
 @dataclass(frozen=True)
 class Gathered:
     """Finished parts, and the manifest's record of their training."""
 
-    parts: dict[str, Part]
+    parts: dict[str, TrainedPart]
     text: TextSpec
     manifest: dict[str, Any]
 
 
-def gather(prepared: Path, run: Path, recipe: Recipe[C], config: C) -> Gathered:
-    """All parts of a run.
+def gather(prepared: Path, run: Path, recipe: TrainingRecipe[C], config: C) -> Gathered:
+    """Read all parts of a run.
 
     Raises:
         NotFound: a stage has not finished.
@@ -57,7 +57,7 @@ def gather(prepared: Path, run: Path, recipe: Recipe[C], config: C) -> Gathered:
 
 
 def scatter(
-    bundle: Bundle, run: Path, recipe: Recipe[C], states: Mapping[str, Mapping[str, Tensor]], config: C
+    bundle: Bundle, run: Path, recipe: TrainingRecipe[C], states: Mapping[str, Mapping[str, Tensor]], config: C
 ) -> None:
     """Write a part for each stage's state dict into a run folder, as if the stages had just finished there.
 
@@ -69,7 +69,7 @@ def scatter(
     present = [name for name in recipe.stages if (run / name).exists()]
     if present:
         raise InvalidInput(
-            f"has a stage {present[0]} already", where=str(run), hint="Unpack the bundle into a new folder."
+            f"already has a stage {present[0]}", where=str(run), hint="Unpack the bundle into a new folder."
         )
     manifest = bundle.manifest
     data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""
@@ -79,7 +79,7 @@ def scatter(
         if "quantizer.sums" in state:
             state["quantizer.sums"] = state["quantizer.codebooks"] * state["quantizer.counts"][..., None]
         metrics = {k.removeprefix(f"{name}/"): v for k, v in manifest.metrics.items() if k.startswith(f"{name}/")}
-        part = Part(state, config.to_dict(), metrics, data_sha256, {"bundle": bundle.reference}, sources)
+        part = TrainedPart(state, config.to_dict(), metrics, data_sha256, {"bundle": bundle.reference}, sources)
         save_part(run / name / "part", part)
 
 
@@ -93,7 +93,7 @@ def _terms(sources: Sequence[Terms]) -> str:
 
 
 def _commit() -> str | None:
-    """The commit of the checkout; None for an installed wheel, whatever repository its environment lies in."""
+    """Return the commit of the checkout; None for an installed wheel, whatever repository contains its environment."""
     root = checkout()
     if root is None:
         return None

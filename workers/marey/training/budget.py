@@ -23,7 +23,7 @@ class Budget:
             raise InvalidInput("a training budget must be positive", hint="Give --steps >= 1 or --max-minutes > 0.")
 
     def fraction(self, step: int, seconds: float) -> float:
-        """Share used after `step` steps and `seconds` of training, 0 to 1."""
+        """Return the used share of the budget after `step` steps and `seconds` of training, 0 to 1."""
         by_steps = step / self.steps if self.steps else 0.0
         by_time = seconds / (60 * self.minutes) if self.minutes else 0.0
         return min(1.0, max(by_steps, by_time))
@@ -39,7 +39,7 @@ def learning_rate(
     decay: Literal["constant", "cosine"] = "constant",
     final: float = 0.02,
 ) -> float:
-    """Learning rate of step number `step` (from 0) at `fraction` of the budget.
+    """Return the learning rate of step number `step` (from 0) at `fraction` of the budget.
 
     Linear warm-up over min(`warmup_steps`, `warmup_share` of the budget), then constant or a cosine down to
     `final` · base.

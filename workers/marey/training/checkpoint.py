@@ -1,4 +1,4 @@
-"""Checkpoints that resume exactly: safetensors and JSON, written whole or not at all. Never pickle."""
+"""Checkpoints that resume exactly: safetensors and JSON, written atomically; never a pickle."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class TrainingState:
 def save_checkpoint(
     folder: Path, state: TrainingState, module: nn.Module, average: WeightAverage, optimizer: torch.optim.Optimizer
 ) -> None:
-    """Write `folder` anew; a crash in the middle leaves the previous checkpoint."""
+    """Replace `folder`; a crash in between keeps the previous checkpoint."""
     temporary = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
@@ -53,10 +53,10 @@ def save_checkpoint(
 
 
 def read_state(folder: Path) -> TrainingState:
-    """The JSON half of a checkpoint.
+    """Read the JSON half of a checkpoint.
 
     Raises:
-        NotFound: there is none.
+        NotFound: it does not exist.
         InvalidFile: it is damaged, or of another version.
     """
     file = folder / "state.json"
@@ -71,7 +71,7 @@ def read_state(folder: Path) -> TrainingState:
     except TypeError as error:
         raise InvalidFile(f"is not a checkpoint's state: {error}", where=str(file)) from error
     if state.format != FORMAT:
-        raise InvalidFile(f"is of format {state.format}, this version reads {FORMAT}", where=str(file))
+        raise InvalidFile(f"has format {state.format}; this version reads {FORMAT}", where=str(file))
     return state
 
 
@@ -94,7 +94,7 @@ def _save(file: Path, tensors: dict[str, Tensor]) -> None:
 
 
 def _flatten_optimizer(optimizer: torch.optim.Optimizer) -> dict[str, Tensor]:
-    """AdamW's state as `{parameter index}.{exp_avg|exp_avg_sq|step}`."""
+    """Return AdamW's state as `{parameter index}.{exp_avg|exp_avg_sq|step}`."""
     state = optimizer.state_dict()["state"]
     return {f"{index}.{name}": value for index, entry in state.items() for name, value in entry.items()}
 

@@ -1,4 +1,4 @@
-"""Motions that a model generated for captions of training clips: trained on as further clips with those captions."""
+"""Motions that a model generated for captions of training clips: used in training as further clips."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ FILE = "practice.safetensors"
 
 @dataclass(frozen=True)
 class Drawn:
-    """M motions, their tokens end to end."""
+    """M motions; their tokens are concatenated."""
 
-    clips: NDArray[np.int64]  # (M,) whose caption each was drawn for
+    clips: NDArray[np.int64]  # (M,) clip of each motion's caption
     lengths: Tensor  # (M,) int64 tokens
     tokens: Tensor  # (N, V) int64
 
@@ -49,7 +49,7 @@ class Drawn:
         temporary.replace(run / FILE)
 
     def extend(self, clips: Sequence[Clip], tokens: TokenData, captions: C) -> tuple[list[Clip], TokenData, C]:
-        """Clips, tokens and captions with these behind them."""
+        """Append these motions to clips, tokens and captions."""
         device = tokens.tokens.device
         lengths = self.lengths.to(device)
         starts = len(tokens.tokens) + lengths.cumsum(0) - lengths
@@ -66,7 +66,7 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
     """Read the motions of a run folder; None if there are none.
 
     Raises:
-        InvalidFile: drawn with another tokenizer, or for other data.
+        InvalidFile: generated with another tokenizer, or for other data.
     """
     file = run / FILE
     if not file.is_file():
@@ -77,7 +77,7 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
     except (SafetensorError, OSError) as error:
         raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Remove it.") from error
     if key != _key(tokenizer, prepared):
-        hint = "Remove it, or draw again (`marey train self-train`)."
+        hint = "Remove it, or generate again (`marey train self-train`)."
         raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)
     values = load_file(file)
     return Drawn(values["clips"].numpy(), values["lengths"], values["tokens"].long())

@@ -7,7 +7,8 @@ from torch import Tensor
 
 
 def heading_joints(features: Tensor, joints: int) -> Tensor:
-    """Joints over the root's ground point, heading frame: (B, T, D) to (B, T, J, 3) metres, nothing integrated."""
+    """Convert (B, T, D) to joints (B, T, J, 3) in metres over the root's ground point, in the heading frame; no
+    integration."""
     features = features.float()
     batch, frames = features.shape[:2]
     root = torch.zeros_like(features[..., :3])
@@ -20,7 +21,7 @@ def world_joints(features: Tensor, joints: int) -> Tensor:
     """Decode positions: (B, T, D) features in their own units to (B, T, J, 3) metres, Y up, facing +Z in frame 0.
 
     Columns: [0] half the yaw delta a frame, [1:3] displacement in the heading frame, [3] root height, [4:4+3(J-1)]
-    the other joints relative to the root's ground point, in the heading frame (HumanML3D; `facts.md` of the design).
+    the other joints relative to the root's ground point, in the heading frame (HumanML3D, Guo et al. 2022).
     """
     features = features.float()
     batch, frames = features.shape[:2]

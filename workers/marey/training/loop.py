@@ -1,7 +1,7 @@
-"""The training loop shared by all stages: a stage defines a loss, the loop does the rest.
+"""The training loop shared by all stages: a stage defines a loss, the loop runs it.
 
-Resuming is exact because nothing random is carried along: batches and torch's generator are seeded from
-(seed, step, rank) at every step. With a budget in minutes the schedules depend on the clock, and runs differ.
+Resuming is exact because no random state is carried along: batches and torch's generator are seeded from (seed, step,
+rank) at every step. With a budget in minutes the schedules depend on the clock, and runs differ.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class StepContext:
     rng: np.random.Generator  # for the choice of data, seeded from (seed, step, rank)
 
 
-class Stage(Protocol):
-    """One thing to train."""
+class TrainingStage(Protocol):
+    """One stage of training."""
 
     @property
     def name(self) -> str:
@@ -54,28 +54,28 @@ class Stage(Protocol):
 
     @property
     def module(self) -> nn.Module:
-        """Everything trained and everything a checkpoint must hold."""
+        """Module with all trained parameters and all tensors of a checkpoint."""
         ...
 
     @property
     def optimisation(self) -> StageConfig:
-        """Batch size, learning rate and the like."""
+        """Batch size, learning rate and other optimisation settings."""
         ...
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """Parameters whose gradient norms are clipped apart from each other."""
+        """Groups of parameters whose gradient norms are clipped separately."""
         ...
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Loss of one batch, and what to log."""
+        """Return the loss of one batch, and values to log."""
         ...
 
     def after_step(self, context: StepContext) -> None:
-        """After the optimiser's step (teacher update)."""
+        """Update state after the optimiser's step (a teacher, for instance)."""
         ...
 
     def validate(self) -> Mapping[str, float]:
-        """Metrics of the averaged weights on the validation split."""
+        """Return metrics of the averaged weights on the validation split."""
         ...
 
 
@@ -87,7 +87,7 @@ class RunOptions:
     budget: Budget
     seed: int = 0
     resume: bool = False
-    bf16: bool = True  # where it pays: processors without its instructions take ten times as long
+    bf16: bool = True  # where it is fast: processors without its instructions take ten times as long
     checkpoint_minutes: float = 3.0
     validate_times: int = 8  # over the whole budget, the end included
     log_every: int = 20
@@ -100,10 +100,10 @@ def start_process_group() -> None:
         dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
 
 
-def train(stage: Stage, options: RunOptions, config: dict[str, Any]) -> dict[str, float]:
-    """Train `stage` until the budget is used; returns its last validation metrics.
+def train(stage: TrainingStage, options: RunOptions, config: dict[str, Any]) -> dict[str, float]:
+    """Train `stage` until the budget is used; return its last validation metrics.
 
-    Afterwards the module carries the averaged weights.
+    Afterwards the module holds the averaged weights.
 
     `folder/checkpoint` holds the state to resume from; `folder/tensorboard` the curves.
 
@@ -114,7 +114,7 @@ def train(stage: Stage, options: RunOptions, config: dict[str, Any]) -> dict[str
 
 
 class _Run:
-    def __init__(self, stage: Stage, options: RunOptions, config: dict[str, Any]) -> None:
+    def __init__(self, stage: TrainingStage, options: RunOptions, config: dict[str, Any]) -> None:
         self.stage, self.options = stage, options
         self.config: dict[str, Any] = json.loads(json.dumps(config))  # tuples become lists, as in a checkpoint
         o = stage.optimisation
@@ -152,7 +152,7 @@ class _Run:
         writer = SummaryWriter(str(options.folder / "tensorboard"), purge_step=self.step) if self.main else None
         validated = math.floor(self.fraction * options.validate_times)
         saved = time.monotonic()
-        # without a process group every process has its own clock: rank 0's decides (see _tick)
+        # without a process group every process has its own clock: rank 0's is used (see _tick)
         with _progress(self.main and not options.quiet) as progress:
             bar = progress.add_task(self.stage.name, total=1.0, note="")
             while self.fraction < 1.0:

@@ -1,6 +1,6 @@
-"""Motions as training reads them, on one device: features of all clips end to end, and their tokens.
+"""Motions for training, on one device: concatenated features of all clips, and their tokens.
 
-Choices of data come from a numpy generator that the loop seeds from (seed, step, rank); nothing here has a state.
+Random choices use a numpy generator that the loop seeds from (seed, step, rank); this code has no state.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ TOKENS = "tokens.safetensors"
 
 @dataclass(frozen=True)
 class MotionData:
-    """All clips of a prepared folder, end to end on one device."""
+    """All clips of a prepared folder, concatenated on one device."""
 
     prepared: PreparedData
     features: Tensor  # (F, D) float32, in their own units
@@ -45,27 +45,27 @@ class MotionData:
         )
 
     def originals(self, split: str) -> list[Clip]:
-        """Captured clips of a split: no mirror images, no loops or splices."""
+        """Return captured clips of a split: no mirror images, no loops or splices."""
         return [c for c in self.prepared.split(split) if not c.mirrored and not c.spliced]
 
     def windows(self, starts: Tensor, size: int) -> Tensor:
-        """(B,) first frames to features (B, size, D); frames beyond the last one of all repeat it."""
+        """Return features (B, size, D) from first frames (B,); frames past the end repeat the very last one."""
         index = starts[:, None] + torch.arange(size, device=self.features.device)
         return self.features[index.clamp(max=len(self.features) - 1)]
 
 
 def dataset_of(clip: Clip) -> str:
-    """Data set, with the part of it where the content names one: `bandai-namco/1`."""
+    """Return the data set, with its part if the content names one: `bandai-namco/1`."""
     number, slash, _ = clip.content.partition("/")
     return f"{clip.dataset}/{number}" if slash and number.isdigit() else clip.dataset
 
 
 @dataclass(frozen=True)
 class TokenData:
-    """Tokens of all clips. A training clip is tokenized from its frames 0, 1, … on, as many as a token has frames (P):
-    the same motion on P token grids."""
+    """Tokens of all clips. A training clip is tokenized from its frames 0, 1, … on, up to the number of frames of a
+    token (P): the same motion on P token grids."""
 
-    tokens: Tensor  # (N, V) int64, sequences end to end
+    tokens: Tensor  # (N, V) int64, concatenated sequences
     starts: Tensor  # (C, P) int64, first token of clip c at phase p; phase 0 where a clip has fewer
     lengths: Tensor  # (C, P) int64 tokens
 
@@ -83,7 +83,7 @@ class TokenData:
             for p in range(rate if clip.split == "train" else 1)
             if clip.length - p >= rate
         ]
-        jobs.sort(key=lambda job: job[3])  # alike lengths together
+        jobs.sort(key=lambda job: job[3])  # similar lengths together
         starts = torch.zeros(len(clips), rate, dtype=torch.long)
         lengths = torch.zeros(len(clips), rate, dtype=torch.long)
         found: list[Tensor] = []
@@ -104,17 +104,17 @@ class TokenData:
 
     @property
     def phases(self) -> int:
-        """P."""
+        """Return P."""
         return self.starts.shape[1]
 
     def log_shares(self, codes: int) -> Tensor:
-        """Logarithm of how often each code occurs (V, K): where the biases of the heads start."""
+        """Return the logarithm of each code's frequency (V, K): initial biases of the heads."""
         levels = self.tokens.shape[1]
         counts = torch.stack([torch.bincount(self.tokens[:, v], minlength=codes) for v in range(levels)]).float() + 1
         return (counts / counts.sum(1, keepdim=True)).log()
 
     def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:
-        """Tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
+        """Return tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
         lengths = self.lengths[clips, phases].clamp(max=max_tokens)
         size = int(lengths.max())
         position = torch.arange(size, device=clips.device)
@@ -124,7 +124,7 @@ class TokenData:
 
 
 def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> TokenData:
-    """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
+    """Return tokens of all clips: encoded once per tokenizer and data, then read from the run folder."""
     key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}"
     device = data.features.device
     return TokenData(**made_once(run / TOKENS, key, device, lambda: vars(TokenData.encode(tokenizer, data))))
@@ -133,7 +133,7 @@ def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> Toke
 def made_once(
     file: Path, key: str, device: torch.device, make: Callable[[], Mapping[str, Tensor]]
 ) -> Mapping[str, Tensor]:
-    """Whole numbers, int64, among them `tokens`: read from a file that has this key, else made, and kept there."""
+    """Return int64 arrays, `tokens` among them: read from a file with this key, else computed and written there."""
     if file.is_file():
         try:
             values = load_file(file)
@@ -153,6 +153,6 @@ def made_once(
 
 
 def fingerprint(network: nn.Module) -> str:
-    """A fingerprint of a network's weights."""
+    """Return a fingerprint of a network's weights."""
     total = sum(float(value.double().abs().sum()) for value in network.state_dict().values())
     return f"{total:.6f}"

@@ -16,7 +16,8 @@ from marey.training.sentences import SentenceData
 
 
 class Pairs:
-    """Clips that have captions and are long enough; with `natural`, but those made longer or shorter than captured."""
+    """Clips that have captions and are long enough; with `natural`, without those made longer or shorter than
+    captured."""
 
     def __init__(
         self,
@@ -36,20 +37,20 @@ class Pairs:
         self.weights = sampling_weights([clips[int(i)] for i in self.train])
 
     def draw(self, rng: np.random.Generator, batch: int) -> NDArray[np.int64]:
-        """Training clips (B,)."""
+        """Draw training clips (B,)."""
         chosen: NDArray[np.int64] = rng.choice(self.train, size=batch, p=self.weights)
         return chosen
 
     def validation_batches(self, batch: int) -> Iterator[NDArray[np.int64]]:
-        """All validation clips."""
+        """Return all validation clips."""
         for at in range(0, len(self.validation), batch):
             yield self.validation[at : at + batch]
 
 
 def pieces_of(lengths: Tensor) -> list[Tensor]:
-    """Rows (B,) of a batch in four pieces of alike length, each padded to its own longest: same sum, less padding.
+    """Split rows (B,) of a batch into four pieces of similar length, each padded to its own longest: less padding.
 
-    One piece on an accelerator, which waits for launches rather than for padding.
+    One piece on an accelerator, where launches cost more than padding.
     """
     order = torch.argsort(lengths, stable=True)
     return list(order.chunk(min(4, len(order)))) if lengths.device.type == "cpu" else [order]

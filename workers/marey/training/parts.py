@@ -20,7 +20,7 @@ _TERMS = TypeAdapter(tuple[Terms, ...])
 
 
 @dataclass(frozen=True)
-class Part:
+class TrainedPart:
     """A trained part of a bundle."""
 
     state: dict[str, Tensor]
@@ -32,7 +32,7 @@ class Part:
     """Data sets that it was trained on, and those of every part that it began from or was trained upon."""
 
 
-def save_part(folder: Path, part: Part) -> None:
+def save_part(folder: Path, part: TrainedPart) -> None:
     """Write `weights.safetensors` and `part.json` (last: a part without it is unfinished)."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "part.json").unlink(missing_ok=True)
@@ -55,7 +55,7 @@ def load_sources(file: Path) -> tuple[Terms, ...]:
         raise InvalidFile(f"is not a trained part: {error}", where=str(file)) from error
 
 
-def load_part(folder: Path) -> Part:
+def load_part(folder: Path) -> TrainedPart:
     """Read a finished part.
 
     Raises:
@@ -71,7 +71,7 @@ def load_part(folder: Path) -> Part:
     try:
         state = load_file(folder / "weights.safetensors")
         sources = _TERMS.validate_python(values.get("sources", ()))
-        return Part(
+        return TrainedPart(
             state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}), sources
         )
     except (AttributeError, KeyError, TypeError, ValueError, SafetensorError, OSError) as error:

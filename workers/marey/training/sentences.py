@@ -17,7 +17,7 @@ from marey.training.texts import CaptionTexts
 
 @dataclass(frozen=True)
 class SentenceData:
-    """Whole sentences, without the parts of their graphs."""
+    """Features of whole sentences, without the parts of their graphs."""
 
     strings: Tensor  # (U, W) float16
     sentence: Tensor  # (K,) int64: string of each caption
@@ -34,30 +34,30 @@ class SentenceData:
         return SentenceData(**sentence_fields(texts, counts, width, device))
 
     def repeated(self, clips: NDArray[np.int64]) -> Self:
-        """The same, where more clips follow that have the captions of these (M,)."""
+        """Return the same data with further clips that have the captions of clips (M,)."""
         first, count = (np.concatenate([own, own[clips]]) for own in (self.first, self.count))
         return replace(self, first=first, count=count)
 
     def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
-        """One caption of each clip (B,) at random."""
+        """Draw one caption of each clip (B,)."""
         chosen = self.first[clips] + np.floor(rng.random(len(clips)) * self.count[clips]).astype(np.int64)
         return torch.from_numpy(chosen).to(self.sentence.device)
 
     def sentences(self, captions: Tensor) -> Tensor:
-        """Sentence features (B, W)."""
+        """Return sentence features (B, W)."""
         return self.strings[self.sentence[captions]].float()
 
     def captions_of(self, clips: Sequence[int]) -> Tensor:
-        """All captions of some whole clips."""
+        """Return all captions of some whole clips."""
         rows = np.concatenate([self.first[c] + np.arange(self.count[c]) for c in clips])
         return torch.from_numpy(rows).to(self.sentence.device)
 
 
 def sentence_fields(texts: CaptionTexts, counts: Sequence[int], width: int, device: torch.device) -> dict[str, Any]:
-    """The fields of `SentenceData`, checked."""
+    """Return the fields of `SentenceData`, validated."""
     if texts.strings.shape[1] != width:
         raise InvalidFile(
-            f"texts are {texts.strings.shape[1]} wide, this configuration reads {width}",
+            f"texts have width {texts.strings.shape[1]}; this configuration reads {width}",
             hint="Run `marey data text` with the encoder of the configuration.",
         )
     whole = texts.node_string[texts.node_start[:-1]]  # the motion node comes first
@@ -70,7 +70,7 @@ def sentence_fields(texts: CaptionTexts, counts: Sequence[int], width: int, devi
 
 
 def text_statistics(strings: Tensor, index: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean and std (W,) of the strings (U, W) at `index`, each counted as often as it occurs there."""
+    """Return mean and std (W,) of the strings (U, W) at `index`, each counted as often as it occurs there."""
     counts = torch.bincount(index, minlength=len(strings)).double()
     share = (counts / counts.sum().clamp(min=1))[:, None]
     values = strings.double()

@@ -2,7 +2,7 @@
 
 run/{stage}/checkpoint    to resume from
 run/{stage}/tensorboard   the curves
-run/{stage}/part          what is finished
+run/{stage}/part          the finished part
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from marey.data.licences import Terms, check_mix
 from marey.data.prepared import read_manifest
 from marey.nn import distributed
 from marey.training.budget import Budget
-from marey.training.loop import RunOptions, Stage, train
-from marey.training.parts import Part, load_part, load_sources, save_part
+from marey.training.loop import RunOptions, TrainingStage, train
+from marey.training.parts import TrainedPart, load_part, load_sources, save_part
 
 
-class ModelConfig(Protocol):
+class TrainableConfig(Protocol):
     """A model's configuration."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         ...
 
 
-C = TypeVar("C", bound=ModelConfig)
+C = TypeVar("C", bound=TrainableConfig)
 
 
 @dataclass(frozen=True)
@@ -53,21 +53,21 @@ class TrainOptions(Generic[C]):
     quiet: bool = False
 
     def options(self, stage: str) -> RunOptions:
-        """The loop's options for a stage."""
+        """Return the loop's options for a stage."""
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet
         )
 
 
 @dataclass(frozen=True)
-class Recipe(Generic[C]):
+class TrainingRecipe(Generic[C]):
     """The training stages of a model.
 
     Attributes:
-        read: a configuration from its plain values.
-        built_from: of each stage in training order the fields of the configuration that its networks are built from;
-            how stages were optimised may differ.
-        shares: how the minutes of a whole training are dealt out.
+        read: parses a configuration from its plain values.
+        built_from: for each stage in training order, the fields of the configuration that determine its networks; how
+            stages were optimised may differ.
+        shares: shares of the stages in the minutes of a whole training.
         most_steps: upper limits of steps for stages that overfit beyond them.
     """
 
@@ -78,16 +78,16 @@ class Recipe(Generic[C]):
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """Stages in training order."""
+        """Return stages in training order."""
         return tuple(self.built_from)
 
     def check_name(self, name: str) -> None:
-        """Refuse a stage that is not there."""
+        """Refuse an unknown stage."""
         if name not in self.stages:
             raise InvalidInput(f"unknown stage {name!r}", hint=f"Known: {', '.join(self.stages)}, all.")
 
-    def part(self, name: str, config: C, run: Path) -> Part:
-        """The finished part of a stage in a run folder.
+    def part(self, name: str, config: C, run: Path) -> TrainedPart:
+        """Return the finished part of a stage in a run folder.
 
         Raises:
             NotFound: not trained yet.
@@ -104,7 +104,7 @@ class Recipe(Generic[C]):
             )
         return part
 
-    def train(self, stage: Stage, options: TrainOptions[C]) -> dict[str, float]:
+    def train(self, stage: TrainingStage, options: TrainOptions[C]) -> dict[str, float]:
         """Train one stage; with `warm` from its finished part. See `part` for what is raised then.
 
         Raises:
@@ -137,19 +137,19 @@ def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: di
     if distributed.rank() == 0:
         budget = {"steps": options.budget.steps, "minutes": options.budget.minutes, "seed": options.seed}
         sources = ancestors(options, name)
-        part = Part(module.state_dict(), options.config.to_dict(), metrics, sha256, budget, sources)
+        part = TrainedPart(module.state_dict(), options.config.to_dict(), metrics, sha256, budget, sources)
         save_part(options.run / name / "part", part)
 
 
 def train_all(
-    recipe: Recipe[C], train_stage: Callable[[str, TrainOptions[C]], dict[str, float]], options: TrainOptions[C]
+    recipe: TrainingRecipe[C], train_stage: Callable[[str, TrainOptions[C]], dict[str, float]], options: TrainOptions[C]
 ) -> dict[str, float]:
-    """Train every stage that has not finished, one after another; `options.budget` is for all of them together.
+    """Train every unfinished stage in order; `options.budget` is for all of them together.
 
-    Called again after a kill it goes on where it stopped. Only minutes are dealt out: steps count for each stage.
+    A second call after a kill continues. Only minutes are shared among stages: steps count for each stage.
 
     Raises:
-        InvalidInput: no minutes are given, or a warm start is wanted.
+        InvalidInput: no minutes are given, or a warm start is requested.
     """
     if options.warm:
         raise InvalidInput("--warm needs a single stage", hint="Give --warm to one stage at a time.")
@@ -171,6 +171,6 @@ def train_all(
 
 
 def use_threads(threads: int) -> None:
-    """Set the number of torch threads; 0 keeps torch's own choice."""
+    """Set the number of torch threads; 0 keeps torch's default."""
     if threads:
         torch.set_num_threads(threads)

@@ -45,7 +45,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class CaptionTexts:
-    """Text features of all captions, clip by clip."""
+    """Text features of all captions, ordered by clip."""
 
     spec: TextSpec
     strings: NDArray[np.float16]  # (U, W)
@@ -68,10 +68,10 @@ class CaptionTexts:
         """Parse and encode the captions of each clip; equal texts are encoded once.
 
         Args:
-            captions: those of each clip.
-            pipeline: reads them here, with one process.
-            processes: that many read at once, each with the weights its `spec` names.
-            progress: called with what is done and all.
+            captions: captions of each clip.
+            pipeline: text pipeline for the single-process case.
+            processes: number of parallel processes, each with the weights of its `spec`.
+            progress: called with the number of done captions and of all.
         """
         flat = [caption for clip in captions for caption in clip]
         unique = list(dict.fromkeys(flat))
@@ -125,7 +125,7 @@ class CaptionTexts:
         """Read the `texts.npz` of a prepared folder.
 
         Raises:
-            NotFound: there is none yet.
+            NotFound: it does not exist yet.
             InvalidFile: broken, or made for other captions.
         """
         file = data.path / TEXTS
@@ -161,21 +161,21 @@ class CaptionTexts:
             ("edge_start", self.edge_start, len(self.edges)),
         ):
             if len(starts) == 0 or starts[0] != 0 or starts[-1] != size or (np.diff(starts) < 0).any():
-                return f"`{name}` does not lead through all rows"
+                return f"`{name}` does not cover all rows"
         if len(self.node_start) != captions + 1 or len(self.edge_start) != captions + 1:
             return "graphs and captions differ in number"
         if len(self.node_level) != len(self.node_string) or not _within(self.node_level, len(LEVELS)):
             return "`node_level` holds an invalid level"
         if not _within(self.node_string, len(self.strings)):
-            return "`node_string` names a string that is not there"
+            return "`node_string` names a missing string"
         nodes = np.repeat(np.diff(self.node_start), np.diff(self.edge_start))
         ends = self.edges[:, :2]
         if (ends < 0).any() or (ends >= nodes[:, None]).any() or not _within(self.edges[:, 2], len(EDGE_TYPES)):
-            return "`edges` names a node or a type that is not there"
+            return "`edges` names a missing node or type"
         return None
 
     def slots(self, max_actions: int, max_specifics: int) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
-        """Strings and edge types in fixed slots, as `SemanticGraph.slots` and `.adjacency` put them.
+        """Put strings and edge types in fixed slots, as `SemanticGraph.slots` and `.adjacency` do.
 
         Returns:
             (K, S) index of the string in each slot, -1 = absent, and (K, S, S) edge type, -1 = none, self-loops in.
@@ -212,7 +212,7 @@ Encode = Callable[[Sequence[Sequence[str]]], Iterator[NDArray[np.float16]]]
 
 @contextmanager
 def _readers(pipeline: TextPipeline, processes: int) -> Generator[tuple[Read, Encode]]:
-    """Functions that parse and encode chunks of texts, in order."""
+    """Return functions that parse and encode chunks of texts, in order."""
     if processes == 1:
         yield lambda chunks: map(pipeline.parse, chunks), lambda chunks: (_encode(pipeline, texts) for texts in chunks)
         return
@@ -249,7 +249,7 @@ def _starts(counts: Sequence[int]) -> NDArray[np.int64]:
 
 
 def _rank_within(group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Position of each element among those of its group, in order."""
+    """Return the position of each element among those of its group, in order."""
     order = np.argsort(group, kind="stable")
     ordered = group[order]
     begins = np.r_[0, np.flatnonzero(np.diff(ordered)) + 1]

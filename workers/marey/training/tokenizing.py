@@ -79,10 +79,11 @@ def tokenizer_loss(
     lengths: Tensor | None = None,
     fraction: float = 1.0,
 ) -> tuple[TokenizerLoss, Quantized]:
-    """Eq. 2 of HGM³, eq. 6 of MOGO without its last term, plus terms on the joints (ours): they are what is measured.
+    """Compute eq. 2 of HGM³, eq. 6 of MOGO without its last term, plus terms on the joints (ours), which metrics
+    measure.
 
-    The term in space rises with the budget's `fraction`: drift adds up over a window, and at first its gradient drowns
-    all others.
+    The term in space rises with the budget's `fraction`: drift adds up over a window, and at first its gradient
+    dominates all others.
 
     Args:
         model: the tokenizer.
@@ -116,7 +117,7 @@ def tokenizer_loss(
 
 
 def feature_weights(config: TokenizerTraining) -> Tensor:
-    """Weight of each feature column (D,) in the L1 term: 1, or `rotation_weight` for the 6-D rotations."""
+    """Return the weight of each feature column (D,) in the L1 term: 1, or `rotation_weight` for the 6-D rotations."""
     weights = torch.ones(config.features)
     start = 4 + 3 * (config.joints - 1)
     weights[start : start + 6 * (config.joints - 1)] = config.tokenizer.rotation_weight
@@ -128,8 +129,8 @@ def _average(values: Tensor, valid: Tensor) -> Tensor:
 
 
 SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
-"""Share of the windows drawn from a data set; others divide what is left. The first has 6 % of the clips, each of
-another content or style, and three times the error of the second when clips are drawn evenly."""
+"""Share of the windows drawn from a data set; others share the rest. The first has 6 % of the clips, each of another
+content or style, and three times the error of the second if clips are drawn evenly."""
 
 
 class TokenizerStage:
@@ -144,7 +145,7 @@ class TokenizerStage:
         module: MotionTokenizer,
         penalty: Callable[[], Tensor] | None = None,
     ) -> None:
-        """`module` is trained, on the data's statistics; `penalty` is added to its loss."""
+        """Train `module` on the data's statistics; `penalty` is added to its loss."""
         self.config = config
         self.optimisation = config.train_tokenizer
         self.data = data
@@ -158,11 +159,11 @@ class TokenizerStage:
         self.lengths = np.array([c.length - c.length % rate for c in self.train_clips])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """One group."""
+        """Return one group."""
         return [list(self.module.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """One window size a step, the batch scaled so that the number of frames stays."""
+        """Return the loss of one window size per step; the batch is scaled to a constant number of frames."""
         rng, config = context.rng, self.config
         window = int(rng.choice(config.windows))
         batch = max(1, self.optimisation.batch * min(config.windows) // window)
@@ -190,17 +191,17 @@ class TokenizerStage:
         """Do nothing: the codebooks are updated in the forward pass."""
 
     def validate(self) -> Mapping[str, float]:
-        """Errors on the validation clips, whole."""
+        """Return errors on whole validation clips."""
         return reconstruction_errors(self.module, self.config, self.data, self.data.originals("val"))
 
     def test(self) -> dict[str, float]:
-        """Errors on the captured test clips, whole."""
+        """Return errors on whole captured test clips."""
         errors = reconstruction_errors(self.module, self.config, self.data, self.data.originals("test"))
         return {f"test/{name}": value for name, value in errors.items()}
 
 
 def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
-    """Sampling weights (sum 1): longer clips more often, rare contents raised, data sets by their `SHARES`."""
+    """Return sampling weights (sum 1): longer clips more often, rare contents raised, data sets by their `SHARES`."""
     weights = sampling_weights(clips) * np.sqrt([c.length for c in clips])
     names = [dataset_of(c) for c in clips]
     named = sum(SHARES.get(n, 0.0) for n in set(names))
@@ -215,10 +216,10 @@ def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
 def reconstruction_errors(
     model: MotionTokenizer, config: TokenizerTraining, data: MotionData, clips: Sequence[Clip], *, batch: int = 64
 ) -> dict[str, float]:
-    """Mean joint error of whole clips, encoded and decoded, in millimetres.
+    """Return the mean joint error of whole clips after encoding and decoding, in millimetres.
 
-    `local_mm` with the pelvis laid over the true one in each frame, which is MoMask's MPJPE; `error_mm` in space, where
-    the drift of the root adds up over a clip; both averaged over clips, and again per data set (`local_mm/{dataset}`);
+    `local_mm` has the pelvis aligned in each frame, as MoMask's MPJPE; `error_mm` is in space, where the drift of the
+    root adds up over a clip; both are averaged over clips, and again per data set (`local_mm/{dataset}`);
     `perplexity/{level}` of the code usage.
     """
     model.eval()

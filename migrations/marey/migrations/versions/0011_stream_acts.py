@@ -1,4 +1,4 @@
-"""Acts of a stream: whoever goes on with it knows which one plays."""
+"""Starts of the actions of a stream, so that a worker that resumes it knows the current one."""
 
 from alembic import op
 

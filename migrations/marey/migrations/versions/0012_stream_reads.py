@@ -1,4 +1,4 @@
-"""How prompts of a stream were read: whoever watches is told what a rewriter made of them."""
+"""How prompts of a stream were rewritten, for its viewers."""
 
 from alembic import op
 

@@ -126,7 +126,7 @@ TRIGGERS = f"""
         EXECUTE FUNCTION motion_search_update();
 """  # noqa: S608 - of constants alone
 
-# Where replication or a bulk load switches triggers off, these still run: nobody else writes the table.
+# Where replication or a bulk load switches triggers off, these still run: no other code writes the table.
 ALWAYS = """
     ALTER TABLE motion
         ENABLE ALWAYS TRIGGER motion_search_insert,

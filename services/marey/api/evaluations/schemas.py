@@ -21,7 +21,7 @@ BUNDLE = rf"^{MODEL.pattern}$"
 
 
 class EvaluationPromptBody(BaseModel):
-    """One prompt. For the documentation: `marey.items.evaluation_prompts` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.items.evaluation_prompts` validates it, with more detailed messages."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -155,8 +155,8 @@ class EvaluationDetailView(EvaluationView):
         cls, row: EvaluationRow, events: Sequence[EvaluationEvent], waits_for: str | None
     ) -> EvaluationDetailView:
         """Convert a row, its events, and the name of the queue it waits for."""
-        told = [EvaluationEventView(state=event.state, reason=event.reason, at=event.at) for event in events]
-        return cls(events=told, waits_for=waits_for, **_fields(row))
+        changes = [EvaluationEventView(state=event.state, reason=event.reason, at=event.at) for event in events]
+        return cls(events=changes, waits_for=waits_for, **_fields(row))
 
 
 def _fields(row: EvaluationRow) -> dict[str, Any]:

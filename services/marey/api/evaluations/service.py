@@ -16,7 +16,7 @@ from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationFields
 from marey.api.jobs.service import Fields, read_fields, request_sha256
 from marey.core.errors import InvalidInput, NotFound
 from marey.core.settings import Settings
-from marey.evaluations.requests import Plan, plan_evaluation
+from marey.evaluations.requests import EvaluationPlan, plan_evaluation
 from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
 from marey.items.item import CHECKS, InvalidItems, Problem
 
@@ -26,14 +26,14 @@ HINT = 'Write {"bundle": "hgm3", "split": "test"}, or "prompts": [{"prompt": "â€
 
 
 @dataclass(frozen=True)
-class Asked:
+class ParsedEvaluation:
     """A parsed evaluation request."""
 
     request: evaluations.EvaluationRequest
     prompts: tuple[EvaluationPrompt, ...] | None
     """None = those of the evaluator's bundle."""
 
-    def planned(self, config: Settings) -> Plan:
+    def planned(self, config: Settings) -> EvaluationPlan:
         """Return the plan that would run now.
 
         Raises:
@@ -50,7 +50,9 @@ def prompts_document(body: BinaryIO, *, at: tuple[str, ...] = ("prompts",), hint
     return Document(body, at, hint=hint, limit=MAX_PROMPTS)
 
 
-def read_asked(model: type[Fields], values: Mapping[str, Any], document: Document) -> tuple[Fields, Asked]:
+def parse_evaluation(
+    model: type[Fields], values: Mapping[str, Any], document: Document
+) -> tuple[Fields, ParsedEvaluation]:
     """Parse the fields of a body, which include those of an evaluation, and its prompts.
 
     Args:
@@ -68,7 +70,7 @@ def read_asked(model: type[Fields], values: Mapping[str, Any], document: Documen
     if other is not None:
         raise InvalidInput("is not a list", where="prompts", hint=HINT)
     assert isinstance(fields, EvaluationFields)
-    return fields, _asked(fields, document)
+    return fields, _parsed(fields, document)
 
 
 def create(
@@ -78,11 +80,11 @@ def create(
     which.
 
     Raises:
-        InvalidItems, InvalidInput, InvalidBundle, Refused: see `read_asked` and `Asked.planned`.
+        InvalidItems, InvalidInput, InvalidBundle, Refused: see `parse_evaluation` and `ParsedEvaluation.planned`.
         IdempotencyMismatch: the key was used with another request.
     """
     document = prompts_document(body)
-    fields, asked = read_asked(NewEvaluationBody, document.fields(), document)
+    fields, asked = parse_evaluation(NewEvaluationBody, document.fields(), document)
     plan = asked.planned(shared.config)
     with db.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
@@ -103,7 +105,7 @@ def create(
         return detail(conn, evaluations.get_evaluation(conn, key.tenant, made)), replayed
 
 
-def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
+def stored(conn: sa.Connection, tenant: str, plan: EvaluationPlan) -> str:
     """Store the prompts of a plan and return their digest. Validates the baseline, too.
 
     Raises:
@@ -121,14 +123,14 @@ def detail(conn: sa.Connection, row: evaluations.EvaluationRow) -> EvaluationDet
     )
 
 
-def _asked(fields: EvaluationFields, document: Document) -> Asked:
+def _parsed(fields: EvaluationFields, document: Document) -> ParsedEvaluation:
     if document.has_list == (fields.split is not None):
         what = "both are given" if document.has_list else "neither is given"
         raise InvalidInput(f"an evaluation has a split or prompts, and {what}", where="split, prompts", hint=HINT)
     prompts = read_prompts(document.elements(), where="prompts") if fields.split is None else None
     source = (fields.split if prompts is None else fields.source) or OWN_PROMPTS
     if prompts is not None and source in evaluations.BUNDLE_SOURCES:
-        raise InvalidInput(f"{source!r} is what the evaluator's own prompts are called", where="source")
+        raise InvalidInput(f"{source!r} is reserved for the evaluator's own prompts", where="source")
     request = evaluations.EvaluationRequest(
         bundle=fields.bundle,
         evaluator=fields.evaluator,
@@ -138,7 +140,7 @@ def _asked(fields: EvaluationFields, document: Document) -> Asked:
         seed=fields.seed,
         baseline=fields.baseline,
     )
-    return Asked(request, prompts)
+    return ParsedEvaluation(request, prompts)
 
 
 def _settings(given: Mapping[str, Any] | None) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from marey.api.readiness import Check
+from marey.api.readiness import DependencyCheck
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
 from marey.db import check_revision, transaction
@@ -13,17 +13,19 @@ from marey.runtime.queue import check_queue
 from marey.storage import AssetStore
 
 
-def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> dict[str, Check]:
+def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> dict[str, DependencyCheck]:
     """Return the checks of an API process, by the name that `/readyz` shows."""
     return {
-        "database": Check(
+        "database": DependencyCheck(
             lambda: check_revision(engine), "the database does not answer, or it or its tables are too old"
         ),
-        "queue": Check(lambda: _check_queue(config), "the queue does not answer, or is too old"),
-        "store": Check(store.check, "the asset store does not answer"),
-        "model": Check(ModelCheck(engine), "no worker has its model loaded yet"),
+        "queue": DependencyCheck(lambda: _check_queue(config), "the queue does not answer, or is too old"),
+        "store": DependencyCheck(store.check, "the asset store does not answer"),
+        "model": DependencyCheck(ModelCheck(engine), "no worker has its model loaded yet"),
         # Submits and reads work without a scheduler, so a load balancer must not remove this API.
-        "scheduler": Check(lambda: _check_scheduler(engine), "the scheduler stalls or was killed", required=False),
+        "scheduler": DependencyCheck(
+            lambda: _check_scheduler(engine), "the scheduler stalls or was killed", required=False
+        ),
     }
 
 

@@ -14,13 +14,23 @@ from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
 from marey.http.problems import QuotaBody
 from marey.http.schemas import Comment, Name, View
 from marey.items.item import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
-from marey.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
+from marey.jobs import (
+    MAX_KEEP_DAYS,
+    EventRow,
+    FailureReason,
+    ItemRow,
+    ItemStage,
+    ItemState,
+    JobControl,
+    JobRow,
+    JobState,
+)
 
 MAX_PRIORITY = 1000
 
 
 class NewItemBody(BaseModel):
-    """One prompt. For the documentation: `marey.items.item.read_item` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.items.item.read_item` validates it, with more detailed messages."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -144,7 +154,7 @@ class ErrorView(View):
     hint: str | None
 
     @classmethod
-    def of(cls, problem: Problem) -> ErrorView:
+    def of(cls, problem: FailureReason) -> ErrorView:
         """Convert a row's problem."""
         return cls(type=problem.type, message=problem.message, where=problem.where, hint=problem.hint)
 
@@ -165,7 +175,7 @@ class ItemView(View):
     seconds: float | None
     settings: dict[str, Any]
     tags: list[str]
-    stage: Stage
+    stage: ItemStage
     state: ItemState
     attempts: int
     reason: str | None

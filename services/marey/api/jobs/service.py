@@ -37,7 +37,7 @@ class Submission:
     by_bundle: Counter[tuple[str, str]]
     """Number of motions by model and exact bundle."""
     _raws: Raws
-    _offers: Mapping[str | None, GeneratorCapabilities]
+    _generators: Mapping[str | None, GeneratorCapabilities]
     """Generator capabilities by the item's model name."""
 
     @property
@@ -48,7 +48,7 @@ class Submission:
     def new_items(self) -> Iterator[NewItem]:
         """Yield one row per motion: the body is read a second time, so that it is never in memory as a whole."""
         items = read_items(self._raws())
-        return new_items((item, self._offers[item.model]) for item in items)
+        return new_items((item, self._generators[item.model]) for item in items)
 
 
 def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Submission:
@@ -94,7 +94,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
-    offers: dict[str | None, GeneratorCapabilities] = {}
+    generators: dict[str | None, GeneratorCapabilities] = {}
     failed: dict[str | None, MareyError] = {}
     """Models of a body by name; a missing one is looked up once, for any number of lines."""
     default_model: set[Problem] = set()
@@ -111,11 +111,11 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
         """Yield problems of an item that its model cannot handle."""
         model = values.get("model")
         if model not in failed:
-            if model not in offers and len(offers) + len(failed) == MAX_MODELS:
+            if model not in generators and len(generators) + len(failed) == MAX_MODELS:
                 hint = "Submit them as several jobs."
                 raise TooLarge(f"names over {MAX_MODELS} models", where=f"line {line}", hint=hint)
             try:
-                offers[model] = catalogue.offer(model)
+                generators[model] = catalogue.capabilities(model)
             except MareyError as error:
                 failed[model] = error
         if (error := failed.get(model)) is not None:
@@ -125,8 +125,8 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             if model is None:
                 default_model.add(problem)
             return
-        offer = offers[model]
-        for field, hold in (("seconds", offer.check_seconds), ("settings", offer.check_settings)):
+        generator = generators[model]
+        for field, hold in (("seconds", generator.check_seconds), ("settings", generator.check_settings)):
             try:
                 if field in values:
                     hold(values[field])
@@ -134,9 +134,9 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
                 yield _problem(error, line, field)
 
     for item in read_items(counted(), check=check):
-        bundle = offers[item.model].bundle
+        bundle = generators[item.model].bundle
         by_bundle[bundle.manifest.model, bundle.reference] += item.variants
-    return Submission(fields, by_bundle.total(), by_bundle, raws, offers)
+    return Submission(fields, by_bundle.total(), by_bundle, raws, generators)
 
 
 def _problem(error: MareyError, line: int | None, field: str) -> Problem:

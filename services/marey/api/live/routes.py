@@ -31,7 +31,7 @@ def examples(catalogue: Catalogue) -> tuple[str, ...]:
     Measured by `python -m marey.models.mogo.examples`.
     """
     try:
-        reference = catalogue.offer(catalogue.live_model).bundle.reference
+        reference = catalogue.capabilities(catalogue.live_model).bundle.reference
     except MareyError:
         return ()  # no such model here: the page reports it when a stream is started
     return tuple(row["prompt"] for row in _measured().get(reference, [])[:MOST_EXAMPLES])

@@ -11,7 +11,7 @@ from marey.api.context import Shared
 from marey.api.models.schemas import ModelsView, ModelView
 from marey.bundles import named_by
 from marey.http.problems import RESPONSES
-from marey.jobs.generators import offers
+from marey.jobs.generators import list_generators
 
 router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 
@@ -19,7 +19,7 @@ router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 @router.get("")
 def list_models(shared: Shared, key: Reader) -> ModelsView:
     """List the bundles that this server can make motions with."""
-    return ModelsView.of(offers(shared.config))
+    return ModelsView.of(list_generators(shared.config))
 
 
 @router.get("/{name}")
@@ -28,4 +28,4 @@ def get_model(
 ) -> ModelView:
     """Get the bundle of a model's or bundle's name."""
     with named_by("name"):
-        return ModelView.of(shared.catalogue.offer(name))
+        return ModelView.of(shared.catalogue.capabilities(name))

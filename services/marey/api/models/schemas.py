@@ -55,16 +55,16 @@ class ModelView(View):
     """Capabilities and limits of the model, in a few lines; empty if the model is not installed on the server."""
 
     @classmethod
-    def of(cls, offer: GeneratorCapabilities) -> ModelView:
+    def of(cls, generator: GeneratorCapabilities) -> ModelView:
         """Convert capabilities."""
-        manifest = offer.bundle.manifest
+        manifest = generator.bundle.manifest
         spec = find_model(manifest.model)
         own = ("name", "model", "version", "config", "random", "licence", "commercial", "skeleton", "fps", "metrics")
         return cls(
-            bundle=offer.bundle.reference,
-            min_seconds=offer.min_seconds,
-            max_seconds=offer.max_seconds,
-            encoder=offer.text.encoder,
+            bundle=generator.bundle.reference,
+            min_seconds=generator.min_seconds,
+            max_seconds=generator.max_seconds,
+            encoder=generator.text.encoder,
             data=[DataView(name=d.name, licence=d.licence, credit=d.credit) for d in manifest.data],
             settings=[
                 SettingView(
@@ -75,7 +75,7 @@ class ModelView(View):
                     whole=each.whole,
                     help=each.help,
                 )
-                for each in settings_of(offer.bundle)
+                for each in settings_of(generator.bundle)
             ],
             about="" if spec is None else spec.about,
             **{name: getattr(manifest, name) for name in own},
@@ -103,9 +103,9 @@ class ModelsView(View):
     """Bundles that are left out, each with the reason."""
 
     @classmethod
-    def of(cls, offers: GeneratorList) -> ModelsView:
+    def of(cls, generators: GeneratorList) -> ModelsView:
         """Convert the bundles of this machine."""
         return cls(
-            items=[ModelView.of(offer) for offer in offers.found],
-            broken=[BrokenView.of(broken) for broken in offers.broken],
+            items=[ModelView.of(generator) for generator in generators.found],
+            broken=[BrokenView.of(broken) for broken in generators.broken],
         )

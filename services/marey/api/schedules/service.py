@@ -9,7 +9,7 @@ from marey import db, evaluations, tenants
 from marey.api.audit import note
 from marey.api.context import Context
 from marey.api.evaluations.schemas import AskedFields
-from marey.api.evaluations.service import prompts_document, read_asked, stored
+from marey.api.evaluations.service import parse_evaluation, prompts_document, stored
 from marey.api.jobs.service import read_fields
 from marey.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
 from marey.core.errors import InvalidInput
@@ -24,7 +24,7 @@ def create(shared: Context, key: tenants.ApiKey, body: BinaryIO) -> ScheduleView
         InvalidItems, InvalidInput, InvalidBundle, Refused: invalid times, or an evaluation that cannot run.
     """
     document = prompts_document(body, hint=HINT)
-    fields, asked = read_asked(NewScheduleBody, document.fields(), document)
+    fields, asked = parse_evaluation(NewScheduleBody, document.fields(), document)
     plan = asked.planned(shared.config)
     with db.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
@@ -54,7 +54,7 @@ def change(shared: Context, key: tenants.ApiKey, schedule: UUID, body: BinaryIO)
     if request is not None and not isinstance(request, dict):
         raise InvalidInput("is not an object", where="request", hint=HINT)
     fields = read_fields(ScheduleFields, values)
-    asked = None if request is None else read_asked(AskedFields, request, document)[1]
+    asked = None if request is None else parse_evaluation(AskedFields, request, document)[1]
     plan = None if asked is None else asked.planned(shared.config)
     with db.transaction(shared.engine) as conn:
         changed = None

@@ -14,7 +14,7 @@ from starlette.websockets import WebSocketDisconnect
 from marey.api.auth import authenticated, authorize, check_scope
 from marey.api.context import Context
 from marey.api.streams import service
-from marey.api.streams.session import Session, SessionRequest
+from marey.api.streams.session import SessionRequest, StreamSession
 from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import InvalidInput, MareyError, NotFound
 from marey.db import transaction
@@ -46,7 +46,7 @@ async def accept_connection(websocket: WebSocket, stream: str, shared: Context) 
             secret = key_of(websocket.headers.get("authorization"), offered)
             request = await hub.call(lambda: _authorize(shared, secret, stream, websocket.query_params))
             with hub.slots.take(request.key):
-                await Session(writer, hub, shared, request).run()
+                await StreamSession(writer, hub, shared, request).run()
         except MareyError as error:
             await writer.refuse(error)
         except Exception:

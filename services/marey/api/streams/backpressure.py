@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from marey.api.stream_hub import Hub
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 
 BEHIND_FRAMES = 40
 """Two seconds."""
@@ -47,11 +47,11 @@ class BackpressurePause:
             Unreachable: Redis does not answer.
         """
         if not self._pulled:
-            await self._hub.call(lambda: self._control.send(Control("pause")))
+            await self._hub.call(lambda: self._control.send(StreamControl("pause")))
             self._pulled = True
 
     async def release(self) -> None:
         """Resume the stream, if it was paused here; raises as `engage`."""
         if self._pulled:
-            await self._hub.call(lambda: self._control.send(Control("resume")))
+            await self._hub.call(lambda: self._control.send(StreamControl("resume")))
             self._pulled = False

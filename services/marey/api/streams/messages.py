@@ -13,7 +13,7 @@ from marey.api.streams import service
 from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import Busy, MareyError, TooLarge
 from marey.items.prompts import check_prompt
-from marey.streams.control import Control
+from marey.streams.control import StreamControl
 from marey.tenants import ApiKey
 
 MAX_BYTES = 8 * 1024
@@ -22,7 +22,7 @@ A_SECOND = 20
 """Maximum messages a second."""
 
 
-class Rate:
+class MessageRateLimit:
     """Token bucket of messages per second."""
 
     def __init__(self, a_second: int) -> None:
@@ -40,14 +40,14 @@ class Rate:
         return True
 
 
-class Messages:
+class ControlMessages:
     """Receives the control messages of one client and forwards them, one after the other."""
 
     def __init__(self, writer: SocketWriter, hub: Hub, shared: Context, key: ApiKey, stream: UUID) -> None:
         self._writer, self._hub, self._shared, self._key, self._stream = writer, hub, shared, key, stream
-        self._rate = Rate(A_SECOND)
+        self._rate = MessageRateLimit(A_SECOND)
 
-    async def obey(self) -> None:
+    async def forward(self) -> None:
         """Forward messages until the client disconnects or the server stops."""
         while (message := await self._writer.receive()) is not None:
             try:
@@ -57,7 +57,7 @@ class Messages:
             except MareyError as error:
                 await self._writer.send_error(error)
 
-    def _control(self, message: bytes) -> Control:
+    def _control(self, message: bytes) -> StreamControl:
         """Parse and validate a message.
 
         Raises:
@@ -68,7 +68,7 @@ class Messages:
         check_scope(self._key, "submit")
         if len(message) > MAX_BYTES:
             raise TooLarge(f"the message is over {MAX_BYTES // 1024} KiB", where="message")
-        control = Control.from_bytes(message)
+        control = StreamControl.from_bytes(message)
         if control.prompt is not None:
-            control = Control("steer", check_prompt(control.prompt, where="prompt"))
+            control = StreamControl("steer", check_prompt(control.prompt, where="prompt"))
         return control

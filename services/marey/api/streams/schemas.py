@@ -68,7 +68,7 @@ class SkeletonView(View):
 
 
 @dataclass(frozen=True)
-class Made:
+class BundleFacts:
     """Data of a stream's bundle; empty if the bundle no longer exists here."""
 
     licence: str | None = None
@@ -76,7 +76,7 @@ class Made:
     skeleton: SkeletonView | None = None
 
     @classmethod
-    def by(cls, bundle: Bundle) -> Made:
+    def by(cls, bundle: Bundle) -> BundleFacts:
         """Read a bundle."""
         manifest = bundle.manifest
         skeleton = None if manifest.layout is None else SkeletonView.of(layout(manifest.layout).skeleton)
@@ -93,10 +93,12 @@ class PromptView(View):
     not_rewritten: str | None = Field(description="Reason why a rewrite was not used.")
 
     @classmethod
-    def of(cls, number: int, told: StreamPrompt) -> PromptView:
+    def of(cls, number: int, recorded: StreamPrompt) -> PromptView:
         """Convert a recorded prompt."""
-        rewritten, reason = (None, None) if told.read is None else told.read
-        return cls(number=number, frame=told.frame, prompt=told.prompt, rewritten=rewritten, not_rewritten=reason)
+        rewritten, reason = (None, None) if recorded.read is None else recorded.read
+        return cls(
+            number=number, frame=recorded.frame, prompt=recorded.prompt, rewritten=rewritten, not_rewritten=reason
+        )
 
 
 class StreamView(View):
@@ -122,7 +124,7 @@ class StreamView(View):
     ended: datetime | None
 
     @classmethod
-    def of(cls, row: StreamRow, made: Made) -> StreamView:
+    def of(cls, row: StreamRow, made: BundleFacts) -> StreamView:
         """Convert a row."""
         return cls(**_fields(row, made))
 
@@ -134,10 +136,10 @@ class StreamDetailView(StreamView):
     skeleton: SkeletonView | None = Field(description=f"Skeleton of the frames; {GONE}")
 
     @classmethod
-    def detail(cls, row: StreamRow, made: Made, prompts: Sequence[StreamPrompt]) -> StreamDetailView:
+    def detail(cls, row: StreamRow, made: BundleFacts, prompts: Sequence[StreamPrompt]) -> StreamDetailView:
         """Convert a row, and its prompts with the frame each is in force from."""
-        told = [PromptView.of(number, prompt) for number, prompt in enumerate(prompts)]
-        return cls(prompts=told, skeleton=made.skeleton, **_fields(row, made))
+        recorded = [PromptView.of(number, prompt) for number, prompt in enumerate(prompts)]
+        return cls(prompts=recorded, skeleton=made.skeleton, **_fields(row, made))
 
 
 class StreamMessage(View):
@@ -172,7 +174,7 @@ class EndMessage(View):
 SocketMessage = StreamMessage | GapMessage | ErrorMessage | EndMessage
 
 
-def _fields(row: StreamRow, made: Made) -> dict[str, Any]:
+def _fields(row: StreamRow, made: BundleFacts) -> dict[str, Any]:
     apart = {"error", "licence", "fps"}
     own = {name: getattr(row, name) for name in StreamView.model_fields if name not in apart}
     error = None if row.problem is None else ErrorView.of(row.problem)

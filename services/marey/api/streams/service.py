@@ -13,7 +13,7 @@ from marey.api.audit import note
 from marey.api.catalogue import Catalogue
 from marey.api.context import Context
 from marey.api.stream_hub import Hub
-from marey.api.streams.schemas import Made, NewStreamBody, StreamDetailView
+from marey.api.streams.schemas import BundleFacts, NewStreamBody, StreamDetailView
 from marey.bundles import named_by
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
 from marey.db import transaction
@@ -21,7 +21,7 @@ from marey.items.item import MAX_SEED, Item, read_item
 from marey.jobs.generators import GeneratorCapabilities
 from marey.registry import find_model, model_names
 from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, prompts_with_rewrites
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.notifier import StreamNotifier
 from marey.streams.states import OPEN_STREAMS
 from marey.tenants import ApiKey
@@ -74,15 +74,15 @@ def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetail
     return StreamDetailView.detail(row, made_by(shared, row), prompts_with_rewrites(conn, row.id))
 
 
-def made_by(shared: Context, row: StreamRow) -> Made:
+def made_by(shared: Context, row: StreamRow) -> BundleFacts:
     """Return the data of a stream's bundle, if it still exists: an ended stream outlives its bundle."""
     try:
-        return Made.by(shared.catalogue.offer(row.bundle).bundle)
+        return BundleFacts.by(shared.catalogue.capabilities(row.bundle).bundle)
     except (NotFound, InvalidBundle, Refused):
-        return Made()
+        return BundleFacts()
 
 
-def made_by_each(shared: Context, rows: Sequence[StreamRow]) -> list[Made]:
+def made_by_each(shared: Context, rows: Sequence[StreamRow]) -> list[BundleFacts]:
     """Return `made_by` of each row; each bundle is read once."""
     found = {row.bundle: row for row in rows}
     views = {name: made_by(shared, row) for name, row in found.items()}
@@ -94,7 +94,7 @@ def is_over(row: StreamRow) -> bool:
     return row.state not in OPEN_STREAMS
 
 
-def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> None:
+def command(shared: Context, key: ApiKey, stream: UUID, control: StreamControl) -> None:
     """Send a control message to an open stream. Steers are frequent, and are recorded with the stream itself.
 
     Raises:
@@ -131,21 +131,21 @@ def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
         end_stream(conn, stream, NEVER_TAKEN, STOPPED)
         row = get_stream(conn, key.tenant, stream)
     if not is_over(row):
-        ControlQueue(hub_of(shared).redis, str(stream)).send(Control("stop"))
+        ControlQueue(hub_of(shared).redis, str(stream)).send(StreamControl("stop"))
     return row
 
 
 def _new_stream(key: ApiKey, body: NewStreamBody, catalogue: Catalogue) -> NewStream:
     item = _checked(body)
-    offer = _offer(item, catalogue)
-    manifest = offer.bundle.manifest
+    generator = _generator(item, catalogue)
+    manifest = generator.bundle.manifest
     fps = manifest.fps or 0.0  # generator capabilities always include one
     return NewStream(
         tenant=key.tenant,
         key=key.id,
         prompt=item.prompt,
         model=manifest.model,
-        bundle=offer.bundle.reference,
+        bundle=generator.bundle.reference,
         seed=secrets.randbelow(MAX_SEED + 1) if item.seed is None else item.seed,
         max_frames=round(body.seconds * fps),
         name=item.name,
@@ -161,14 +161,14 @@ def _checked(body: NewStreamBody) -> Item:
     return item
 
 
-def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
+def _generator(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
     """Return the capabilities of the stream's bundle."""
     try:
         with named_by("model"):
-            offer = catalogue.offer(item.model or catalogue.live_model)
+            generator = catalogue.capabilities(item.model or catalogue.live_model)
     except NotFound as error:  # the problem is a field's, not the path's
         raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
-    manifest = offer.bundle.manifest
+    manifest = generator.bundle.manifest
     spec = find_model(manifest.model)
     if spec is None or spec.live is None:
         live = [name for name in model_names() if (each := find_model(name)) and each.live]
@@ -177,4 +177,4 @@ def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
             where="model",
             hint=f"Bundles of {', '.join(live) or 'no model that is installed here'} can.",
         )
-    return offer
+    return generator

@@ -18,8 +18,8 @@ from starlette.websockets import WebSocketDisconnect
 from marey.api.context import Context
 from marey.api.stream_hub import Hub
 from marey.api.streams.backpressure import BLOCKED_SECONDS, BackpressurePause, LagTracker
-from marey.api.streams.messages import Messages
-from marey.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
+from marey.api.streams.messages import ControlMessages
+from marey.api.streams.schemas import BundleFacts, EndMessage, GapMessage, StreamDetailView, StreamMessage
 from marey.api.streams.service import is_over
 from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import MareyError, Unreachable
@@ -58,12 +58,12 @@ class SessionRequest:
     key: ApiKey
     row: StreamRow
     prompts: Sequence[StreamPrompt]
-    made: Made
+    made: BundleFacts
     first: int
     pauses: bool
 
 
-class Session:
+class StreamSession:
     """Streams frames and messages to one client.
 
     Args:
@@ -79,7 +79,7 @@ class Session:
         name = str(request.row.id)
         self._frames = FrameStream(hub.redis, name)
         self._presence = ViewerPresence(hub.redis, name)
-        self._messages = Messages(writer, hub, shared, request.key, request.row.id)
+        self._messages = ControlMessages(writer, hub, shared, request.key, request.row.id)
         self._pause = BackpressurePause(hub, ControlQueue(hub.redis, name))
         self._lag = LagTracker()
         self._at = request.first
@@ -91,7 +91,7 @@ class Session:
 
     async def run(self) -> None:
         """Run until the stream ends, the client disconnects or the server stops."""
-        tasks = [self._show, self._messages.obey, self._renew]
+        tasks = [self._show, self._messages.forward, self._renew]
         if self._request.pauses:
             tasks.append(self._hold)
         try:

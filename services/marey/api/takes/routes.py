@@ -51,13 +51,13 @@ def motion_filter(
     review: Annotated[list[ReviewFilter] | None, Query(description="One of these review states.")] = None,
 ) -> takes_store.MotionFilter:
     """Filters of a motion listing; all given ones must match."""
-    said = review or []
+    chosen_reviews = review or []
     return takes_store.MotionFilter(
         tags=tag or (),
         name=name and unicodedata.normalize("NFC", name),  # as stored names and prompts
         text=text and unicodedata.normalize("NFC", text),
-        reviews=[jobs.Review(each) for each in said if each is not ReviewFilter.NEW],
-        unreviewed=ReviewFilter.NEW in said,
+        reviews=[jobs.Review(each) for each in chosen_reviews if each is not ReviewFilter.NEW],
+        unreviewed=ReviewFilter.NEW in chosen_reviews,
     )
 
 

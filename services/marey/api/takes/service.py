@@ -35,9 +35,9 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
         settings={name: value for name, value in row.settings.items() if isinstance(value, int | float)},
     )
     try:
-        offer = catalogue.offer(row.bundle)
-        offer.check_seconds(item.seconds)
-        offer.check_settings(item.settings)
+        generator = catalogue.capabilities(row.bundle)
+        generator.check_seconds(item.seconds)
+        generator.check_settings(item.settings)
     except MareyError as error:
         if error.status >= 500:
             raise
@@ -46,4 +46,4 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
             where=f"item {row.id}",
             hint=error.hint or "Submit the prompt as a new job.",
         ) from error
-    return next(new_items([(item, offer)]))
+    return next(new_items([(item, generator)]))

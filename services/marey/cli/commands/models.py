@@ -104,10 +104,10 @@ def _local_models() -> dict[str, Any]:
     try:
         from marey.api.models.schemas import ModelsView
         from marey.core.settings import settings
-        from marey.jobs.generators import offers
+        from marey.jobs.generators import list_generators
     except ImportError as error:
         raise needs_extra("server", error) from error
-    return ModelsView.of(offers(settings())).model_dump(mode="json")
+    return ModelsView.of(list_generators(settings())).model_dump(mode="json")
 
 
 def _local_model(name: str) -> dict[str, Any]:
@@ -119,7 +119,7 @@ def _local_model(name: str) -> dict[str, Any]:
         from marey.core.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
-    return ModelView.of(Catalogue(settings()).offer(name)).model_dump(mode="json")
+    return ModelView.of(Catalogue(settings()).capabilities(name)).model_dump(mode="json")
 
 
 def _length(model: dict[str, Any]) -> str:

@@ -2,7 +2,7 @@
 
 Reading accepts files of other programs: six channels a joint, positions that replace the OFFSET or are added to it,
 any rotation order, tabs, CRLF, wrong frame counts, a T-pose before the first frame. Oddities without consequence are
-listed in `BvhClip.notes`; what is broken raises InvalidFile with its line number.
+listed in `BvhClip.notes`; broken files raise InvalidFile with a line number.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from marey.core.errors import InvalidFile, TooLarge
 from marey.motion.files import read_limited
-from marey.motion.io.bvh_header import LARGEST, Header, Joint
+from marey.motion.io.bvh_header import LARGEST, BvhHeader, Joint
 from marey.motion.io.bvh_write import format_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
@@ -25,7 +25,7 @@ from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "read_bvh", "write_bvh"]
 
-MAX_BYTES = 512 * 2**20  # the longest capture takes we know are under 100 MB
+MAX_BYTES = 512 * 2**20  # the longest known capture takes are under 100 MB
 MAX_FRAMES = 1_000_000  # over two hours at 120 fps
 
 
@@ -38,10 +38,10 @@ class BvhClip:
         rotations: (T, J, 4) float64 local quaternions.
         root: (T, 3) float64 position of joint 0.
         positions: (T, J, 3) local translations in place of the offsets, when a joint under the root moves; else None.
-        fps: frames a second; a rounded frame time is taken back to the rate it was rounded from.
+        fps: frames a second; a rounded frame time is converted back to the rate it was rounded from.
         ends: (J, 3) offset of the End Site, NaN where there is none.
         rest: the first frame's joints (J, 3), if it was a rest pose and has been left out.
-        notes: oddities of the file, for a person.
+        notes: oddities of the file, as sentences.
     """
 
     skeleton: Skeleton
@@ -70,16 +70,16 @@ def read_bvh(
 
     Args:
         path: the file.
-        unit: what its lengths are in.
-        up: which axis of the file points up.
+        unit: unit of its lengths.
+        up: the axis of the file that points up.
         rest_frame: drop the first frame if it is a rest pose (`auto`: if it differs clearly from the motion).
         translation: position channels replace the OFFSET (Blender) or are added to it (three.js, iClone);
-            `auto` finds out.
+            `auto` detects it.
 
     Raises:
         NotFound: no such file.
         InvalidFile: broken, with the line number.
-        TooLarge: over the limits above.
+        TooLarge: over `MAX_BYTES`, `MAX_FRAMES` or the limit of joints.
     """
     path = Path(path)
     data = read_limited(path, MAX_BYTES)
@@ -99,7 +99,7 @@ def parse_bvh(
     if len(data) > MAX_BYTES:
         message = f"{len(data) / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB"
         raise TooLarge(message, where=where)
-    header = Header(data, where)
+    header = BvhHeader(data, where)
     notes = header.notes
     values = _numbers(data, header, where)
     joints, scale = header.joints, METRES[unit]
@@ -125,7 +125,7 @@ def parse_bvh(
     if up == "z":
         offsets, moving, root, ends = (rotate(Z_TO_Y, a) for a in (offsets, moving, root, ends))
         rotations = multiply(multiply(Z_TO_Y, rotations), Z_TO_Y * [1, -1, -1, -1])
-    still = np.ptp(moving[:, 1:], axis=0).max(initial=0.0) < 1e-4  # metres: what rounding in a file can do
+    still = np.ptp(moving[:, 1:], axis=0).max(initial=0.0) < 1e-4  # metres: the rounding of a file
     offsets = np.concatenate([np.zeros((1, 3)), moving[:, 1:].mean(axis=0) if still else offsets[1:]])
     skeleton = tree.with_offsets(offsets)
     clip = BvhClip(skeleton, unroll(rotations), root, None if still else moving, header.fps, ends, None, tuple(notes))
@@ -150,7 +150,8 @@ def _without_first(clip: BvhClip) -> BvhClip:
 
 
 def _translations(joints: list[Joint], values: Array) -> tuple[Array, Array, Array]:
-    """Offsets (J, 3), the position channels (T, J, 3) and which there are (J, 3), in the file's unit."""
+    """Return offsets (J, 3), the position channels (T, J, 3) and a mask of existing channels (J, 3), in the file's
+    unit."""
     offsets = np.array([j.offset for j in joints], np.float64)
     channels = np.zeros((len(values), *offsets.shape))
     given = np.zeros(offsets.shape, bool)
@@ -194,10 +195,11 @@ def _unique(names: list[str], notes: list[str]) -> tuple[str, ...]:
     return tuple(unique)
 
 
-def _numbers(data: bytes, header: Header, where: str) -> Array:
-    """The motion (T, C). Fast where all is well; only a broken file is read again line by line, to say where."""
+def _numbers(data: bytes, header: BvhHeader, where: str) -> Array:
+    """Parse the motion (T, C). The fast path reads all at once; a broken file is read again line by line, for the
+    message."""
     with warnings.catch_warnings():
-        # Up to numpy 2.2 text that is no number is a DeprecationWarning and an early end, later a ValueError.
+        # Up to numpy 2.2 text that is not a number is a DeprecationWarning and an early end, later a ValueError.
         warnings.simplefilter("error", DeprecationWarning)
         try:
             values = np.fromstring(data[header.motion_at :], np.float64, sep=" ")
@@ -215,8 +217,8 @@ def _numbers(data: bytes, header: Header, where: str) -> Array:
     return values.reshape(-1, width)
 
 
-def _first_fault(data: bytes, header: Header, where: str) -> InvalidFile:
-    """The error for the first line of numbers that is not what the header promised."""
+def _first_fault(data: bytes, header: BvhHeader, where: str) -> InvalidFile:
+    """Return the error for the first line of numbers that differs from the header."""
     lines = data[header.motion_at :].decode("latin-1").splitlines()
     for number, text in enumerate(lines, start=header.motion_line):
         words = text.split()
@@ -232,7 +234,7 @@ def _first_fault(data: bytes, header: Header, where: str) -> InvalidFile:
         if words and len(words) != header.channels:
             last = not any(later.strip() for later in lines[number - header.motion_line + 1 :])
             return InvalidFile(
-                f"{len(words)} numbers, where the channels need {header.channels}",
+                f"{len(words)} numbers; the channels need {header.channels}",
                 where=f"{where}, line {number}",
                 hint="The file ends in the middle of a frame: it is cut off." if last else None,
             )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from marey.core.errors import InvalidFile, TooLarge
 
 MAX_JOINTS = 512  # a rig with face and fingers has about 300
-LARGEST = 1e9  # of any number: a degree or a millimetre is never that much
+LARGEST = 1e9  # limit of any number, degrees or millimetres
 
 
 @dataclass
@@ -23,8 +23,8 @@ class Joint:
     first: int = 0
 
 
-class Header:
-    """Everything before the numbers."""
+class BvhHeader:
+    """The part of the file before the numbers."""
 
     def __init__(self, data: bytes, where: str) -> None:
         self.where = where
@@ -40,7 +40,7 @@ class Header:
         return InvalidFile(message, where=f"{self.where}, line {line or self.line}", hint=hint)
 
     def _lines(self, data: bytes) -> Iterator[tuple[str, int]]:
-        """Lines without their ends, and where the next begins; ends may be LF, CRLF or CR."""
+        """Lines without their ends, and the position of the next one; ends may be LF, CRLF or CR."""
         at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
         alone = b"\n" not in data[: 2**16]
         while at < len(data):
@@ -68,7 +68,7 @@ class Header:
             elif key == "frame" and value.split()[:1] == ["time"]:
                 time = self._number(" ".join(value.split()[1:]))
                 if not 1e-4 <= time <= 10:
-                    raise self.fail(f"a frame time of {time:g} seconds cannot be")
+                    raise self.fail(f"a frame time of {time:g} seconds is invalid")
                 self.fps = rate(time)
                 self.motion_line, self.motion_at = self.line + 1, at
                 break
@@ -94,7 +94,7 @@ class Header:
     def _hierarchy(self, lines: Iterator[tuple[str, int]]) -> None:
         """HIERARCHY down to MOTION. A stack of open braces: joint index, or -1 for an End Site."""
         stack: list[int] = []
-        opening: int | None = None  # what the next brace opens
+        opening: int | None = None  # owner of the next opening brace
         begun = False
         for text, _ in lines:
             words = text.replace("{", " { ").replace("}", " } ").split()
@@ -130,7 +130,7 @@ class Header:
         raise self.fail("ends before MOTION", hint="The file is cut off.")
 
     def _statement(self, key: str, words: list[str], stack: list[int]) -> int | None:
-        """ROOT, JOINT, End Site, OFFSET or CHANNELS; returns what its brace opens."""
+        """Parse ROOT, JOINT, End Site, OFFSET or CHANNELS; return the owner of its brace."""
         if key in ("ROOT", "JOINT"):
             if (key == "ROOT") != (not stack):
                 raise self.fail("JOINT outside of any joint" if key == "JOINT" else "ROOT inside of a joint")
@@ -149,7 +149,7 @@ class Header:
             raise self.fail(f"`{key[:40]}` outside of any joint")
         if key == "END":
             brace = words.index("{") if "{" in words else len(words)
-            del words[:brace]  # `Site`, and now and then a name
+            del words[:brace]  # `Site`, and in some files a name
             return -1
         if key == "OFFSET":
             if len(words) < 3:
@@ -170,9 +170,9 @@ class Header:
         if joint is None or joint.channels:
             raise self.fail("CHANNELS of an End Site" if joint is None else f"CHANNELS of {joint.name} a second time")
         if not 0 <= count <= 6 or count != int(count):
-            raise self.fail(f"{count:g} channels; 0 to 6 can be")
+            raise self.fail(f"{count:g} channels; allowed: 0 to 6")
         if len(words) < count:
-            raise self.fail(f"{count:g} channels are announced, {len(words)} named")
+            raise self.fail(f"{count:g} channels are declared, but {len(words)} named")
         for _ in range(int(count)):
             word = words.pop(0)
             axis, kind = word[:1].upper(), word[1:].lower()

@@ -1,13 +1,12 @@
 """A BVH file that is valid at every moment while its motion is being generated, even if the process is killed.
 
-- It comes into being with its first frame, by a rename: BVH has no way to say "no frames".
-- A row is written before it is counted, so `Frames:` never promises rows that are not there. Between the two steps
-  there are more rows than it says: three.js stops at the count, Blender and `bvh.py` read all rows. The count has a
-  fixed width, blanks after it, and is written in place.
-- No row is ever there in part: Blender and `bvh.py` would refuse the file. A write whose process is killed ends where a
-  page of memory ends and nowhere else, so a row that would lie across such a border begins behind it, after blanks.
-  (True of rows of up to a page, about a hundred joints. A power failure is another matter: only `close` waits for the
-  disk.)
+- The file is created with its first frame, by a rename: BVH cannot express "no frames".
+- A row is written before it is counted, so `Frames:` never counts missing rows. Between the two steps the file has more
+  rows than it says: three.js stops at the count, Blender and `bvh.py` read all rows. The count has a fixed width,
+  padded with blanks, and is written in place.
+- A row is never partial: Blender and `bvh.py` would refuse the file. A write of a killed process ends at a border of a
+  memory page, so a row that would cross such a border begins behind it, after blanks. (This holds for rows of up to a
+  page, about a hundred joints, and not after a power failure: only `close` waits for the disk.)
 
 The numbers are those of `bvh_write.py`, which writes whole clips.
 """
@@ -33,7 +32,7 @@ from marey.motion.io.bvh_write import Layout
 from marey.motion.rotations import Array, continuous_euler, slerp
 from marey.motion.skeleton import Skeleton
 
-PAGE = 4096  # bytes; some systems have larger ones, whose borders are borders of these
+PAGE = 4096  # bytes; larger pages of some systems have borders at multiples of it
 COUNT_WIDTH = len(str(MAX_FRAMES))
 
 
@@ -41,13 +40,13 @@ class LiveBVH:
     """A BVH file that grows frame by frame: centimetres, Y up, one row per frame. Not thread-safe.
 
     Args:
-        path: the file; nothing is there before the first frame.
+        path: the file; it does not exist before the first frame.
         skeleton: its offsets become the OFFSETs.
         fps: frames a second.
 
     Attributes:
         frames: rows in the file.
-        filled: how many of them were interpolated for missing frames.
+        filled: number of rows interpolated for missing frames.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton, fps: float) -> None:
@@ -67,14 +66,14 @@ class LiveBVH:
 
     @classmethod
     def open(cls, path: Path | str, skeleton: Skeleton, fps: float, *, overwrite: bool = False) -> LiveBVH:
-        """Open a file for writing and check its path now rather than at the first frame.
+        """Open a file for writing and check its path now instead of at the first frame.
 
         Args:
-            overwrite: replace a file that is there; it stays until the first frame.
+            overwrite: replace an existing file; it stays until the first frame.
 
         Raises:
-            Conflict: a file is there.
-            InvalidInput: the folder is not there or cannot be written to.
+            Conflict: the file exists.
+            InvalidInput: the folder does not exist or is not writable.
         """
         check_place(path, overwrite=overwrite)
         return cls(Path(path), skeleton, fps)
@@ -96,11 +95,11 @@ class LiveBVH:
         Args:
             rotations: (J, 4) local unit quaternions `w x y z`.
             root: (3,) metres, Y up.
-            missing: how many frames are missing before it.
+            missing: number of missing frames before it.
 
         Raises:
             InvalidInput: wrong shapes, numbers that are not finite, a file that cannot be written or is closed.
-            TooLarge: more frames than a BVH file may have here.
+            TooLarge: more than `MAX_FRAMES` frames.
         """
         turns, place = self._checked(rotations, root)
         if missing < 0:
@@ -150,7 +149,7 @@ class LiveBVH:
         return turns, place
 
     def _write(self, rows: list[str]) -> None:
-        """Rows, then the count; all, or none. The first row comes with the file."""
+        """Write rows, then the count; all or none. The first row creates the file."""
         kept, count = self._end, self.frames + len(rows)
         try:
             if self._file is None:
@@ -174,7 +173,7 @@ class LiveBVH:
             over = PAGE - self._count_at % PAGE
             if over >= COUNT_WIDTH:
                 break
-            blanks = " " * over  # the count must not lie across a border either
+            blanks = " " * over  # the count must not cross a border either
         data = header + row.encode() + b"\n"
         write_atomically(self.path, data)
         self._end = len(data)
@@ -190,7 +189,7 @@ class LiveBVH:
     def _put(self, at: int, data: bytes) -> None:
         assert self._file is not None
         self._file.seek(at)
-        if self._file.write(data) != len(data):  # the first part found room
+        if self._file.write(data) != len(data):  # a part was written
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
@@ -198,8 +197,8 @@ def check_place(path: Path | str, *, overwrite: bool = False) -> None:
     """Check that a file can be created at this path.
 
     Raises:
-        Conflict: a file is there.
-        InvalidInput: the folder is not there or cannot be written to.
+        Conflict: the file exists.
+        InvalidInput: the folder does not exist or is not writable.
     """
     path = Path(path)
     if path.is_dir():

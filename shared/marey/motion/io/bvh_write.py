@@ -42,9 +42,9 @@ def write_bvh(path: Path | str, clip: Posed, *, unit: Unit = "cm", up: Up = "y")
 
 
 def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
-    """The text of the BVH file; see `write_bvh`."""
+    """Return the text of the BVH file; see `write_bvh`."""
     if getattr(clip, "positions", None) is not None:
-        raise InvalidInput("bones of this clip change their length, which one set of OFFSETs cannot say")
+        raise InvalidInput("bones of this clip change their length, and BVH has one OFFSET per joint")
     layout = Layout(clip.skeleton, ends=getattr(clip, "ends", None), unit=unit, up=up)
     rows = layout.rows(clip.root, continuous_euler(layout.angles(clip.rotations)))
     return "\n".join([layout.header(str(len(rows)), clip.fps), *rows]) + "\n"
@@ -53,13 +53,13 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
 class Layout:
     """A skeleton in BVH form: the only code that formats a header and a row of numbers.
 
-    Joints stand depth first in the file, whatever their order in the arrays.
+    Joints are depth first in the file, whatever their order in the arrays.
 
     Args:
         skeleton: its offsets become the OFFSETs.
-        ends: (J, 3) End Site offsets in metres, NaN or None where a short bone on from the last one will do.
-        unit: what the lengths of the file are in.
-        up: which axis of the file points up.
+        ends: (J, 3) End Site offsets in metres; NaN or None = a short bone in the direction of the last one.
+        unit: unit of the file's lengths.
+        up: the axis of the file that points up.
     """
 
     def __init__(self, skeleton: Skeleton, *, ends: Array | None = None, unit: Unit = "cm", up: Up = "y") -> None:
@@ -73,19 +73,19 @@ class Layout:
         self._joint(0, 0)
 
     def header(self, frames: str, fps: float) -> str:
-        """Everything before the numbers, without the end of its last line; `frames` is the count as it is to stand."""
+        """Return the part before the numbers, without the end of its last line; `frames` is the frame count."""
         return "\n".join([*self._hierarchy, "MOTION", f"Frames: {frames}", f"Frame Time: {1 / fps:.8f}"])
 
     def angles(self, rotations: NDArray[np.floating[Any]]) -> Array:
-        """Local quaternions (T, J, 4) as Euler angles (T, J, 3) in degrees, each frame by itself: `continuous_euler`
-        makes channels without jumps of them."""
+        """Convert local quaternions (T, J, 4) to Euler angles (T, J, 3) in degrees, each frame by itself;
+        `continuous_euler` removes jumps between frames."""
         turns = np.asarray(rotations, np.float64)
         if self.up == "z":
             turns = multiply(multiply(conjugate(Z_TO_Y), turns), Z_TO_Y)
         return to_euler(turns, "ZYX")
 
     def rows(self, root: NDArray[np.floating[Any]], angles: Array) -> list[str]:
-        """The lines of numbers, without their ends.
+        """Format the lines of numbers, without their ends.
 
         Args:
             root: (T, 3) metres, Y up.
@@ -130,12 +130,13 @@ def _vector(v: Array) -> str:
 
 
 def _word(name: str) -> str:
-    """A joint name as one word of the file: whitespace and braces would end it."""
+    """Return a joint name as one word of the file: whitespace and braces would end it."""
     return re.sub(r"[\s{}]+", "_", name) or "_"
 
 
 def _tips(skeleton: Skeleton, ends: Array | None) -> Array:
-    """(J, 3) End Site offsets in metres: the given ones, else a short bone on from the last one (toes: forward)."""
+    """Return End Site offsets (J, 3) in metres: the given ones, else a short bone in the last one's direction (toes:
+    forward)."""
     offsets = np.asarray(skeleton.offsets, np.float64)
     tips = 0.15 * normalize(offsets)
     for toe in skeleton.feet[1::2]:

@@ -17,7 +17,7 @@ from marey.motion.skeleton import known_order, skeleton_of
 
 
 def resample_bvh(clip: BvhClip, fps: float) -> BvhClip:
-    """See `resample`; for clips as they come from BVH files."""
+    """Resample a BVH clip; see `resample`."""
     times = frame_times(len(clip.root), clip.fps, fps)
     return replace(
         clip,
@@ -29,10 +29,10 @@ def resample_bvh(clip: BvhClip, fps: float) -> BvhClip:
 
 
 def steady(clip: BvhClip) -> BvhClip:
-    """The same motion with bones of constant length.
+    """Return the motion with bones of constant length.
 
     A root that only carries another joint (Bandai-Namco's `joint_Root` over the travelling `Hips`) is merged into it.
-    What moves below gets its mean offset, and a note says by how much the farthest joint is off then.
+    Joints that move relative to their parents get their mean offset, and a note gives the largest error.
     """
     positions = clip.positions
     if positions is None:
@@ -49,7 +49,7 @@ def steady(clip: BvhClip) -> BvhClip:
 
 
 def _without_root(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
-    """Joint 1 as the new root, with the old one's rotation and place taken in."""
+    """Make joint 1 the root, with the old root's rotation and position merged into it."""
     tree = clip.skeleton
     root = clip.root + rotate(clip.rotations[:, 0], positions[:, 1])
     rotations = clip.rotations[:, 1:].copy()

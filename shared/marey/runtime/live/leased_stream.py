@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from marey.runtime.live.parsing import PromptParsing
 from marey.runtime.live.port import LiveFrame, Tokens
-from marey.runtime.live.reading import Reading
 from marey.streams import StreamChunk, StreamRow, StreamState
 from marey.streams.actions import ActionStart
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.frames import Frame
 from marey.streams.presence import ViewerPresence
 from marey.streams.redis import FrameStream, Lease
@@ -27,11 +27,11 @@ class LeasedStream:
 
     Attributes:
         text: features of the prompt in force.
-        opening: features of the first prompt.
+        first_text: features of the first prompt.
         session: its id in the pool; None before it joined and after it left.
-        read: id of the last read message; `obeyed`: of the last applied one.
-        heard: messages to apply, each with its id, in order; `reading`: parsing of the first, if that is a steer.
-        acts: starts of actions, of all prompts; `recorded_acts`: number of recorded ones.
+        read: id of the last read message; `applied`: of the last applied one.
+        received: messages to apply, each with its id, in order; `parsing`: parsing of the first, if that is a steer.
+        actions: starts of actions, of all prompts; `recorded_actions`: number of recorded ones.
         unwritten: frames to write to Redis.
         delayed: messages to apply after the replay of frames that another worker showed.
         reads: rewrites of prompts that are not recorded yet.
@@ -48,27 +48,27 @@ class LeasedStream:
     presence: ViewerPresence
     lease: Lease
     text: TextFeatures
-    opening: TextFeatures
+    first_text: TextFeatures
     tokens: list[Tokens]
     prompts: list[tuple[int, str]]
     seen: float
     moved: float
     read: str
-    obeyed: str
+    applied: str
     shown: int
     recorded: int
     recorded_prompts: int
-    acts: list[ActionStart]
+    actions: list[ActionStart]
     reads: list[PromptRewrite]
     session: int | None = None
-    heard: deque[tuple[str, Control]] = field(default_factory=deque[tuple[str, Control]])
-    reading: Reading | None = None
+    received: deque[tuple[str, StreamControl]] = field(default_factory=deque[tuple[str, StreamControl]])
+    parsing: PromptParsing | None = None
     unwritten: list[Frame] = field(default_factory=list[Frame])
     delayed: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
     state: StreamState = StreamState.LIVE
     recorded_state: StreamState = StreamState.LIVE
     recorded_control: str = ""
-    recorded_acts: int = 0
+    recorded_actions: int = 0
     ending: str | None = None
     lost: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -76,7 +76,7 @@ class LeasedStream:
     def __post_init__(self) -> None:
         self.state = self.recorded_state = self.row.state
         self.recorded_control = self.row.control
-        self.recorded_acts = len(self.acts)
+        self.recorded_actions = len(self.actions)
 
     @property
     def past(self) -> Tokens | None:
@@ -91,13 +91,13 @@ class LeasedStream:
     @property
     def playing(self) -> ActionStart | None:
         """Start of the current action of the prompt in force; None before the first frame of that prompt."""
-        return self.acts[-1] if self.acts and self.acts[-1].frame >= self.prompts[-1][0] else None
+        return self.actions[-1] if self.actions and self.actions[-1].frame >= self.prompts[-1][0] else None
 
     def add(self, made: LiveFrame) -> None:
         """Append a frame."""
         with self.lock:
-            if self.playing is None or self.playing.act != made.act:
-                self.acts.append(ActionStart(len(self.tokens), made.act))
+            if self.playing is None or self.playing.action != made.action:
+                self.actions.append(ActionStart(len(self.tokens), made.action))
             self.tokens.append(made.tokens)
 
     def steered(self, prompt: str, text: TextFeatures, control: str) -> None:
@@ -105,7 +105,7 @@ class LeasedStream:
         with self.lock:
             self.prompts.append((len(self.tokens), prompt))
             self.reads.append(PromptRewrite(text.rewritten, text.not_rewritten))
-            self.text, self.obeyed = text, control
+            self.text, self.applied = text, control
 
     def chunk(self) -> StreamChunk | None:
         """Return shown but unrecorded frames and changes; None if there are none."""
@@ -113,17 +113,17 @@ class LeasedStream:
             stop = min(self.shown, len(self.tokens))
             tokens = self.tokens[self.recorded : stop]
             prompts = [(frame, text) for frame, text in self.prompts[self.recorded_prompts :] if frame < stop]
-            acts = [act for act in self.acts[self.recorded_acts :] if act.frame < stop]
+            actions = [action for action in self.actions[self.recorded_actions :] if action.frame < stop]
             changed = self.state is not self.recorded_state
             if not tokens and not changed:
                 return None
             content = np.stack(tokens).astype("<i2").tobytes() if tokens else b""
             # A successor reads the message again whose prompt waits for its first frame.
             waits = len(self.prompts) > self.recorded_prompts + len(prompts)
-            control = self.recorded_control if waits else self.obeyed
+            control = self.recorded_control if waits else self.applied
             state = self.state if changed else None
             reads = self.reads[: len(prompts)]
-            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, acts, reads)
+            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, actions, reads)
 
     def wrote(self, chunk: StreamChunk) -> None:
         """Mark a chunk as recorded."""
@@ -132,5 +132,5 @@ class LeasedStream:
             self.recorded += chunk.frames
             self.recorded_prompts += len(chunk.prompts)
             del self.reads[: len(chunk.prompts)]
-            self.recorded_acts += len(chunk.acts)
+            self.recorded_actions += len(chunk.actions)
             self.recorded_state = chunk.state or self.recorded_state

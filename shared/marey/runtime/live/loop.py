@@ -174,7 +174,7 @@ class LiveLoop:
             else:
                 self.pool.resume(session)
         with leased.lock:
-            leased.state, leased.obeyed = state, control
+            leased.state, leased.applied = state, control
 
     def _end(self, leased: LeasedStream, reason: str) -> None:
         leased.ending = reason

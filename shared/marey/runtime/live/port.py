@@ -23,7 +23,7 @@ class LiveFrame:
     frame: Frame
     tokens: Tokens
     """(V,): the column it was decoded from."""
-    act: int
+    action: int
     """Number of the action in its prompt, from 0."""
 
 

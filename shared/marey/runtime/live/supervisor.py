@@ -15,19 +15,19 @@ import sqlalchemy as sa
 from marey.core import metrics
 from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.db import transaction
-from marey.jobs import NewItem, Problem, WorkerHeartbeat, beat, retire
+from marey.jobs import FailureReason, NewItem, WorkerHeartbeat, beat, retire
 from marey.runtime.exposition import measure_gpu
 from marey.runtime.faults import as_problem, retry_unreachable
 from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.loop import LiveLoop, StreamFinished
+from marey.runtime.live.parsing import PromptParsing, StartingStream
 from marey.runtime.live.port import Parse, SessionPool
-from marey.runtime.live.reading import Opening, Reading
 from marey.runtime.logs import logger
 from marey.streams import StreamPast, StreamRow, StreamState, add_chunk, end_stream, open_streams, take_stream
-from marey.streams.control import Control, ControlQueue
+from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.notifier import StreamNotifier
 from marey.streams.presence import ViewerPresence
-from marey.streams.recording import Recording
+from marey.streams.recording import StreamRecording
 from marey.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
 from marey.streams.rewrites import PromptRewrite
 
@@ -73,7 +73,7 @@ class StreamSupervisor(threading.Thread):
         self._stopping = stopping
         self._over: queue.SimpleQueue[StreamFinished] = queue.SimpleQueue()
         self._notifier = StreamNotifier(client)
-        self._openings: dict[str, Opening] = {}
+        self._starting: dict[str, StartingStream] = {}
         self._leased: dict[str, LeasedStream] = {}
         self._rounds = (
             _Round(self._open, LISTEN_SECONDS),
@@ -119,7 +119,7 @@ class StreamSupervisor(threading.Thread):
         while not self._stopping.wait(RENEW_SECONDS):
             if time.monotonic() - self._loop.ticked > STALL_SECONDS:
                 continue  # the loop hangs: let another worker take its streams
-            for leased in (*list(self._openings.values()), *list(self._leased.values())):
+            for leased in (*list(self._starting.values()), *list(self._leased.values())):
                 try:
                     leased.frames.renew(leased.lease)
                 except LeaseLost:
@@ -127,13 +127,13 @@ class StreamSupervisor(threading.Thread):
                 except Unreachable as error:
                     log.warning("not_renewed", stream=str(leased.row.id), error=error.message)
 
-    def _lose(self, leased: Opening | LeasedStream) -> None:
+    def _lose(self, leased: StartingStream | LeasedStream) -> None:
         leased.lost = True
         if isinstance(leased, LeasedStream):
             self._leased.pop(str(leased.row.id), None)
             self._loop.drop(leased)
         else:
-            self._openings.pop(str(leased.row.id), None)
+            self._starting.pop(str(leased.row.id), None)
         metrics.LIVE_LOST.inc()
         log.info("stream_lost", stream=str(leased.row.id), fence=leased.lease.fence)
 
@@ -144,7 +144,7 @@ class StreamSupervisor(threading.Thread):
             self._take()
 
     def _is_full(self) -> bool:
-        return len(self._openings) + len(self._leased) >= self._pool.capacity
+        return len(self._starting) + len(self._leased) >= self._pool.capacity
 
     def _take(self) -> None:
         if self._is_full():
@@ -155,7 +155,7 @@ class StreamSupervisor(threading.Thread):
         for row in sorted(waiting, key=lambda row: row.state is StreamState.WAITING):
             if self._is_full():
                 return
-            if str(row.id) not in self._leased and str(row.id) not in self._openings:
+            if str(row.id) not in self._leased and str(row.id) not in self._starting:
                 self._try(row)
 
     def _try(self, row: StreamRow) -> None:
@@ -176,24 +176,24 @@ class StreamSupervisor(threading.Thread):
 
     def _begin(self, past: StreamPast, frames: FrameStream, lease: Lease) -> None:
         prompts = [past.row.prompt, *(text for _, text in past.prompts[-1:])]
-        opening = Opening(past, frames, lease, Reading(self._parse, list(dict.fromkeys(prompts))))
-        self._openings[str(past.row.id)] = opening
-        if opening.reading.is_done(READ_SECONDS):
-            self._join(opening)
+        starting = StartingStream(past, frames, lease, PromptParsing(self._parse, list(dict.fromkeys(prompts))))
+        self._starting[str(past.row.id)] = starting
+        if starting.parsing.is_done(READ_SECONDS):
+            self._join(starting)
 
     def _open(self) -> None:
-        for opening in list(self._openings.values()):
-            if opening.reading.is_done():
-                self._join(opening)
+        for starting in list(self._starting.values()):
+            if starting.parsing.is_done():
+                self._join(starting)
 
-    def _join(self, opening: Opening) -> None:
+    def _join(self, starting: StartingStream) -> None:
         """Pass a stream on to the loop once its prompts are parsed."""
-        past, row, frames, lease = opening.past, opening.row, opening.frames, opening.lease
-        self._openings.pop(str(row.id), None)
-        if opening.lost:
+        past, row, frames, lease = starting.past, starting.row, starting.frames, starting.lease
+        self._starting.pop(str(row.id), None)
+        if starting.lost:
             return
         try:
-            features = opening.reading.features()
+            features = starting.parsing.features()
         except MareyError as error:
             self._end(row, lease, "its prompt cannot be parsed", error)
             frames.release(lease)
@@ -206,17 +206,17 @@ class StreamSupervisor(threading.Thread):
             presence=ViewerPresence(self._redis, str(row.id)),
             lease=lease,
             text=features[-1],
-            opening=features[0],
+            first_text=features[0],
             tokens=list(tokens),
-            prompts=opening.prompts,
+            prompts=starting.prompts,
             seen=time.monotonic(),
             moved=time.monotonic(),
             read=row.control,
-            obeyed=row.control,
+            applied=row.control,
             shown=len(tokens),
             recorded=len(tokens),
             recorded_prompts=len(past.prompts),
-            acts=list(past.acts),
+            actions=list(past.actions),
             reads=[] if past.prompts else [PromptRewrite(features[0].rewritten, features[0].not_rewritten)],
         )
         self._leased[str(row.id)] = leased
@@ -234,24 +234,24 @@ class StreamSupervisor(threading.Thread):
                 elif message.kind == "stop":
                     self._loop.end(leased, "stopped")
                 else:
-                    leased.heard.append((identity, message))
-            while leased.heard and self._obey(leased, *leased.heard[0]):
-                leased.heard.popleft()
+                    leased.received.append((identity, message))
+            while leased.received and self._apply(leased, *leased.received[0]):
+                leased.received.popleft()
 
-    def _obey(self, leased: LeasedStream, identity: str, message: Control) -> bool:
+    def _apply(self, leased: LeasedStream, identity: str, message: StreamControl) -> bool:
         """Pass a message on to the loop; return False while its prompt is being parsed, and later messages wait."""
         if message.prompt is None:
             state = StreamState.PAUSED if message.kind == "pause" else StreamState.LIVE
             self._loop.switch(leased, state, identity)
             return True
-        if leased.reading is None:
-            leased.reading = Reading(self._parse, [message.prompt])
-            leased.reading.is_done(READ_SECONDS)
-        if not leased.reading.is_done():
+        if leased.parsing is None:
+            leased.parsing = PromptParsing(self._parse, [message.prompt])
+            leased.parsing.is_done(READ_SECONDS)
+        if not leased.parsing.is_done():
             return False
-        reading, leased.reading = leased.reading, None
+        parsing, leased.parsing = leased.parsing, None
         try:
-            (text,) = reading.features()
+            (text,) = parsing.features()
         except MareyError as error:
             log.warning("prompt_refused", stream=str(leased.row.id), error=error.message)
         else:
@@ -323,7 +323,7 @@ class StreamSupervisor(threading.Thread):
         error: MareyError | None,
         clip: tuple[NewItem, bytes] | None = None,
     ) -> None:
-        problem = None if error is None else Problem.of(as_problem(error))
+        problem = None if error is None else FailureReason.of(as_problem(error))
         with transaction(self._engine) as conn:
             end_stream(conn, row.id, lease.fence, reason, problem=problem, clip=clip)
         log.info("stream_ended", stream=str(row.id), reason=reason, failed=problem is not None, clip=clip is not None)
@@ -331,8 +331,8 @@ class StreamSupervisor(threading.Thread):
     def _give_back(self) -> None:
         """Release all streams when this worker stops: another one resumes at once, behind the last shown frame."""
         self._loop.finished.wait(STALL_SECONDS)
-        for opening in list(self._openings.values()):
-            self._guarded(lambda opening=opening: _released(opening))
+        for starting in list(self._starting.values()):
+            self._guarded(lambda starting=starting: _released(starting))
         for leased in list(self._leased.values()):
             self._guarded(lambda leased=leased: self._write(leased))
             self._guarded(lambda leased=leased: _released(leased))
@@ -367,7 +367,7 @@ def clip_of(leased: LeasedStream, pool: SessionPool) -> tuple[NewItem, bytes] | 
         return None
     tokens = np.stack(leased.tokens[: leased.recorded])
     prompts = [(frame, text) for frame, text in leased.prompts if frame < leased.recorded]
-    blob = Recording(str(row.id), tokens, prompts, leased.opening).to_blob()
+    blob = StreamRecording(str(row.id), tokens, prompts, leased.first_text).to_blob()
     key = f"stream-{row.id}"
     item = NewItem(
         index=0,
@@ -383,5 +383,5 @@ def clip_of(leased: LeasedStream, pool: SessionPool) -> tuple[NewItem, bytes] | 
     return item, blob
 
 
-def _released(leased: Opening | LeasedStream) -> None:
+def _released(leased: StartingStream | LeasedStream) -> None:
     leased.frames.release(leased.lease)

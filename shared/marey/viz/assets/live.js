@@ -5,7 +5,7 @@
   const { Buffer, decode } = MareyFrames;
   const { Link } = MareyLink;
   const clock = () => performance.now() / 1000;
-  const shown = document.body.dataset; // what is going on, for whoever looks from outside
+  const shown = document.body.dataset; // state of the page, for tests and embedding pages
   const OPEN = ["starting", "connecting", "reconnecting", "waiting", "live", "paused"];
   const CLIP_SECONDS = 120; // for which the page waits for the clip of a stream that has ended
   const REFUSED = {
@@ -14,7 +14,7 @@
     4404: "There is no such stream.",
   };
 
-  const SUGGESTED = JSON.parse($("suggested").textContent); // prompts that the model was measured to obey
+  const SUGGESTED = JSON.parse($("suggested").textContent); // prompts that the model followed in measurements
   let view;
   try {
     view = new MareyView.View(JSON.parse($("bodies").textContent));
@@ -24,7 +24,7 @@
     throw error;
   }
 
-  // ---------------------------------------------------------------- what is told
+  // ---------------------------------------------------------------- messages
   function say(text, kind = "note") {
     $("message").textContent = text;
     $("message").dataset.kind = kind;
@@ -69,7 +69,7 @@
     $("facts").replaceChildren(state, document.createTextNode(facts.map((fact) => ` · ${fact}`).join("")));
   }
 
-  // What a rewriter made of a prompt, where there is something to tell.
+  // The rewrite of a prompt, if there is one.
   function readAs({ prompt, rewritten, not_rewritten: reason }) {
     if (rewritten && rewritten !== prompt) return ` (read as: ${rewritten})`;
     return reason ? ` (read as it is: ${reason})` : "";
@@ -101,7 +101,7 @@
 
   function keyed() {
     const key = $("key").value.trim();
-    // What a subprotocol may consist of; all keys do.
+    // Characters that a subprotocol may have; all keys consist of them.
     if (/^[\w.~+-]+$/.test(key)) return key;
     say(key ? "This is no API key: it has spaces or signs that no key has." : "An API key is needed: `marey admin keys create` makes one.", "problem");
     $("options").hidden = false;
@@ -109,7 +109,7 @@
     return null;
   }
 
-  // The answer of the API; null when it was no success, which is told.
+  // The answer of the API; null after a failure, which is displayed.
   async function ask(method, path, key, body) {
     try {
       const headers = { Authorization: `Bearer ${key}`, ...(body && { "Content-Type": "application/json" }) };
@@ -151,7 +151,7 @@
     session.asked = { at: asked, after: -1 };
   }
 
-  // Watch a stream that was started before: from what is on record, which is at most a second behind.
+  // Watch a stream that was started before, from its recorded frames, which are at most a second behind.
   async function watch(id) {
     const key = keyed();
     if (key === null) return;
@@ -213,7 +213,7 @@
     if (stream.skeleton) view.wear(stream.skeleton);
     for (const row of stream.prompts ?? []) {
       const sent = session.prompts.has(row.number) ? -1 : session.pending.indexOf(row.prompt);
-      if (sent >= 0) session.pending.splice(0, sent + 1); // they are obeyed in order
+      if (sent >= 0) session.pending.splice(0, sent + 1); // they are applied in order
       session.prompts.set(row.number, row);
     }
     listPrompts();

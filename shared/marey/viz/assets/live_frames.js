@@ -1,6 +1,6 @@
 "use strict";
-// Frames of a live stream: read from their bytes (shared/marey/streams/frames.py), and kept back a little, so that what is
-// drawn moves evenly though frames arrive unevenly.
+// Frames of a live stream: read from their bytes (shared/marey/streams/frames.py), and delayed a little, so that drawn
+// motion is even although frames arrive unevenly.
 const MareyFrames = (() => {
   const [MAGIC, VERSION, HEADER, LAST] = [0x4d46, 1, 24, 1 << 4];
 
@@ -25,8 +25,8 @@ const MareyFrames = (() => {
   const DELAY = 0.25; // s behind the newest frame: five frames may come late or at once
   const FASTEST = 3; // times the stream's rate, when behind
   const SLOWEST = 0.8;
-  const LEAP = 5; // s behind from which on nobody wants to see what was missed
-  const STEADY = 0.5; // s over which the lag is averaged, or the speed would shake with every frame
+  const LEAP = 5; // s behind beyond which missed frames are skipped
+  const STEADY = 0.5; // s over which the lag is averaged; otherwise the speed would jitter with every frame
   const WINDOW = 2; // s over which the arriving frames are counted
 
   class Buffer {
@@ -73,7 +73,7 @@ const MareyFrames = (() => {
       return true;
     }
 
-    // After so many more seconds: the two frames to draw between, the share of the way, and the frames gone by since
+    // After `seconds` more: the two frames to draw between, the share of the way, and the frames passed since
     // the last time. Null before the first frame.
     advance(seconds) {
       if (!this.frames.length) return null;
@@ -83,14 +83,14 @@ const MareyFrames = (() => {
         const speed = this.over ? 1 : Math.min(Math.max(1 + this.lag - DELAY, SLOWEST), FASTEST);
         this.at = Math.min(this.at + seconds * this.fps * speed, this.newest.number);
         this.lag += (this.buffered - this.lag) * Math.min(seconds / STEADY, 1);
-        // Run dry (a pause, a slow network): fill up again before it goes on, rather than stumble along.
+        // Empty (a pause, a slow network): fill up again before continuing, instead of stuttering.
         if (this.at >= this.newest.number) [this.waiting, this.lag] = [true, DELAY];
       }
       const past = this.frames.findLastIndex((frame) => frame.number <= this.at);
       const passed = this.frames.splice(0, Math.max(past, 0));
       const [frame, later = frame] = this.frames;
       const steps = later.number - frame.number;
-      // Over a long gap nothing is made up: it goes on behind it.
+      // A long gap is not interpolated: playback continues after it.
       if (steps > this.fps) this.at = Math.max(this.at, later.number);
       return { frame, later, passed, share: steps ? Math.min(Math.max((this.at - frame.number) / steps, 0), 1) : 0 };
     }

@@ -1,11 +1,11 @@
 "use strict";
-// What is seen of a live stream: its figure, the trail of its root, and the buttons that change the view.
+// The view of a live stream: its figure, the trail of its root, and the buttons that change the view.
 const MareyView = (() => {
   const $ = (id) => document.getElementById(id);
   const { Figure, Stage } = MareyScene;
   const TRAIL = 600; // frames: half a minute
 
-  // A body for a skeleton that nobody has dressed: all bones alike, and thin.
+  // A body for an unknown skeleton: all bones alike, and thin.
   function bones({ parents, offsets }) {
     const places = [];
     parents.forEach((parent, j) => places.push(offsets[j].map((x, axis) => x + (parent < 0 ? 0 : places[parent][axis]))));
@@ -19,7 +19,7 @@ const MareyView = (() => {
 
   class View {
     // bodies: of the skeletons that are known, each with the names of its joints. Shows the first one at rest.
-    // Throws where there is no WebGL, after it has said so.
+    // Throws without WebGL, after displaying the reason.
     constructor(bodies) {
       this.bodies = bodies;
       this.stage = new Stage($("view"), $("failure"));

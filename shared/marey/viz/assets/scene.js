@@ -1,5 +1,5 @@
 "use strict";
-// What every page draws with: a stage (camera, light, floor, palette), a figure of round cones, forward kinematics.
+// Shared drawing code of all pages: a stage (camera, light, floor, palette), a figure of round cones, forward kinematics.
 // Conventions are the files': metres, seconds, Y up, quaternions w x y z, left blue and right orange.
 const MareyScene = (() => {
   const T = THREE;
@@ -159,7 +159,7 @@ const MareyScene = (() => {
   }
 
   class Stage {
-    // What draws on a canvas. Throws where there is no WebGL, after it has said so in the element `failure`.
+    // The renderer of a canvas. Throws without WebGL, after displaying the reason in the element `failure`.
     static renderer(canvas, failure) {
       let renderer;
       try {

@@ -13,7 +13,7 @@
     renderer = Stage.renderer(document.createElement("canvas"), document.getElementById("failure"));
   } catch {
     for (const box of boxes) box.hidden = true;
-    return; // the page says why, and its text is whole
+    return; // the page displays the reason, and its text is complete
   }
   const size = { width: 0, height: 0 }; // of the renderer: the largest picture so far
 
@@ -42,7 +42,7 @@
       this.play(this.playing);
     }
 
-    // A stage costs memory on the graphics card, so it is set only for a clip that somebody looks at.
+    // A stage costs memory on the graphics card, so it is set only for a clip in view.
     open() {
       this.stage = new Stage(this.canvas, null, renderer);
       this.stage.sun.shadow.mapSize.set(1024, 1024);

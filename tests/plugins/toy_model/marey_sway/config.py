@@ -1,4 +1,4 @@
-"""The configuration of Sway: what stands in its bundles and checkpoints."""
+"""The configuration of Sway, as its bundle and checkpoints hold it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Inference:
 
 @dataclass(frozen=True)
 class SwayConfig(ModelConfig):
-    """Everything that decides a bundle; `min_frames` and `max_frames` are its range of lengths."""
+    """Configuration of a bundle; `min_frames` and `max_frames` are its range of lengths."""
 
     name: str = "starter"
     layout: str = "humanml3d-263"

@@ -1,4 +1,4 @@
-"""Requests in, features out; and the work of the queue `sway`."""
+"""Generate features from requests, and handle the queue `sway`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle
 from marey.core.settings import settings as process_settings
 from marey.generation.handler import GeneratorHandler
-from marey.generation.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.motion.features import layout
 from marey_sway.config import Inference, SwayConfig
 
@@ -20,8 +20,8 @@ BATCH = 8
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Uniform over a batch; None = as the bundle says."""
+class SamplingSettings:
+    """Settings uniform over a batch; None = the bundle's value."""
 
     width: float | None = None
     beats: int | None = None
@@ -55,34 +55,38 @@ class Generator:
         """Load a bundle."""
         return cls(*open_bundle(bundle, device, threads, dtype))
 
-    def settings(self, values: Mapping[str, Any]) -> Settings:
-        """An item's settings."""
-        return read_settings(Settings, values, Settings.__dataclass_fields__)
+    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
+        """Check an item's settings."""
+        return read_settings(SamplingSettings, values, SamplingSettings.__dataclass_fields__)
 
-    def described(self, settings: Settings) -> dict[str, Any]:
-        """Everything that decides a motion."""
+    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
+        """Return everything that decides a motion."""
         return asdict(self._inference(settings))
 
-    def settled(self, request: Request) -> Request:
-        """The request with its length decided."""
+    def resolve_length(self, request: Request) -> Request:
+        """Return the request with its length set."""
         self.limits.check(request)
         return replace(request, frames=request.frames or 40)
 
     def bucket(self, request: Request) -> int:
-        """All lengths together."""
+        """Put all lengths in one bucket."""
         return 1
 
     def generate(
-        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+        self,
+        requests: Sequence[Request],
+        settings: SamplingSettings | None = None,
+        *,
+        control: GenerationControl | None = None,
     ) -> Sequence[Generated | None]:
-        """One motion a request."""
-        inference, control = self._inference(settings or Settings()), control or NoControl()
+        """Generate one motion per request."""
+        inference, control = self._inference(settings or SamplingSettings()), control or NoControl()
         made = [self._sway(request, inference) for request in requests]
         control.progress(1, 1)
         dropped = control.dropped()
         return [None if row in dropped else each for row, each in enumerate(made)]
 
-    def _inference(self, settings: Settings) -> Inference:
+    def _inference(self, settings: SamplingSettings) -> Inference:
         changed = {name: value for name, value in vars(settings).items() if value is not None}
         return replace(self.config.inference, **changed)
 
@@ -96,6 +100,6 @@ class Generator:
         return Generated(np.zeros((1, request.frames), np.int16), features)
 
 
-def create_handler() -> GeneratorHandler[Settings]:
-    """The work of the queue."""
+def create_handler() -> GeneratorHandler[SamplingSettings]:
+    """Create the handler of the queue."""
     return GeneratorHandler("sway", Generator.load, BATCH, process_settings())

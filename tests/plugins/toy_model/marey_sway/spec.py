@@ -12,7 +12,7 @@ SPEC = ModelSpec(
     load="marey_sway.generate:Generator.load",
     settings=(
         Setting("width", 0.0, 0.5, 0.1, "Metres from side to side."),
-        Setting("beats", 1, 8, 2, "Sways a motion.", whole=True),
+        Setting("beats", 1, 8, 2, "Sways per motion.", whole=True),
     ),
     training=Training(
         help="Sway: the pose, then `bundle`.",
@@ -20,7 +20,7 @@ SPEC = ModelSpec(
         config="marey_sway.train:named_config",
         train="marey_sway.train:train_stage",
         assemble="marey_sway.train:assemble",
-        choices=(Choice("side", ("left", "right"), "First side; none given = as the configuration says."),),
+        choices=(Choice("side", ("left", "right"), "First side; default: as the configuration says."),),
     ),
     random_bundle="marey_sway.train:random_bundle",
 )

@@ -1,4 +1,4 @@
-"""Training Sway: one stage, then the bundle."""
+"""Train Sway: one stage, then the bundle."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from marey.core.errors import InvalidInput
 from marey.nn.bundling import standing, write_generator
 from marey.training.assembly import gather
 from marey.training.motions import MotionData
-from marey.training.staging import Recipe, TrainOptions, finish
+from marey.training.staging import TrainingRecipe, TrainOptions, finish
 from marey_sway.config import SwayConfig
 
-RECIPE = Recipe(read=SwayConfig.from_dict, built_from={"pose": ("layout",)}, shares={"pose": 1.0})
+RECIPE = TrainingRecipe(read=SwayConfig.from_dict, built_from={"pose": ("layout",)}, shares={"pose": 1.0})
 
 
 class Pose(nn.Module):
@@ -34,12 +34,12 @@ def named_config(name: str, *, side: str | None = None) -> SwayConfig:
         InvalidInput: no such configuration.
     """
     if name != "starter":
-        raise InvalidInput(f"there is no configuration {name!r}", hint="Known: starter.")
+        raise InvalidInput(f"unknown configuration {name!r}", hint="Known: starter.")
     return SwayConfig() if side is None else replace(SwayConfig(), side=side)
 
 
 def train_stage(name: str, options: TrainOptions[SwayConfig]) -> dict[str, float]:
-    """Average the frames of the prepared clips; returns the height of the root."""
+    """Average the frames of the prepared clips; return the height of the root."""
     RECIPE.check_name(name)
     data = MotionData.load(options.prepared, torch.device("cpu"))
     metrics = {"height": float(data.mean[3])}
@@ -58,7 +58,7 @@ def assemble(
 
 
 def random_bundle(path: Path) -> Bundle:
-    """A bundle that was never trained: the rest pose."""
+    """Write a bundle that was never trained: the rest pose."""
     mean = torch.from_numpy(standing(SwayConfig().layout)[0])
     return _write(path, SwayConfig(), {"mean": mean}, None, True, text=TextSpec(), random=True, licence="MIT")
 

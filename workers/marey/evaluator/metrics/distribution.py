@@ -10,7 +10,7 @@ from marey.core.errors import InvalidInput
 from marey.measures.inputs import Array, Integers, Numbers, at_least, embeddings
 
 SAMPLES_PER_DIMENSION = 5
-_FEW_PAIRS = 100  # of `diversity` where there are not more motions than pairs asked for
+_FEW_PAIRS = 100  # pairs of `diversity` if there are no more motions than requested pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class GaussianStatistics:
 
     @classmethod
     def of(cls, values: Numbers, *, name: str = "embeddings") -> GaussianStatistics:
-        """Statistics of (N, D) embeddings.
+        """Compute statistics of embeddings (N, D).
 
         Raises:
             InvalidInput: broken embeddings, or a single one.
@@ -38,7 +38,7 @@ class GaussianStatistics:
         count, dimensions = array.shape
         at_least(name, count, 2, hint="one embedding has no covariance")
         mean = array.mean(axis=0)
-        # From the data, not from its covariance: squaring first would halve the digits of the small directions.
+        # Computed from the data, not from its covariance: squaring first would halve the digits of small directions.
         triangle = np.linalg.qr(array - mean, mode="r") / np.sqrt(count - 1)  # (min(N, D), D)
         factor = np.zeros((dimensions, dimensions))
         factor[: len(triangle)] = triangle
@@ -47,7 +47,7 @@ class GaussianStatistics:
 
 @dataclass(frozen=True)
 class Fid:
-    """A Fréchet distance with what it stands on.
+    """A Fréchet distance with the sizes of its sets.
 
     Attributes:
         value: 0 or more.
@@ -67,7 +67,7 @@ class Kid:
     """Kernel distance over random subsets.
 
     Attributes:
-        mean: unbiased, so it may be a little under 0 where the sets are alike.
+        mean: unbiased, so it may be slightly negative for similar sets.
         std: over the subsets, population.
     """
 
@@ -76,11 +76,11 @@ class Kid:
 
 
 def fid(real: Numbers | GaussianStatistics, generated: Numbers | GaussianStatistics) -> Fid:
-    """Fréchet distance of two Gaussians (Heusel et al. 2017, eq. 6): |μ₁ - μ₂|² + tr(S₁ + S₂ - 2 (S₁ S₂)^½).
+    """Return the Fréchet distance of two Gaussians (Heusel et al. 2017, eq. 6): |μ₁ - μ₂|² + tr(S₁ + S₂ - 2 (S₁ S₂)^½).
 
     With factors S = RᵀR the trace of the root is the sum of the singular values U Σ Vᵀ of R₁R₂ᵀ, and the whole second
-    term is |R₁ - U Vᵀ R₂|². As a sum of squares it is never negative and never complex, with fewer embeddings than
-    dimensions neither, where the root of the singular product S₁S₂ is.
+    term is |R₁ - U Vᵀ R₂|². As a sum of squares it is never negative or complex, also with fewer embeddings than
+    dimensions, where the root of the singular product S₁S₂ is.
 
     Args:
         real: (N, D) embeddings or their statistics.
@@ -99,15 +99,16 @@ def fid(real: Numbers | GaussianStatistics, generated: Numbers | GaussianStatist
 
 
 def kid(real: Numbers, generated: Numbers, *, subsets: int, subset_size: int, rng: np.random.Generator) -> Kid:
-    """Kernel distance (Bińkowski et al. 2018, section 4): squared MMD, unbiased, with the kernel (xᵀy / D + 1)³.
+    """Return the kernel distance (Bińkowski et al. 2018, section 4): squared MMD, unbiased, with the kernel (xᵀy / D +
+    1)³.
 
     Unlike FID its expectation does not depend on the number of embeddings.
 
     Args:
         real: (N, D) embeddings.
         generated: (M, D) embeddings of the same network.
-        subsets: draws of `subset_size` out of each set, without replacement within a draw.
-        subset_size: 2 or more, not more than either set holds.
+        subsets: number of draws of `subset_size` from each set, without replacement within a draw.
+        subset_size: 2 or more, at most the size of either set.
 
     Raises:
         InvalidInput: broken embeddings, sets of different dimensions, or fewer embeddings than a subset.
@@ -129,14 +130,14 @@ def kid(real: Numbers, generated: Numbers, *, subsets: int, subset_size: int, rn
 
 
 def diversity(motion: Numbers, *, pairs: int = 300, rng: np.random.Generator) -> float:
-    """Mean Euclidean distance of random pairs (Guo et al. 2022). Compare it to that of real motions: nearer is better.
+    """Return the mean Euclidean distance of random pairs (Guo et al. 2022); best near that of real motions.
 
-    As the public evaluator has it: first and second members are two draws without replacement, so a motion may meet
-    itself, and where there are not more motions than pairs, 100 pairs are drawn.
+    As in the public evaluator, first and second members are two draws without replacement, so a motion may be paired
+    with itself, and if there are no more motions than pairs, 100 pairs are drawn.
 
     Args:
-        motion: (N, D) embeddings, more than are drawn.
-        pairs: to draw.
+        motion: (N, D) embeddings, more than `pairs`.
+        pairs: number of pairs to draw.
 
     Raises:
         InvalidInput: broken embeddings, or too few.
@@ -148,13 +149,13 @@ def diversity(motion: Numbers, *, pairs: int = 300, rng: np.random.Generator) ->
 
 
 def multimodality(motion: Numbers, *, pairs: int = 10, rng: np.random.Generator) -> float:
-    """Mean Euclidean distance of random pairs of motions of the same prompt (Guo et al. 2022).
+    """Return the mean Euclidean distance of random pairs of motions of the same prompt (Guo et al. 2022).
 
-    As the public evaluator has it: the pairs drawn are the same generations of each prompt.
+    As in the public evaluator, all prompts use the same drawn pairs of generations.
 
     Args:
         motion: (P, K, D) embeddings, K generations of each of P prompts; the protocol has K = 30.
-        pairs: to draw, under K.
+        pairs: number of pairs to draw, under K.
 
     Raises:
         InvalidInput: broken embeddings, or too few generations.
@@ -171,7 +172,7 @@ def _drawn_twice(name: str, count: int, pairs: int, rng: np.random.Generator) ->
 
 
 def _squared_mmd(one: Array, two: Array) -> float:
-    """Unbiased squared MMD of (m, D) and (m, D): a motion is not compared to itself."""
+    """Return the unbiased squared MMD of (m, D) and (m, D): a motion is not compared to itself."""
     size = len(one)
     within = sum(k.sum() - np.trace(k) for k in (_kernel(one, one), _kernel(two, two))) / (size * (size - 1))
     return float(within - 2 * _kernel(one, two).mean())

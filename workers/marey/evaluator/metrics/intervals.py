@@ -1,4 +1,4 @@
-"""Intervals over repeats, as the field reports them. For two runs on the same prompts see `marey.measures`."""
+"""Intervals over repeats, in the usual form of the field. For two runs on the same prompts see `marey.measures`."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class Interval:
 
 
 def repeated(values: Sequence[float] | Numbers) -> Interval:
-    """Mean and 95 % interval of repeats, as the T2M evaluator reports them over 20.
+    """Return mean and 95 % interval of repeats, as the T2M evaluator reports them over 20.
 
-    The interval covers what the repeats redraw: where they draw pools only, not what another generation or training
-    would give.
+    The interval covers the variation of the repeats: if they redraw only pools, not that of another generation or
+    training.
 
     Args:
-        values: (n,) one number a repeat, 2 or more.
+        values: (n,) one number per repeat, 2 or more.
 
     Raises:
-        InvalidInput: not finite, or a single repeat, whose interval would be 0 wide.
+        InvalidInput: not finite, or a single repeat, whose interval would have width 0.
     """
     array = embeddings("values", values, axes="n")
     at_least("values", len(array), 2, hint="one repeat has no interval")
@@ -46,7 +46,7 @@ def repeated(values: Sequence[float] | Numbers) -> Interval:
 
 
 def redraw(metric: Callable[[np.random.Generator], T], *, repeats: int = 20, seed: int) -> tuple[T, ...]:
-    """Call `metric` once a repeat, each time with an independent generator.
+    """Call `metric` once per repeat, each time with an independent generator.
 
     The generators are a function of `seed` and the repeat only, so that two runs draw the same pools, and more repeats
     begin with the same ones.

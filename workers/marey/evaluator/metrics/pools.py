@@ -14,7 +14,7 @@ _LONE = "a match alone in its pool is always found"
 
 
 def draw_pools(count: int, pool: int, rng: np.random.Generator) -> Integers:
-    """Row numbers (pools, pool): all rows shuffled and cut, the incomplete rest dropped.
+    """Return row numbers (pools, pool): all rows shuffled and cut, the incomplete rest dropped.
 
     Raises:
         InvalidInput: fewer rows than a pool.
@@ -25,10 +25,10 @@ def draw_pools(count: int, pool: int, rng: np.random.Generator) -> Integers:
 
 
 def draw_distinct_pools(labels: Numbers, pool: int, rng: np.random.Generator) -> Integers:
-    """Row numbers (pools, pool): as many disjoint pools as there can be in which no label occurs twice.
+    """Return row numbers (pools, pool): as many disjoint pools as possible in which no label occurs twice.
 
     P pools take at most P rows of one label, so P is the largest for which the labels, each cut to P rows, still fill
-    them. What is over is left out at random.
+    them. Surplus rows are dropped at random.
 
     Args:
         labels: (N,) integers.
@@ -42,9 +42,9 @@ def draw_distinct_pools(labels: Numbers, pool: int, rng: np.random.Generator) ->
     at_least("distinct labels", len(sizes), pool, hint="give clips of more labels or take a smaller pool")
     pools = max(p for p in range(1, len(groups) // pool + 1) if np.minimum(sizes, p).sum() >= p * pool)
     shuffled = rng.permutation(len(groups))
-    turn = rng.permutation(len(sizes))[group]  # of a row: when its label is dealt
+    turn = rng.permutation(len(sizes))[group]  # of a row: rank of its label
     dealt = shuffled[np.argsort(turn[shuffled], kind="stable")]  # label by label, its rows in random order
     _, begins, runs = np.unique(turn[dealt], return_index=True, return_counts=True)
     kept = dealt[np.arange(len(dealt)) - np.repeat(begins, runs) < pools]
-    # Rows go to the pools in turn, so the at most `pools` neighbours of one label fall into different pools.
+    # Rows go to the pools in turn, so the up to `pools` adjacent rows of one label fall into different pools.
     return kept[: pools * pool].reshape(pool, pools).T

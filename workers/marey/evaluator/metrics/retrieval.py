@@ -1,14 +1,14 @@
 """Retrieval between text and motion: R-precision, all-pairs ranks, distance and cosine of matched pairs.
 
 Rows of `text` and `motion` are pairs. The public T2M evaluator returns both sorted by motion length; a caller that
-sorts one must sort the other, and labels, alike: a mispaired row looks like a bad motion.
+sorts one must sort the other, and the labels, in the same way.
 
 Sources: Guo et al. 2022 (T2M; pools of 32, Euclidean), SnapMoGen 2025 appendix B.2 (pools of 100; its released code
 draws them as shuffled batches too, and ranks by cosine), Petrovich et al. 2023 (TMR; all pairs, same-label hits).
 
 Ties count as their expectation under random order: of t candidates at the match's distance (itself included) with n
-nearer ones, the match stands in the first k with probability clip((k - n) / t, 0, 1). An evaluator that embeds
-everything alike so scores chance, k / pool, where a stable sort would give it 1 or whatever the row order is.
+nearer ones, the match is among the first k with probability clip((k - n) / t, 0, 1). An evaluator that gives all inputs
+one embedding scores chance, k / pool, where a stable sort would score 1 or depend on the row order.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class RPrecision:
 
     Attributes:
         top: the k of each column of `hits`.
-        clips: (used,) row of each query in what was given; those of an incomplete pool are not among them.
-        hits: (used, len(top)) 1 where the match is in the first k, 0 where it is not, between them on ties. Two runs
+        clips: (used,) row of each query in the input, without those of an incomplete pool.
+        hits: (used, len(top)) 1 if the match is in the first k, 0 if not, between them on ties. Two runs
             that draw with the same seed have the same `clips`, so their `hits` are paired, for `paired_bootstrap`.
     """
 
@@ -45,7 +45,7 @@ class RPrecision:
     hits: Array
 
     def at(self, k: int) -> float:
-        """R@k, 0 to 1: hits divided by the queries used."""
+        """Return R@k, 0 to 1: hits divided by the number of queries."""
         return float(self.hits[:, self.top.index(k)].mean())
 
 
@@ -64,7 +64,7 @@ class Ranks:
 
 @dataclass(frozen=True)
 class AllRanks:
-    """TMR's "all" protocol in both directions."""
+    """Ranks of TMR's "all" protocol in both directions."""
 
     text_to_motion: Ranks
     motion_to_text: Ranks
@@ -90,16 +90,16 @@ def r_precision(
     distinct_pools: bool = False,
     rng: np.random.Generator,
 ) -> RPrecision:
-    """R-precision, text to motion, within pools that are drawn at random.
+    """Compute R-precision, text to motion, within randomly drawn pools.
 
     T2M is `pool=32, distance="euclidean"`; SnapMoGen is `pool=100, distance="cosine"`.
 
     Args:
         text: (N, D) embeddings.
         motion: (N, D) embeddings in the same space, row by row the matches of `text`.
-        pool: candidates of a query, its match among them. The last, incomplete pool is dropped.
+        pool: candidates of a query, its match included. The last, incomplete pool is dropped.
         top: each k, 1 or more and under `pool`.
-        distance: what "near" means.
+        distance: distance by which candidates are ranked.
         labels: (N,) integers; a candidate of the query's label is a match too (TMR's threshold protocol).
         distinct_pools: draw with `draw_distinct_pools`, so that no pool holds a label twice.
 
@@ -121,9 +121,10 @@ def r_precision(
 def label_ceiling(
     labels: Numbers, *, pool: int, top: Sequence[int] = (1, 2, 3), rng: np.random.Generator
 ) -> RPrecision:
-    """R-precision of an oracle that knows every label and nothing else, in pools where only the pair is a match.
+    """Return the R-precision of an oracle that knows every label and nothing else, in pools where only the pair is a
+    match.
 
-    Clips of one label are alike to it, so among c of them in a pool it finds the right one in k tries with
+    The oracle cannot distinguish clips of one label, so among c of them in a pool it finds the match in k tries with
     probability min(k / c, 1). With the same `rng` the pools are those of `r_precision`.
 
     Args:
@@ -146,12 +147,12 @@ def label_ceiling(
 def all_ranks(
     text: Numbers, motion: Numbers, *, distance: Distance = "cosine", labels: Numbers | None = None
 ) -> AllRanks:
-    """Every text against every motion, and back: R@1, 2, 3, 5, 10 and the median rank (TMR's "all" protocol).
+    """Rank every text against every motion, and back: R@1, 2, 3, 5, 10 and the median rank (TMR's "all" protocol).
 
     Args:
         text: (N, D) embeddings, more than 10.
         motion: (N, D) embeddings in the same space, row by row the matches of `text`.
-        distance: what "near" means.
+        distance: distance by which candidates are ranked.
         labels: (N,) integers; a candidate of the query's label is a match too, and the best of them has the rank
             (TMR's threshold protocol).
 
@@ -166,7 +167,8 @@ def all_ranks(
 
 
 def matching_score(text: Numbers, motion: Numbers) -> float:
-    """MM-Dist (Guo et al. 2022): mean Euclidean distance of the pairs of (N, D) text and motion; less is better.
+    """Return MM-Dist (Guo et al. 2022): mean Euclidean distance of the pairs of (N, D) text and motion; lower is
+    better.
 
     Raises:
         InvalidInput: broken or unpaired embeddings.
@@ -176,10 +178,10 @@ def matching_score(text: Numbers, motion: Numbers) -> float:
 
 
 def clip_score(text: Numbers, motion: Numbers) -> float:
-    """Mean cosine of the pairs of (N, D) text and motion in the evaluator's own joint space, -1 to 1.
+    """Return the mean cosine of the pairs of (N, D) text and motion in the evaluator's own joint space, -1 to 1.
 
-    SnapMoGen's "CLIP score" (section 5: "the cosine similarity between text and motion features"). No CLIP network is
-    in it, so scores of different evaluators are different quantities.
+    This is SnapMoGen's "CLIP score" (section 5: "the cosine similarity between text and motion features"). It uses no
+    CLIP network, so scores of different evaluators are different quantities.
 
     Raises:
         InvalidInput: broken or unpaired embeddings, a zero vector.
@@ -199,17 +201,18 @@ def _checked_top(top: Sequence[int], candidates: int) -> tuple[int, ...]:
 
 
 def _groups(labels: Numbers | None, count: int) -> Integers:
-    """Labels, or, where there are none, each pair as a label of its own."""
+    """Return labels, or without any, each pair as a label of its own."""
     return np.arange(count) if labels is None else integers("labels", labels, count=count)
 
 
 def _comparable(text: Array, motion: Array, distance: Distance) -> tuple[Array, Array]:
-    """Vectors whose Euclidean distances have the order asked for: for unit vectors it is that of the cosine."""
+    """Return vectors whose Euclidean distances have the requested order: for unit vectors it is that of the cosine."""
     if distance not in get_args(Distance):
-        raise InvalidInput(f"no distance {distance!r}", where="distance", hint=f"take one of {get_args(Distance)}")
+        known = ", ".join(get_args(Distance))
+        raise InvalidInput(f"unknown distance {distance!r}", where="distance", hint=f"Known: {known}.")
     if distance == "cosine":
         return _unit("text", text), _unit("motion", motion)
-    # |a|² + |b|² - 2ab cancels where the vectors are long beside their differences; distances keep under a shift
+    # |a|² + |b|² - 2ab cancels if the vectors are long compared with their differences; a shift keeps distances
     middle = (text.mean(axis=0) + motion.mean(axis=0)) / 2
     return text - middle, motion - middle
 
@@ -227,7 +230,7 @@ def _unit(name: str, vectors: Array) -> Array:
 
 
 def _standing(queries: Array, candidates: Array, labels: Integers, among: Integers) -> _Standing:
-    """Standing of each query (n, D) of `labels` (n,) among candidates (m, D) of labels `among` (m,)."""
+    """Return the ranks of each query (n, D) of `labels` (n,) among candidates (m, D) of labels `among` (m,)."""
     scale = (queries**2).sum(axis=1)[:, None] + (candidates**2).sum(axis=1)  # (n, m)
     distances = scale - 2 * queries @ candidates.T
     match = labels[:, None] == among
@@ -238,13 +241,13 @@ def _standing(queries: Array, candidates: Array, labels: Integers, among: Intege
 
 
 def _hits(standing: _Standing, top: tuple[int, ...]) -> Array:
-    """Probability (n, len(top)) that a match is in the first k, the tied being in random order."""
+    """Return the probability (n, len(top)) that a match is in the first k, ties in random order."""
     miss = np.ones(len(standing.nearer))
     hits = []
     for place in range(max(top)):
-        before = place - standing.nearer  # tied ones that stand before this place
+        before = place - standing.nearer  # tied ones before this place
         left = standing.tied - before
-        other = np.maximum(left - standing.matches, 0) / np.maximum(left, 1)  # no match here, none having been before
+        other = np.maximum(left - standing.matches, 0) / np.maximum(left, 1)  # no match here, given none before
         miss = np.where((before >= 0) & (left > 0), miss * other, miss)
         hits.append(1 - miss)
     return np.stack([hits[k - 1] for k in top], axis=1)

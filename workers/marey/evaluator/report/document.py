@@ -1,10 +1,10 @@
-"""The report as JSON: the same numbers for programs, for committed results, for the next comparison.
+"""The report as JSON: the same numbers for programs, for results in version control, for the next comparison.
 
     {"schema": "marey.evaluation-report", "version": 1, "title": …, every field of `Report` by its name}
 
-Times are ISO 8601 in UTC; numbers have six significant digits (settings all of theirs); what does not apply is null.
-Clips are not inside: an exhibit has its prompt, seed, verdict and score. A field that is added with a default keeps the
-version; a field that is renamed, goes, or changes its meaning raises it.
+Times are ISO 8601 in UTC; numbers have six significant digits (settings all of theirs); inapplicable values are null.
+Clips are not included: an exhibit has its prompt, seed, verdict and score. A field added with a default keeps the
+version; a field that is renamed, removed, or changes its meaning raises it.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ DIGITS = 6  # significant; intervals are a hundred times wider
 
 
 def to_json(report: Report) -> bytes:
-    """The file. Equal reports give equal bytes."""
-    # Settings keep all their digits: they are there to be typed in again.
+    """Encode the file. Equal reports give equal bytes."""
+    # Settings keep all their digits: users type them in again.
     document = {"schema": SCHEMA, "version": VERSION, **_plain(report), "settings": dict(report.settings)}
     scores = [_text(score) for score in document.pop("scores")]
     text = _text(document, indent=2).removesuffix("\n}")
-    # A line a motion: committed results stay readable, and their differences too.
+    # One line per motion: stored results stay readable, and their differences too.
     lines = "".join(f"\n    {score}," for score in scores).removesuffix(",")
     return f'{text},\n  "scores": [{lines}\n  ]\n}}\n'.encode()
 
 
 def from_json(data: bytes, where: str = "report") -> Report:
-    """Read a report back, without its clips.
+    """Read a report, without its clips.
 
     Raises:
-        InvalidFile: no such JSON, of another version, or a field that is missing or of the wrong kind.
+        InvalidFile: invalid JSON, another version, or a field that is missing or of the wrong type.
         InvalidInput: the fields contradict each other.
     """
     try:
@@ -71,7 +71,7 @@ def _text(value: Any, indent: int | None = None) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Dataclasses, times and numbers as JSON has them; a clip is left out."""
+    """Convert dataclasses, times and numbers to JSON; a clip is left out."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         names = [f.name for f in dataclasses.fields(value) if not (isinstance(value, Exhibit) and f.name == "clip")]
         return {name: _plain(getattr(value, name)) for name in names}

@@ -22,13 +22,13 @@ from marey.evaluator.report.words import (
 )
 from marey.viz.paper import one_line
 
-ROWS_OF_TREND = 8  # the page has the rest
-# What could begin emphasis, code, a link, a picture, HTML, a column, a formula, an issue or a person's name.
+ROWS_OF_TREND = 8  # the page has all
+# Characters that could start emphasis, code, a link, a picture, HTML, a column, a formula, an issue or a mention.
 _SPECIAL = re.compile(r"([\\`*_\[\]<>&|~$#@])|(?<=\w)(:)(?=//)|(?<=\bwww)(\.)|^([-+=]|\d+[.)](?=\s|$))", re.IGNORECASE)
 
 
 def to_markdown(report: Report) -> bytes:
-    """The file. Equal reports give equal bytes."""
+    """Encode the file. Equal reports give equal bytes."""
     head = headline(report)
     blocks = [
         f"# {_text(report.title)}",
@@ -52,17 +52,17 @@ def to_markdown(report: Report) -> bytes:
 
 
 def _text(value: str) -> str:
-    """Any text as one line that says what it says: nothing in it is Markdown or HTML."""
+    """Escape any text as one line: nothing in it is Markdown or HTML."""
     return _SPECIAL.sub(lambda found: "\\" + found[0] if not found[4] else _item(found[4]), one_line(value))
 
 
 def _item(begin: str) -> str:
-    """The beginning of a list, made none: `1\\.`, `\\-`."""
+    """Escape the beginning of a list: `1\\.`, `\\-`."""
     return f"{begin[:-1]}\\{begin[-1]}"
 
 
 def _code(value: str) -> str:
-    """Any text as code; a backtick or a table's bar cannot be escaped between backticks in every renderer."""
+    """Format any text as code; not every renderer can escape a backtick or a table's bar between backticks."""
     line = one_line(value)
     if not line:
         return ""

@@ -1,6 +1,6 @@
 """Data of an evaluation report: numbers with intervals, changes, weak spots, and how to repeat it.
 
-Statements that contradict each other are refused, so that no page ever shows them.
+Contradictory statements are refused, so that no page shows them.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from marey.core.errors import InvalidInput
 from marey.evaluator.report.parts import (
     ArtifactReference,
     Exhibit,
+    GenerationSpeed,
     HeatCell,
     Metric,
     Repeats,
     Row,
-    Speed,
     TrendPoint,
     aware,
     distinct,
@@ -32,9 +32,9 @@ Against = Literal["last run", "pinned baseline"]
 
 GROUND_TRUTH, RECONSTRUCTION = "ground_truth", "reconstruction"
 ALWAYS = (GROUND_TRUTH, RECONSTRUCTION)
-"""Keys of the rows that every report has: without them a number of generated motion says nothing."""
+"""Keys of the rows that every report has: a number of generated motion has no meaning without them."""
 MOST_EXHIBITS = 6
-"""Of the best and of the worst clips each: what a person looks at, and under 1.5 MB a page with three.js."""
+"""Number of best and of worst clips: enough for a reader, and under 1.5 MB per page with three.js."""
 OWN_NUMBERS = (
     "These numbers compare runs of this evaluator on this data with each other. They are not comparable with the "
     "numbers that papers print for HumanML3D: other networks measured those, on other data."
@@ -46,10 +46,10 @@ class Baseline:
     """An earlier evaluation to compare with: same evaluator, same data.
 
     Attributes:
-        against: which of the two.
+        against: the kind of comparison.
         evaluation: its identifier.
-        bundle: what generated.
-        finished: when.
+        bundle: the bundle that generated.
+        finished: time of its end.
     """
 
     against: Against
@@ -67,9 +67,9 @@ class Change:
 
     Attributes:
         metric: its key.
-        against: which earlier evaluation.
-        before: there.
-        after: here.
+        against: the kind of the earlier evaluation.
+        before: value of the earlier evaluation.
+        after: value of this one.
         low: lower end of the 95 % interval of after - before.
         high: upper end.
         verdict: `no difference found` is a result.
@@ -96,34 +96,34 @@ class Report:
     Attributes:
         title: of the page.
         evaluation: identifier of the evaluation.
-        created: when the report was made.
+        created: time of the report.
         generator: the bundle that generated.
         licence: of its weights.
         evaluator: the network that embedded; None where only joints were measured.
         source: split or file of prompts.
-        comparability: a sentence under the numbers: with what they may be compared.
+        comparability: a sentence under the numbers on what they may be compared with.
         prompts: distinct prompts.
         motions: generated and measured.
         failed: motions that could not be generated; they count in no number.
-        repeats: what intervals are over.
+        repeats: the repeats that intervals cover.
         metrics: columns, in order.
-        rows: in order; those of `ALWAYS` among them, marked where they could not be measured.
-        judged: key of the row that changes and trend speak of: what users get.
-        baselines: what it is compared with, one of each kind at most.
+        rows: in order, including those of `ALWAYS`, marked if they could not be measured.
+        judged: key of the row that changes and trend refer to: the motion that users get.
+        baselines: earlier evaluations to compare with, at most one of each kind.
         changes: of the judged row.
-        regressed: an alarm was raised; None = there was nothing to compare with.
+        regressed: True if an alarm was raised; None = no baseline.
         alarms: a sentence for each reason.
         trend: runs with the same evaluator and data, the oldest first, this one last.
         heat: prompt checks by action and style.
-        ranked_by: what `best` and `worst` are ordered by.
+        ranked_by: order of `best` and `worst`.
         best: clips, the best first.
         worst: clips, the worst first.
         speed: of the generation.
-        command: a line for a shell that repeats the evaluation.
+        command: a shell command that repeats the evaluation.
         settings: of the generator and the evaluation; JSON.
         software: versions by name.
         notes: further remarks for the reader.
-        scores: of each motion, for the comparison that a later run makes; in the JSON alone.
+        scores: scores of each motion, for the comparison of a later run; in the JSON alone.
     """
 
     title: str
@@ -150,7 +150,7 @@ class Report:
     ranked_by: str = ""
     best: tuple[Exhibit, ...] = ()
     worst: tuple[Exhibit, ...] = ()
-    speed: Speed | None = None
+    speed: GenerationSpeed | None = None
     command: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
     software: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -162,9 +162,9 @@ class Report:
         if min(self.prompts, self.motions, self.failed) < 0:
             raise InvalidInput(f"{self.prompts} prompts, {self.motions} motions, {self.failed} failed")
         if bool(self.regressed) != bool(self.alarms):
-            raise InvalidInput("a run has regressed when an alarm says why, and only then", where="regressed")
+            raise InvalidInput("`regressed` needs an alarm, and an alarm needs `regressed`", where="regressed")
         if self.regressed is not None and not self.baselines:
-            raise InvalidInput("nothing to have regressed against", where="regressed", hint="Give a baseline, or None.")
+            raise InvalidInput("`regressed` needs a baseline", where="regressed", hint="Give a baseline, or None.")
         if max(len(self.best), len(self.worst)) > MOST_EXHIBITS:
             raise InvalidInput(f"at most {MOST_EXHIBITS} clips of a kind", where="best, worst")
         try:
@@ -175,11 +175,11 @@ class Report:
         self._check_changes()
 
     def metric(self, key: str) -> Metric:
-        """A column by its key."""
+        """Return a column by its key."""
         return next(metric for metric in self.metrics if metric.key == key)
 
     def row(self, key: str) -> Row:
-        """A row by its key."""
+        """Return a row by its key."""
         return next(row for row in self.rows if row.key == key)
 
     def _check_table(self) -> None:
@@ -198,7 +198,7 @@ class Report:
             if unknown := [key for key in keys if key not in metrics]:
                 raise InvalidInput(f"unknown metric {unknown[0]!r}", where=where)
         if any(a.finished > b.finished for a, b in zip(self.trend, self.trend[1:], strict=False)):
-            raise InvalidInput("runs come the oldest first", where="trend")
+            raise InvalidInput("runs must be ordered by age, the oldest first", where="trend")
 
     def _check_changes(self) -> None:
         distinct("baselines", [baseline.against for baseline in self.baselines])
@@ -209,7 +209,7 @@ class Report:
             if change.metric not in metrics:
                 raise InvalidInput(f"unknown metric {change.metric!r}", where=where)
             if change.against not in known:
-                raise InvalidInput(f"there is no {change.against} among the baselines", where=where)
+                raise InvalidInput(f"the baselines lack the {change.against}", where=where)
             if change.verdict == "no difference found":
                 continue
             rise = {"higher": "better", "lower": "worse", "": ""}[metrics[change.metric].better]

@@ -1,7 +1,7 @@
-"""The report as one HTML file: tables, plots and small 3D players, for a person and without a network.
+"""The report as one HTML file: tables, plots and small 3D players, readable without a network.
 
-Style, scripts and motions are inside. The content security policy names the page's own scripts and style by their
-hashes and lets it fetch nothing; every text is escaped: a prompt is data, whatever is in it.
+Style, scripts and motions are included. The content security policy lists the page's own scripts and style by their
+hashes and lets it fetch nothing; every text is escaped, prompts included.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from marey.viz.player import motion_document
 def to_html(report: Report) -> bytes:
     """Render the page. Equal reports give equal bytes.
 
-    It holds three.js only when an exhibit has its clip: 0.6 MB then, and 0.05 MB for each clip of 10 s.
+    It includes three.js only if an exhibit has its clip: 0.6 MB then, and 0.05 MB for each clip of 10 s.
     """
     numbers = itertools.count()
     body = render("report.html.jinja", report=report, scripts=_scripts(report), next_clip=lambda: next(numbers))
@@ -30,7 +30,7 @@ def to_html(report: Report) -> bytes:
 
 
 def _scripts(report: Report) -> Markup:
-    """Every script of the page. All of it is the product's own but the motions, which are JSON that ends no element."""
+    """Return every script of the page: the product's own code, and the motions as JSON that cannot end its element."""
     code = f"<script>\n{asset('report.js', PACKAGE)}</script>"
     if clips := _clips_of(report):
         motion = script_json(motion_document(clips, [""] * len(clips)))
@@ -42,5 +42,5 @@ def _scripts(report: Report) -> Markup:
 
 
 def _clips_of(report: Report) -> list[MotionClip]:
-    """The motions that the page holds, in the order of its players."""
+    """Return the motions of the page, in the order of its players."""
     return [exhibit.clip for exhibit in (*report.worst, *report.best) if exhibit.clip is not None]

@@ -1,7 +1,7 @@
 """Parts of a report: numbers, rows, clips, references.
 
-A number that does not exist stays a marked place with a reason; NaN and infinity are refused where they enter, so that
-no page ever shows them. Numbers are given in the unit they are printed in: a share in percent is 94.9.
+A missing number is a marked place with a reason; NaN and infinity are refused on construction, so that no page shows
+them. Numbers are given in the unit they are printed in: a share in percent is 94.9.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Value:
     Attributes:
         mean: over the repeats; None = not available.
         half_width: of its 95 % interval over the repeats; None = measured once.
-        n: motions (or prompts) that one repeat counts; for a distance of distributions the smaller set.
+        n: motions (or prompts) of one repeat; for a distance of distributions the smaller set.
         note: a remark for the reader; the reason if there is no number.
-        dimensions: of the embeddings, for a metric that needs many motions a dimension (FID).
+        dimensions: of the embeddings, for a metric that needs many motions per dimension (FID).
     """
 
     mean: float | None
@@ -50,12 +50,12 @@ class Value:
 
     @classmethod
     def missing(cls, why: str) -> Value:
-        """A marked place in the table."""
+        """Create a marked place in the table."""
         return cls(None, note=why)
 
     @property
     def too_few(self) -> bool:
-        """The number stands on fewer than 5 motions a dimension: it is mostly sampling noise."""
+        """True if the number has fewer than 5 motions per dimension: it is mostly sampling noise."""
         return (
             self.mean is not None and self.dimensions is not None and self.n < SAMPLES_PER_DIMENSION * self.dimensions
         )
@@ -69,11 +69,11 @@ class Metric:
         key: `r_precision_1`.
         label: `R-precision, top 1`.
         unit: printed after the number; empty for a bare one.
-        better: which way is better; empty where neither is (diversity: as the ground truth).
+        better: the better direction; empty if neither is (diversity: near the ground truth).
         digits: after the point.
         explanation: one sentence for readers who do not know the metric.
-        measured_by: the network (name and hash) or the way it was measured. Columns of different ones share no table.
-        measured_on: the data, where it is not the report's source: the compositional split has columns of its own.
+        measured_by: the network (name and hash) or the method. Columns of different ones share no table.
+        measured_on: the data, if not the report's source: the compositional split has columns of its own.
     """
 
     key: str
@@ -87,7 +87,7 @@ class Metric:
 
     @property
     def name(self) -> str:
-        """Name of the metric in a sentence, with its data if those differ from the report's."""
+        """Return the metric's name in a sentence, with its data if those differ from the report's."""
         return f"{self.label} on {self.measured_on}" if self.measured_on else self.label
 
 
@@ -98,8 +98,8 @@ class Row:
     Attributes:
         key: `ground_truth`, `reconstruction`, `raw`, `exported`, ….
         label: as printed.
-        note: what the row is, in a few words.
-        values: by metric; a metric that makes no sense for the row is left out.
+        note: description of the row, in a few words.
+        values: by metric; a metric without meaning for the row is left out.
     """
 
     key: str
@@ -138,7 +138,7 @@ class HeatCell:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A clip that the page shows. Read back from JSON it has no clip, and the page then shows its text alone."""
+    """A clip that the page shows. An exhibit read from JSON has no clip, and the page shows its text alone."""
 
     prompt: str
     seed: int
@@ -152,7 +152,7 @@ class Exhibit:
 
 
 @dataclass(frozen=True)
-class Speed:
+class GenerationSpeed:
     """Generation speed; `note` says on which hardware (workers, device, batch)."""
 
     motions_per_second: float
@@ -165,7 +165,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class ArtifactReference:
-    """A bundle, a split, a file: by name and by the sha256 of its content."""
+    """Reference to a bundle, a split or a file: name and sha256 of the content."""
 
     name: str
     sha256: str
@@ -177,8 +177,8 @@ class Repeats:
 
     Attributes:
         count: repeats.
-        regenerated: of those, how many generated all motions anew; the others drew pools only, and an interval over
-            them says nothing of what another generation would give.
+        regenerated: number of repeats that generated all motions anew; the others drew pools only, and an interval over
+            those does not cover the variation of another generation.
     """
 
     count: int

@@ -1,8 +1,8 @@
-"""The numbers as tables of words, for the page and for Markdown alike.
+"""The numbers as tables of text, shared by the page and Markdown.
 
-Columns of different evaluators never share a table, and a column on other data than the rest says so. What one
-evaluator measured is several tables where one would be wider than a window. The changes since the last run
-and since the pinned baseline stand under the judged row.
+Columns of different evaluators never share a table, and a column on other data is labelled. The columns of one
+evaluator are split into several tables where one would be wider than a window. Changes since the last run and since the
+pinned baseline are listed under the judged row.
 """
 
 from __future__ import annotations
@@ -28,20 +28,21 @@ from marey.evaluator.report.words import (
 Kind = Literal["value", "missing", "blank", "better", "worse", "same"]
 NOT_AVAILABLE = "not available"
 MOST_COLUMNS = 6
-"""Of a table: with intervals and row names, what a window of 1,000 pixels shows. R-precision in both pools is six."""
+"""Largest number of columns of a table with intervals and row names in 1,000 pixels. R-precision in both pools is
+six."""
 MOST_RUNS = 30
-"""Of a trend: half a year of weekly runs."""
+"""Largest number of runs of a trend: half a year of weekly runs."""
 MOST_STYLES = 8
-"""Columns of the heat map that have room to spare; more stand closer together, their names upright."""
+"""Columns of the heat map with normal width; more columns are narrower, their names upright."""
 RAMP = (0.2, 0.4, 0.6, 0.8, 0.95)
-"""Shares passed at which a cell of the heat map gets paler; the last step begins where a bar of 95 % would be met."""
+"""Shares passed at which a cell of the heat map gets paler; the last step begins at the 95 % target."""
 LEAST_TRIALS = 3
-"""A cell of the heat map with fewer is not named among the weakest: chance would choose it."""
+"""Smallest number of trials of a cell that may be named among the weakest: fewer would be chance."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One place of a table: `0.412`, `± 0.008`, `N 337, D 512: N < 5·D`, and the numbers of its footnotes."""
+    """One place of a table: `0.412`, `± 0.008`, `N 337, D 512: N < 5·D`, with the numbers of its footnotes."""
 
     kind: Kind
     text: str = ""
@@ -52,7 +53,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Line:
-    """One row; `of` says whether it holds values or changes of the row above."""
+    """One row; `of` is the kind: values, or changes of the row above."""
 
     of: Literal["values", "changes"]
     label: str
@@ -63,7 +64,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns that one evaluator measured."""
+    """Columns measured by one evaluator."""
 
     measured_by: str
     metrics: tuple[Metric, ...]
@@ -73,7 +74,7 @@ class Table:
 
 @dataclass
 class _Footnotes:
-    """Numbers for texts; the same text has one number."""
+    """Numbers of footnotes; equal texts share one number."""
 
     numbers: dict[str, int] = field(default_factory=dict[str, int])
 
@@ -82,7 +83,7 @@ class _Footnotes:
 
 
 def tables_of(report: Report) -> tuple[Table, ...]:
-    """Tables of each evaluator, in the order of the metrics; footnotes are numbered through."""
+    """Return the tables of each evaluator, in the order of the metrics; footnotes are numbered across them."""
     groups: dict[str, list[Metric]] = {}
     for metric in report.metrics:
         groups.setdefault(metric.measured_by, []).append(metric)
@@ -96,7 +97,7 @@ def tables_of(report: Report) -> tuple[Table, ...]:
 
 
 def _cut(metrics: Sequence[Metric]) -> Iterator[Sequence[Metric]]:
-    """The columns of one table after another, about as many in each."""
+    """Split columns into tables of about equal width."""
     size = math.ceil(len(metrics) / math.ceil(len(metrics) / MOST_COLUMNS))
     for begin in range(0, len(metrics), size):
         yield metrics[begin : begin + size]
@@ -144,47 +145,47 @@ def _change_line(report: Report, baseline: Baseline, metrics: Sequence[Metric]) 
 
 @dataclass(frozen=True)
 class Heat:
-    """Prompt checks by action (rows) and style (columns), with sums; places never tried are None."""
+    """Prompt checks by action (rows) and style (columns), with sums; untried places are None."""
 
     acts: tuple[str, ...]
     styles: tuple[str, ...]
     cells: Mapping[tuple[str, str], HeatCell]
 
     def cell(self, act: str, style: str) -> HeatCell | None:
-        """One place; None where nothing was tried."""
+        """Return one place; None without trials."""
         found = self.cells.get((act, style))
         return found if found and found.trials else None
 
     def total(self, act: str | None = None, style: str | None = None) -> HeatCell:
-        """The sum of a row, of a column, or of all."""
+        """Return the sum of a row, of a column, or of all."""
         chosen = [c for c in self.cells.values() if act in (None, c.act) and style in (None, c.style)]
         return HeatCell(act or "", style or "", sum(c.trials for c in chosen), sum(c.passed for c in chosen))
 
     @property
     def weakest(self) -> tuple[HeatCell, ...]:
-        """Up to three places where most fails, the worst first."""
+        """Return up to three places with the highest failure rates, the worst first."""
         tried = [c for c in self.cells.values() if c.trials >= LEAST_TRIALS and c.passed < c.trials]
         return tuple(sorted(tried, key=lambda c: (share(c), -c.trials))[:3])
 
 
 def heat_of(report: Report) -> Heat:
-    """The heat map; actions and styles in the order in which they first come."""
+    """Build the heat map; actions and styles in the order of their first occurrence."""
     cells = {(cell.act, cell.style): cell for cell in report.heat}
     return Heat(tuple(dict.fromkeys(a for a, _ in cells)), tuple(dict.fromkeys(s for _, s in cells)), cells)
 
 
 def share(cell: HeatCell) -> float:
-    """Share of trials that passed, 0 to 1."""
+    """Return the share of trials that passed, 0 to 1."""
     return cell.passed / cell.trials
 
 
 def heat_step(cell: HeatCell) -> int:
-    """Step of the colour ramp: 0 where most fails, 5 where nearly all passes."""
+    """Return the step of the colour ramp: 0 where most fails, 5 where nearly all passes."""
     return sum(share(cell) >= bound for bound in RAMP)
 
 
 def in_percent(cell: HeatCell) -> str:
-    """Whole percent that says 0 and 100 only where none or all passed."""
+    """Format whole percent; 0 and 100 only if none or all passed."""
     percent = round(100 * share(cell))
     if cell.passed not in (0, cell.trials):
         percent = min(max(percent, 1), 99)
@@ -192,17 +193,17 @@ def in_percent(cell: HeatCell) -> str:
 
 
 def weakest_of(heat: Heat) -> str:
-    """One sentence on where most fails; empty where nothing does."""
+    """Return one sentence on the highest failure rates; empty if no check failed."""
     named = [f"{place_of(c)} {c.passed} of {c.trials}" for c in heat.weakest]
     return f"Weakest: {', '.join(named)}." if named else ""
 
 
 def place_of(cell: HeatCell) -> str:
-    """`kick (exhausted)`."""
+    """Name a cell: `kick (exhausted)`."""
     return f"{cell.act} ({cell.style})" if cell.style else cell.act
 
 
 def trended(report: Report) -> tuple[tuple[TrendPoint, ...], tuple[Metric, ...]]:
-    """The last runs, and the metrics that any of them has."""
+    """Return the last runs, and the metrics that any of them has."""
     runs = report.trend[-MOST_RUNS:]
     return runs, tuple(m for m in report.metrics if any(m.key in run.values for run in runs))

@@ -1,4 +1,4 @@
-"""The templates of the report: Jinja2, every text escaped, a missing name an error."""
+"""The templates of the report: Jinja2, every text escaped, a missing name is an error."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _NAMES = {
 
 
 def _without_controls(value: Any) -> Any:
-    """Turn control characters of a text (line breaks, turns of the writing direction) into spaces."""
+    """Replace control characters of a text (line breaks, direction overrides) by spaces."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     return "".join(" " if unicodedata.category(character).startswith("C") else character for character in value)

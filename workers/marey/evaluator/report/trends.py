@@ -11,9 +11,9 @@ from marey.evaluator.report.parts import Metric, TrendPoint
 from marey.evaluator.report.words import MINUS, day, moment, number, with_unit
 
 WIDTH, HEIGHT = 340, 170
-LEFT, RIGHT, TOP, BOTTOM = 52, 328, 16, 136  # of the plot in the picture
-HIT = 9  # radius that a pointer finds
-TINY = 1e-12  # no metric is printed with so many digits
+LEFT, RIGHT, TOP, BOTTOM = 52, 328, 16, 136  # edges of the plot in the picture
+HIT = 9  # radius of the area that reacts to a pointer
+TINY = 1e-12  # smaller than the last printed digit of any metric
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class Plot:
 
     Attributes:
         name: prefix of the ids in the picture.
-        metric: what is drawn.
+        metric: the drawn metric.
         runs: the oldest first.
-        description: what the picture shows, in words.
+        description: description of the picture, in words.
         ticks: heights and labels of the grid.
-        bundle_changes: where another bundle begins.
+        bundle_changes: positions where another bundle begins.
         path: the line through the runs; a run without the metric is a gap.
-        dots: the runs that have the metric.
+        dots: runs that have the metric.
     """
 
     name: str
@@ -56,7 +56,7 @@ def plot_of(name: str, metric: Metric, runs: Sequence[TrendPoint]) -> Plot | Non
 
     Args:
         name: prefix of the ids in the picture; one a page.
-        metric: what is drawn.
+        metric: the metric to draw.
         runs: the oldest first.
     """
     known = [run.values[metric.key] for run in runs if metric.key in run.values]
@@ -89,7 +89,7 @@ def plot_of(name: str, metric: Metric, runs: Sequence[TrendPoint]) -> Plot | Non
 
 
 def ticks_of(values: Sequence[float]) -> list[float]:
-    """Three to five round numbers, the first under all values and the last over them; equal values have room too."""
+    """Return three to five round numbers that enclose all values; equal values get a range too."""
     low, high = min(values), max(values)
     scale = max(abs(low), abs(high))
     if high - low <= max(1e-6 * scale, TINY):  # equal, or so close that steps would drown in rounding

@@ -17,10 +17,10 @@ MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", 
 NOTHING_EARLIER = "There is no earlier evaluation of this model with this evaluator and this data to compare with."
 LEGEND = "↑ higher is better, ↓ lower is better."
 CHANGES = (
-    "A change holds the difference, what it means, and its 95\u00a0% interval, by paired bootstrap over the prompts of "
+    "A change has the difference, its direction, and its 95\u00a0% interval, by paired bootstrap over the prompts of "
     "both runs. No difference found means that the interval holds 0."
 )
-MOST_NAMED = 4  # metrics that the one sentence names
+MOST_NAMED = 4  # metrics that the sentence names
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Headline:
 
 
 def headline(report: Report) -> Headline:
-    """Regressed or not, and why, in one sentence."""
+    """Return regressed or not, with the reason, in one sentence."""
     if not report.baselines:
         return Headline("Not compared", NOTHING_EARLIER, "unknown")
     tally = "; ".join(
@@ -45,7 +45,7 @@ def headline(report: Report) -> Headline:
     if report.regressed:
         return Headline("Regressed", report.alarms[0], "worse", (*report.alarms[1:], tally))
     if report.regressed is None:
-        return Headline("Not judged", f"Nothing was measured that may raise an alarm. {tally}", "unknown")
+        return Headline("Not judged", f"No measured metric can raise an alarm. {tally}", "unknown")
     return Headline("No regression found", tally, "same")
 
 
@@ -72,7 +72,8 @@ def _listed(names: list[str]) -> str:
 
 
 def sentence_of(change: Change, metric: Metric) -> str:
-    """`Prompt adherence fell from 94.4 % to 88.1 % against the last run (95 % interval of the difference: …).`"""
+    """Describe a change: `Prompt adherence fell from 94.4 % to 88.1 % against the last run (95 % interval of the
+    difference: …).`"""
     before, after = (with_unit(number(v, metric), metric) for v in (change.before, change.after))
     verb = "rose" if change.after > change.before else "fell"
     moved = f"{verb} from {before} to {after}" if change.after != change.before else f"stayed at {after}"
@@ -82,39 +83,39 @@ def sentence_of(change: Change, metric: Metric) -> str:
 
 
 def number(value: float, metric: Metric) -> str:
-    """A number with the metric's digits and a real minus; never `−0`."""
+    """Format a number with the metric's digits and a real minus; never `−0`."""
     text = f"{value:.{metric.digits}f}"
     return text.lstrip("-") if not text.strip("-0.") else text.replace("-", MINUS)
 
 
 def signed(value: float, metric: Metric) -> str:
-    """A difference, its sign always there."""
+    """Format a difference, always with its sign."""
     text = number(value, metric)
     return text if text.startswith(MINUS) else f"+{text}" if text.strip("0.") else f"±{text}"
 
 
 def with_unit(text: str, metric: Metric) -> str:
-    """A number as it stands in a sentence."""
+    """Format a number for a sentence."""
     return f"{text}{SPACE}{metric.unit}" if metric.unit else text
 
 
 def interval_of(change: Change, metric: Metric) -> str:
-    """`−9.8 to −2.9`, of the difference."""
+    """Format the interval of a difference: `−9.8 to −2.9`."""
     return f"{signed(change.low, metric)} to {signed(change.high, metric)}"
 
 
 def arrow(change: Change) -> str:
-    """Direction of the change as an arrow; the word beside it says if it is an improvement."""
+    """Return the direction of the change as an arrow; the word beside it tells if it is an improvement."""
     return "↑" if change.after > change.before else "↓" if change.after < change.before else "="
 
 
 def direction(metric: Metric) -> str:
-    """`higher is better`; empty for a metric without a better side."""
+    """Return `higher is better`; empty for a metric without a better direction."""
     return f"{metric.better} is better" if metric.better else ""
 
 
 def counts_of(value: Value) -> str:
-    """N and D of a distance of distributions, and the mark when N < 5·D; empty for other numbers."""
+    """Return N and D of a distance of distributions, and the mark if N < 5·D; empty for other numbers."""
     if value.dimensions is None or value.mean is None:
         return ""
     mark = f": N{SPACE}<{SPACE}{SAMPLES_PER_DIMENSION}·D" if value.too_few else ""
@@ -122,7 +123,7 @@ def counts_of(value: Value) -> str:
 
 
 def too_few_note(value: Value) -> str:
-    """Explanation of the mark for too few motions."""
+    """Return the explanation of the mark for too few motions."""
     wanted = SAMPLES_PER_DIMENSION * (value.dimensions or 0)
     return (
         f"N = {value.n} motions are fewer than {SAMPLES_PER_DIMENSION}·D = {wanted} for embeddings of D = "
@@ -131,10 +132,10 @@ def too_few_note(value: Value) -> str:
 
 
 def intervals_of(repeats: Repeats) -> str:
-    """Explanation of ±; intervals without regeneration are labelled."""
+    """Return the explanation of ±; intervals without regeneration are labelled."""
     count, anew = repeats.count, repeats.regenerated
     if count == 1:
-        return "One repeat: numbers stand without interval."
+        return "One repeat: numbers have no interval."
     said = f"± is half of the 95{SPACE}% interval over {count} repeats"
     if anew == count:
         return f"{said}, each of which generated every motion anew."
@@ -144,24 +145,24 @@ def intervals_of(repeats: Repeats) -> str:
 
 
 def moment(time: datetime) -> str:
-    """`22 Nov 2026, 07:05 UTC`: English months on every machine."""
+    """Format a time: `22 Nov 2026, 07:05 UTC`, with English months on every machine."""
     utc = time.astimezone(UTC)
     return f"{day(time)}, {utc:%H:%M} UTC"
 
 
 def day(time: datetime) -> str:
-    """`22 Nov 2026`."""
+    """Format a day: `22 Nov 2026`."""
     utc = time.astimezone(UTC)
     return f"{utc.day} {MONTHS[utc.month - 1]} {utc.year}"
 
 
 def score_of(exhibit: Exhibit) -> str:
-    """Three digits tell clips apart."""
+    """Format a score with three digits, which distinguish clips."""
     return f"{exhibit.score:.3f}".replace("-", MINUS)
 
 
 def speed_of(report: Report) -> str:
-    """`1.42 motions a second, 9.80 s a motion (median), 1 worker`; empty when it was not measured."""
+    """Format a speed: `1.42 motions a second, 9.80 s a motion (median), 1 worker`; empty if it was not measured."""
     if report.speed is None:
         return ""
     rate, median = report.speed.motions_per_second, report.speed.median_seconds_per_motion
@@ -170,5 +171,5 @@ def speed_of(report: Report) -> str:
 
 
 def plain(value: object) -> str:
-    """A setting as a person types it."""
+    """Format a setting as a user types it."""
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

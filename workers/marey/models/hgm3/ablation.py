@@ -1,10 +1,11 @@
-"""What hard token mining and the hierarchy of conditions are worth, on several training seeds.
+"""Ablation of hard token mining and of the hierarchy of conditions, on several training seeds.
 
     marey train ablate data/prepared hgm3-starter --steps 1500 --seeds 3 -o report
 
-Everything but the masked transformer is the bundle's: it is trained from nothing, once with hard and once with random
-masks a seed, with as many steps each; every result is then decoded hierarchically, flat, and with at least one token a
-pass, and judged on the evaluation prompts. What is finished is kept: called again, it goes on.
+All networks but the masked transformer are the bundle's. The masked transformer is trained from scratch, once with hard
+and once with random masks per seed, for the same number of steps. Every result is then decoded hierarchically, flat,
+and with at least one token per pass, and judged on the evaluation prompts. Finished variants are kept: a second call
+continues.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from pathlib import Path
 from marey.bundles import find_bundle
 from marey.checks.prompts import evaluation_prompts
 from marey.core.errors import InvalidBundle
-from marey.models.hgm3.assembly import assemble, take_apart
+from marey.models.hgm3.assembly import assemble, unpack
 from marey.models.hgm3.config import HGM3Config
-from marey.models.hgm3.generate import Generator, Settings
+from marey.models.hgm3.generate import Generator, SamplingSettings
 from marey.models.hgm3.train import train_stage
 from marey.text.pipeline import TextPipeline
 from marey.training.ablation import judge, table
@@ -30,9 +31,9 @@ from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 
 DECODINGS = {
-    "hierarchical": Settings(motion_steps=2, action_steps=5),
-    "flat": Settings(motion_steps=0, action_steps=0),
-    "hierarchical, one token a pass at least": Settings(motion_steps=2, action_steps=5, min_progress=True),
+    "hierarchical": SamplingSettings(motion_steps=2, action_steps=5),
+    "flat": SamplingSettings(motion_steps=0, action_steps=0),
+    "hierarchical, one token a pass at least": SamplingSettings(motion_steps=2, action_steps=5, min_progress=True),
 }
 
 
@@ -41,8 +42,8 @@ def train_variant(
 ) -> dict[str, float]:
     """Train one masked transformer beside the bundle's other parts; write its bundle and return all its numbers."""
     shutil.rmtree(folder, ignore_errors=True)
-    take_apart(find_bundle(bundle), folder / "run")
-    encoded = folder.parent / TOKENS  # of the tokenizer that all variants share
+    unpack(find_bundle(bundle), folder / "run")
+    encoded = folder.parent / TOKENS  # tokens of the tokenizer that all variants share
     if encoded.is_file():
         shutil.copy(encoded, folder / "run")
     found = train_stage("masked", replace(options, run=folder / "run", config=config))
@@ -52,7 +53,7 @@ def train_variant(
 
 
 def ablate(data: Path, bundle: str, output: Path, *, steps: int, batch: int | None, seeds: int, threads: int) -> str:
-    """Train and judge; write `results.json` and `results.md`, and return the table.
+    """Train and judge all variants; write `results.json` and `results.md`, and return the table.
 
     Raises:
         InvalidBundle: the bundle declares no text pipeline.
@@ -62,7 +63,7 @@ def ablate(data: Path, bundle: str, output: Path, *, steps: int, batch: int | No
     if batch is not None:
         config = replace(config, train_masked=replace(config.train_masked, batch=batch))
     if given.text is None:
-        raise InvalidBundle("does not say how it reads prompts", where=bundle)
+        raise InvalidBundle("the bundle declares no text pipeline", where=bundle)
     texts = TextPipeline.load(given.text).features([p.text for p in evaluation_prompts()])
     results: dict[str, list[dict[str, float]]] = defaultdict(list)
     for seed, mask in product(range(seeds), ("hard", "random")):

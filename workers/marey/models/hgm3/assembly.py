@@ -1,4 +1,4 @@
-"""From the parts of a run to a bundle, and back: the parts of a bundle as a run that training goes on from."""
+"""Assembly of a bundle from the parts of a run, and its inverse: the parts of a bundle as a run to continue from."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from marey.models.hgm3.bundle import MODEL, load_networks
 from marey.models.hgm3.config import HGM3Config
 from marey.nn.bundling import write_generator
 from marey.training.assembly import gather, scatter
-from marey.training.staging import Recipe
+from marey.training.staging import TrainingRecipe
 
-RECIPE = Recipe(
+RECIPE = TrainingRecipe(
     read=HGM3Config.from_dict,
     built_from={
         "tokenizer": ("layout", "features", "joints", "tokenizer"),
@@ -53,10 +53,10 @@ def assemble(
     )  # fmt: skip
 
 
-def take_apart(bundle: Bundle, run: Path) -> HGM3Config:
+def unpack(bundle: Bundle, run: Path) -> HGM3Config:
     """Write the parts of a bundle into a run folder, as if its stages had just finished there.
 
-    What a bundle does not hold is made up as well as can be: the predictor starts as its teacher.
+    Parts that a bundle does not hold are initialised: the predictor starts as its teacher.
 
     Returns:
         the bundle's configuration.

@@ -1,4 +1,4 @@
-"""HGM³'s networks as one bundle: assembling, loading, and a random one for the machinery's tests."""
+"""HGM³'s networks as one bundle: assembly, loading, and a random bundle for tests."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ MODEL = "hgm3"
 
 @dataclass(frozen=True)
 class Networks:
-    """All parts of a bundle."""
+    """All networks of a bundle."""
 
     tokenizer: Tokenizer
     masked: MaskedTransformer
-    predictor: LossPredictor  # the teacher, for the heat map
+    predictor: LossPredictor  # the teacher (exponential moving average), for the heat map
     residual: ResidualTransformer
     length: LengthEstimator
 
     @classmethod
     def build(cls, config: HGM3Config) -> Networks:
-        """Freshly initialised networks."""
+        """Build freshly initialised networks."""
         return cls(
             Tokenizer(config),
             MaskedTransformer(config),
@@ -41,7 +41,7 @@ class Networks:
         )
 
     def parts(self) -> dict[str, nn.Module]:
-        """Part name to network."""
+        """Return the networks by part name."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
@@ -52,7 +52,7 @@ def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
     if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"is a bundle of {bundle.manifest.model}, not of {MODEL}", where=str(bundle.path))
+        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
     config = HGM3Config.from_dict(bundle.manifest.parameters)
     networks = Networks.build(config)
     for name, network in networks.parts().items():
@@ -64,9 +64,9 @@ def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
 
 
 def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int = 0) -> Bundle:
-    """A real bundle with random weights: it exercises everything and generates nonsense (manifest `random` = true).
+    """Write a bundle with random weights, for tests: it runs like a trained one (manifest `random` = true).
 
-    Statistics are those of a person standing still, so that joints stay in sight.
+    Statistics are those of a person standing still, so that joints stay within a sane range.
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config

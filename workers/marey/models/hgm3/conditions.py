@@ -32,12 +32,12 @@ class GraphBatch:
     present: Tensor  # (B, S) bool
 
     def select(self, rows: Tensor) -> GraphBatch:
-        """The graphs at `rows` (indices or bool)."""
+        """Return the graphs at `rows` (indices or bool)."""
         return GraphBatch(self.nodes[rows], self.adjacency[rows], self.present[rows])
 
 
 def graph_batch(texts: Sequence[TextFeatures], config: ConditionConfig, device: torch.device) -> GraphBatch:
-    """Put nodes into slots: motion 0, then actions, then specifics; what is absent is zero.
+    """Put nodes into slots: motion 0, then actions, then specifics; absent slots are zero.
 
     Raises:
         InvalidInput: features of another encoder's width.
@@ -49,7 +49,7 @@ def graph_batch(texts: Sequence[TextFeatures], config: ConditionConfig, device: 
     for row, text in enumerate(texts):
         if text.nodes.shape[1] != config.text_width:
             raise InvalidInput(
-                f"text features are {text.nodes.shape[1]} wide, this bundle reads {config.text_width}",
+                f"text features have width {text.nodes.shape[1]}; this bundle reads {config.text_width}",
                 where=text.prompt[:60],
                 hint="They come from another encoder. Parse the prompt again for this bundle.",
             )
@@ -63,10 +63,10 @@ def graph_batch(texts: Sequence[TextFeatures], config: ConditionConfig, device: 
 
 
 class TextNormalizer(nn.Module):
-    """Standardises text features by the training set's mean and std, apart for the three node levels (ours).
+    """Standardisation of text features by the training set's mean and std, separate for the three node levels (ours).
 
-    Sentence encoders put "left hand" and "right hand" nearly parallel; what differs is small beside what all motion
-    captions share. In training a little noise stands for the phrases that the captions do not have.
+    Sentence encoders map "left hand" and "right hand" to nearly parallel vectors; their difference is small compared
+    with the part that all motion captions share. Noise in training stands in for phrasings that the captions lack.
     """
 
     mean: Tensor  # (3, W)
@@ -81,12 +81,12 @@ class TextNormalizer(nn.Module):
         self.register_buffer("slot_level", torch.tensor(level), persistent=False)
 
     def forward(self, nodes: Tensor, present: Tensor) -> Tensor:
-        """(B, S, W) -> (B, S, W), zeros in absent slots."""
+        """Standardise (B, S, W); zeros in absent slots."""
         index: Tensor = self.get_buffer("slot_level")
         return self._noisy((nodes.float() - self.mean[index]) / self.std[index]) * present[..., None]
 
     def sentence(self, features: Tensor) -> Tensor:
-        """(B, W) encodings of whole sentences, standardised."""
+        """Standardise encodings (B, W) of whole sentences."""
         return self._noisy((features.float() - self.mean[MOTION]) / self.std[MOTION])
 
     def _noisy(self, x: Tensor) -> Tensor:
@@ -124,8 +124,8 @@ class GraphAttention(nn.Module):
         return (torch.softmax(logits, -1) * edge).to(h.dtype)
 
 
-class TextEncoder(nn.Module):
-    """Graph batch to node embeddings C (B, S, W): standardise, then reason over the whole graph once."""
+class GraphEncoder(nn.Module):
+    """Encoder of a graph batch as node embeddings C (B, S, W): standardise, then one layer of graph attention."""
 
     def __init__(self, config: ConditionConfig) -> None:
         super().__init__()
@@ -133,12 +133,12 @@ class TextEncoder(nn.Module):
         self.graph = GraphAttention(config.text_width, config.dropout)
 
     def forward(self, batch: GraphBatch) -> Tensor:
-        """(B, S, W)."""
+        """Encode a batch as (B, S, W)."""
         return self.graph(self.normalizer(batch.nodes, batch.present), batch.adjacency)
 
 
 class Condition(nn.Module):
-    """Node embeddings to condition tokens of width w, and the null condition of guidance."""
+    """Projection of node embeddings to condition tokens of width w, with the null condition of guidance."""
 
     def __init__(self, config: ConditionConfig, width: int) -> None:
         super().__init__()
@@ -147,7 +147,7 @@ class Condition(nn.Module):
         self.null = nn.Parameter(torch.zeros(width))  # in slot 0, the rest masked; the same at all levels (ours)
 
     def forward(self, nodes: Tensor, dropped: Tensor | None = None) -> Tensor:
-        """(B, S, W) -> (B, S, w); samples marked in `dropped` (B,) bool carry the null token in slot 0."""
+        """Project (B, S, W) to (B, S, w); samples marked in `dropped` (B,) bool carry the null token in slot 0."""
         tokens = self.project(nodes)
         if dropped is None:
             return tokens
@@ -155,7 +155,7 @@ class Condition(nn.Module):
         return torch.cat([first[:, None], tokens[:, 1:]], 1)
 
     def visible(self, present: Tensor, level: int | Tensor, dropped: Tensor | None = None) -> Tensor:
-        """Which slots (B, S) bool a transformer may read at `level` (one for all, or (B,))."""
+        """Return the slots (B, S) bool that a transformer may read at `level` (one for all, or (B,))."""
         slots = torch.arange(self.config.slots, device=present.device)
         slot_level = (slots > 0).long() + (slots > self.config.max_actions).long()  # 0, 1 … 1, 2 … 2
         level = torch.as_tensor(level, device=present.device).expand(present.shape[0])

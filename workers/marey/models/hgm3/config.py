@@ -23,7 +23,7 @@ class TokenizerConfig:
     decay: float = 0.99
     level_dropout: float = 0.2
     commitment: float = 0.02  # β of eq. 2
-    feature_bias: float = 5.0  # divides the std of root and contacts (MoMask), which so weigh more
+    feature_bias: float = 5.0  # divides the std of root and contacts (MoMask), which gives them more weight
     rotation_weight: float = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
     position_weight: float = 5.0  # ours: L1 on joints in the heading frame, metres
     velocity_weight: float = 0.5  # ours: L1 on their velocity, m/s; against jitter and skating
@@ -31,7 +31,7 @@ class TokenizerConfig:
 
     @property
     def frames_per_token(self) -> int:
-        """Downsampling rate N/n."""
+        """Return the downsampling rate N/n."""
         return 2**self.stages
 
 
@@ -57,11 +57,11 @@ class ConditionConfig:
     max_specifics: int = 8
     dropout: float = 0.1  # on the attention of the graph (GraphMotion)
     drop: float = 0.1  # share of samples trained without condition, for guidance
-    noise: float = 0.0  # ours: std of what training adds to standardised text features
+    noise: float = 0.0  # ours: std of the noise added to standardised text features in training
 
     @property
     def slots(self) -> int:
-        """S: one motion slot, then actions, then specifics."""
+        """Return S: one motion slot, then actions, then specifics."""
         return 1 + self.max_actions + self.max_specifics
 
 
@@ -75,7 +75,7 @@ class MiningConfig:
     momentum: float = 0.999  # λ of eq. 6; the paper gives none
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
     replace_random: float = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
-    replace_mask: float = 1.0  # MoMask: share of the rest that shows [MASK]; what remains shows itself
+    replace_mask: float = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class InferenceConfig:
 
 @dataclass(frozen=True)
 class HGM3Config(ModelConfig):
-    """Everything that decides shapes and training of one bundle."""
+    """Configuration of one bundle: shapes and training."""
 
     name: str = "paper"
     layout: str = "humanml3d-263"
@@ -109,7 +109,7 @@ class HGM3Config(ModelConfig):
     masked: TransformerConfig = TransformerConfig()
     predictor: TransformerConfig = TransformerConfig()
     residual: TransformerConfig = TransformerConfig()
-    in_order: bool = False  # ours: prompts of several acts are read in the order of time (`TextSpec.in_order`)
+    in_order: bool = False  # ours: prompts of several actions are read in the order of time (`TextSpec.in_order`)
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     residual_drop: float = 0.2  # condition drop of the residual transformer
@@ -124,12 +124,12 @@ class HGM3Config(ModelConfig):
 
     @property
     def max_tokens(self) -> int:
-        """Longest clip in tokens."""
+        """Return the length of the longest clip in tokens."""
         return self.max_frames // self.tokenizer.frames_per_token
 
     @property
     def min_tokens(self) -> int:
-        """Shortest clip in tokens."""
+        """Return the length of the shortest clip in tokens."""
         return -(-self.min_frames // self.tokenizer.frames_per_token)
 
 
@@ -187,7 +187,7 @@ CONFIGS: dict[str, HGM3Config] = {c.name: c for c in (PAPER, STARTER, TINY)}
 
 
 def named_config(name: str, *, mask: Literal["hard", "random"] | None = None) -> HGM3Config:
-    """A configuration by name; `mask` overrides its masking strategy (for the ablation).
+    """Return a configuration by name; `mask` overrides its masking strategy (for the ablation).
 
     Raises:
         InvalidInput: no such configuration.

@@ -39,14 +39,14 @@ class CaptionData(SentenceData):
         )
 
     def graphs(self, captions: Tensor) -> GraphBatch:
-        """The graphs of captions (B,)."""
+        """Return the graphs of captions (B,)."""
         slots = self.slots[captions].long()
         present = slots >= 0
         nodes = self.strings[slots.clamp(min=0)].float() * present[..., None]
         return GraphBatch(nodes, self.adjacency[captions].long(), present)
 
     def statistics(self, clips: Sequence[int], config: ConditionConfig) -> tuple[Tensor, Tensor]:
-        """Mean and std (3, W) of the texts of motion, action and specific nodes over captions of `clips`."""
+        """Return mean and std (3, W) of the texts of motion, action and specific nodes over captions of `clips`."""
         slots = self.slots[self.captions_of(clips)].long()  # (R, S)
         ends = [0, 1, 1 + config.max_actions, config.slots]
         levels = [slots[:, ends[level] : ends[level + 1]] for level in range(LEVELS)]

@@ -20,7 +20,7 @@ from marey.nn.masking import remaining_masks
 from marey.nn.sampling import sample_top_k, uniform
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
-"""What random numbers are drawn for; see `marey.nn.sampling.uniform`."""
+"""Streams of random numbers; see `marey.nn.sampling.uniform`."""
 
 KeepRows = Callable[[], Tensor | None]
 """Called after each pass: bool (B,) rows to go on with, or None for all."""
@@ -28,11 +28,11 @@ KeepRows = Callable[[], Tensor | None]
 
 @dataclass(frozen=True)
 class DecodeOptions:
-    """Savings and variants; the first two change no token."""
+    """Optimisations and variants; the first two change no token."""
 
-    skip_idle: bool = True  # leave out passes that keep nothing
-    trim_slots: bool = True  # leave out slots that nobody reads
-    min_progress: bool = False  # keep at least one token a pass (ours): other tokens
+    skip_idle: bool = True  # leave out passes that keep no token
+    trim_slots: bool = True  # leave out slots that no item reads
+    min_progress: bool = False  # keep at least one token per pass (ours); changes tokens
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class Items:
     decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
 
     def select(self, rows: Tensor) -> Items:
-        """The items at `rows`."""
+        """Return the items at `rows`."""
         fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
         return Items(**fields)
 
 
 def condition_level(step: int, config: InferenceConfig) -> int:
-    """C(l) of eq. 14 for pass l = 1 … L."""
+    """Return C(l) of eq. 14 for pass l = 1 … L."""
     if step > config.action_steps:
         return SPECIFIC
     return MOTION if step <= config.motion_steps else ACTION
@@ -63,7 +63,7 @@ def condition_level(step: int, config: InferenceConfig) -> int:
 def decode_base(
     model: MaskedTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
 ) -> Items:
-    """Fill `tokens[..., 0]`: L passes, each keeping the most confident tokens and never masking them again."""
+    """Fill `tokens[..., 0]`: L passes; each keeps the most confident tokens and never masks them again."""
     base = torch.full_like(items.tokens[..., 0], model.mask_token)  # (B, n)
     schedule = _schedules(items.lengths, config.steps, options)  # (L + 1, B): masked before each pass, at last 0
     for step in range(1, config.steps + 1):
@@ -125,7 +125,7 @@ def _base_logits(
     guidance: float,
     options: DecodeOptions,
 ) -> Tensor:
-    """Guided logits (B, n, K), from one forward of 2 B sequences."""
+    """Return guided logits (B, n, K), from one forward pass of 2 B sequences."""
     null = torch.cat([model.condition.null.expand_as(items.condition[:, :1]), items.condition[:, 1:]], 1)
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
@@ -173,6 +173,6 @@ def decode_residual(
 
 
 def _schedules(lengths: Tensor, steps: int, options: DecodeOptions) -> Tensor:
-    """Masked tokens before pass 1 and after each pass: (L + 1, B)."""
+    """Return the number of masked tokens before pass 1 and after each pass: (L + 1, B)."""
     columns = [[n, *remaining_masks(n, steps, min_progress=options.min_progress)] for n in lengths.tolist()]
     return torch.tensor(columns, device=lengths.device).T.contiguous()

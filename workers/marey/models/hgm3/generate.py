@@ -1,4 +1,4 @@
-"""Prompts' features in, motion features out: the whole of HGM³'s inference behind one class."""
+"""HGM³'s inference behind one class: features of prompts to features of motion."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidInput
-from marey.generation.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
@@ -25,14 +25,14 @@ from marey.nn.batch_threads import BatchThreads
 from marey.nn.sampling import uniform
 
 BUCKET = 8
-"""Tokens; an item is padded to a multiple of this, never to its batch's longest."""
+"""Tokens; an item is padded to a multiple of this, not to the longest of its batch."""
 MAX_ROWS = 32
-"""Items a forward; beyond it a larger batch gains nothing on a CPU and costs memory."""
+"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Uniform over a batch; None = what the bundle says."""
+class SamplingSettings:
+    """Sampling settings, uniform over a batch; None = the bundle's value."""
 
     steps: int | None = None
     motion_steps: int | None = None
@@ -48,7 +48,7 @@ class Settings:
     trim_slots: bool = True
 
     def inference(self, default: InferenceConfig) -> InferenceConfig:
-        """The bundle's decoding with this batch's changes; stage boundaries scale with the steps.
+        """Return the bundle's decoding settings with this batch's changes; stage boundaries scale with the steps.
 
         Raises:
             InvalidInput: a value out of range.
@@ -75,7 +75,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Generated:
-    """One motion as the network made it: before decoding to joints and clean-up."""
+    """One motion as the network generated it, before decoding to joints and clean-up."""
 
     tokens: NDArray[np.int16]  # (V, n)
     features: NDArray[np.float32]  # (Tf, D), in the layout's own units
@@ -83,7 +83,7 @@ class Generated:
 
 
 class Generator:
-    """A loaded bundle. Not thread-safe; one a process."""
+    """A loaded bundle. Not thread-safe; one per process."""
 
     def __init__(
         self,
@@ -112,13 +112,13 @@ class Generator:
 
         Args:
             bundle: a verified bundle, or its name or path.
-            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            threads: of torch; 0 = torch's default.
             threads: of torch; 0 leaves torch's own choice.
             dtype: of the transformers' matrices; None = bfloat16 where the device multiplies it fast, else float32.
 
         Raises:
             InvalidBundle: not HGM³, or damaged.
-            InvalidInput: no such device.
+            InvalidInput: unknown device.
         """
         verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
         config, networks = load_networks(verified)
@@ -134,21 +134,25 @@ class Generator:
 
     @property
     def frames_per_token(self) -> int:
-        """N/n."""
+        """Return N/n, the frames of a token."""
         return self.config.tokenizer.frames_per_token
 
     @torch.inference_mode()
     def generate(
-        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+        self,
+        requests: Sequence[Request],
+        settings: SamplingSettings | None = None,
+        *,
+        control: GenerationControl | None = None,
     ) -> list[Generated | None]:
-        """Make one motion a request; None where `control` dropped it.
+        """Generate one motion per request; None where `control` dropped it.
 
-        The tokens of an item do not depend on the others, on their number or order.
+        The tokens of an item do not depend on the number or order of the others.
 
         Raises:
             InvalidInput: a length or seed out of range, or features of another encoder.
         """
-        settings = settings or Settings()
+        settings = settings or SamplingSettings()
         inference = settings.inference(self.config.inference)
         options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress)
         frames = [self.frames(request) for request in requests]
@@ -163,27 +167,28 @@ class Generator:
             self.batch_threads.map(make, groups)
         return results
 
-    def settings(self, values: Mapping[str, Any]) -> Settings:
-        """An item's settings, checked. Raises InvalidInput."""
-        settings = read_settings(Settings, values, InferenceConfig.__dataclass_fields__)
+    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
+        """Check an item's settings. Raises InvalidInput."""
+        settings = read_settings(SamplingSettings, values, InferenceConfig.__dataclass_fields__)
         settings.inference(self.config.inference)
         return settings
 
-    def described(self, settings: Settings) -> dict[str, Any]:
-        """Everything that decides how tokens are drawn."""
+    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
+        """Return all settings that decide how tokens are drawn."""
         return asdict(settings.inference(self.config.inference))
 
-    def settled(self, request: Request) -> Request:
-        """The request with the length that the estimator draws with its seed, where none was asked for."""
+    def resolve_length(self, request: Request) -> Request:
+        """Return the request with a length; the estimator draws a missing one with the request's seed."""
         return replace(request, frames=self.frames(request))
 
     def frames(self, request: Request) -> int:
-        """Feature frames: as asked, or drawn from the length estimator. Raises InvalidInput out of range."""
+        """Return the feature frames: as requested, or drawn by the length estimator. Raises InvalidInput if out of
+        range."""
         self.limits.check(request)
         return self._estimate(request) if request.frames is None else request.frames
 
     def bucket(self, request: Request) -> int:
-        """Tokens, rounded up: those of one forward."""
+        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
         return self._bucket(self.frames(request))
 
     def _bucket(self, frames: int) -> int:
@@ -191,7 +196,7 @@ class Generator:
         return -(-tokens // BUCKET) * BUCKET
 
     def _estimate(self, request: Request) -> int:
-        """Frames from the middle third of the estimated distribution (ours): seeds differ, extremes do not come."""
+        """Draw frames from the middle third of the estimated distribution (ours): seeds differ, without extremes."""
         sentence = torch.from_numpy(request.text.nodes[:1].astype(np.float32)).to(self.device)
         share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
         seeds = torch.tensor([request.seed], device=self.device)
@@ -201,7 +206,7 @@ class Generator:
         return min(max(frames, self.config.min_frames), self.config.max_frames)
 
     def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Rows of one bucket each, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
+        """Group rows by bucket, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
         buckets: dict[int, list[int]] = defaultdict(list)
         for row, count in enumerate(frames):
             buckets[self._bucket(count)].append(row)
@@ -227,7 +232,7 @@ class Generator:
         if not watcher.rows:
             return
         for position, row in enumerate(watcher.rows):
-            # one by one, at its own length: a convolution rounds differently in another batch, files would differ
+            # one by one, at its own length: a convolution rounds differently in another batch, and files would differ
             tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
             features = self.networks.tokenizer.decode(tokens[None])[0, : frames[row]]
             results[row] = Generated(
@@ -256,29 +261,29 @@ class Generator:
 
 
 class _Steps:
-    """Counts the steps of all groups, which batch threads make side by side, and reports them."""
+    """Step counter of all groups, which batch threads run in parallel; reports the progress."""
 
-    def __init__(self, control: Control, total: int) -> None:
+    def __init__(self, control: GenerationControl, total: int) -> None:
         self._control = control
         self._total = total
         self._done = 0
         self._lock = threading.Lock()
 
     def step(self) -> set[int]:
-        """One step done; requests to leave out."""
+        """Count one step; return the requests to leave out."""
         with self._lock:
             self._done = min(self._done + 1, self._total)
             self._control.progress(self._done, self._total)
             return self._control.dropped()
 
     def dropped(self) -> set[int]:
-        """Requests to leave out."""
+        """Return the requests to leave out."""
         with self._lock:
             return self._control.dropped()
 
 
 class _Watcher:
-    """Turns dropped requests into rows of one group to keep."""
+    """Adapter from dropped requests to the rows of one group to keep."""
 
     def __init__(self, steps: _Steps, rows: list[int]) -> None:
         """`rows`: the group's requests."""
@@ -287,7 +292,7 @@ class _Watcher:
         self.rows = [r for r in rows if r not in dropped]
 
     def step(self) -> Tensor | None:
-        """One step done; rows to keep, or None for all."""
+        """Count one step; return the rows to keep, or None for all."""
         dropped = self._steps.step()
         if not dropped or not any(r in dropped for r in self.rows):
             return None

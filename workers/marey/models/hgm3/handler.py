@@ -1,13 +1,13 @@
-"""The work of the queue `hgm3`."""
+"""Handler of the queue `hgm3`."""
 
 from __future__ import annotations
 
 from marey.core.settings import settings as configuration
 from marey.generation.handler import GeneratorHandler
 from marey.models.hgm3.bundle import MODEL
-from marey.models.hgm3.generate import MAX_ROWS, Generator, Settings
+from marey.models.hgm3.generate import MAX_ROWS, Generator, SamplingSettings
 
 
-def create_handler() -> GeneratorHandler[Settings]:
-    """What a worker's child makes."""
+def create_handler() -> GeneratorHandler[SamplingSettings]:
+    """Create the handler in a worker's child process."""
     return GeneratorHandler(MODEL, Generator.load, MAX_ROWS, configuration())

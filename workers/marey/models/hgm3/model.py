@@ -21,7 +21,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from marey.models.hgm3.conditions import Condition, TextEncoder, TextNormalizer
+from marey.models.hgm3.conditions import Condition, GraphEncoder, TextNormalizer
 from marey.models.hgm3.config import HGM3Config, TransformerConfig
 from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import packed_gelu
@@ -59,7 +59,7 @@ class SequenceModel(nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Embedded tokens (B, n, w) and condition (B, S, w) to outputs at the wanted tokens.
 
-        In memory wanted tokens stand first, then what else may be read, then padding: leaving padding out (`trim`)
+        Wanted tokens come first in memory, then other readable positions, then padding: dropping padding (`trim`)
         changes no bit (`pad_length`), and the last block computes the wanted rows alone.
 
         Args:
@@ -100,9 +100,9 @@ def at_tokens(outputs: Tensor, index: Tensor, size: int) -> Tensor:
 
 
 def guided(hidden: Tensor, guidance: float | None) -> Tensor:
-    """Classifier-free guidance in front of the last matrix, which is linear: the same logits for half of its work.
+    """Apply classifier-free guidance before the last matrix, which is linear: the same logits for half of its work.
 
-    (B, …), the first half with condition and the second without, to (B / 2, …); without `guidance` nothing changes.
+    (B, …), the first half with condition and the second without, to (B / 2, …); unchanged without `guidance`.
     """
     if guidance is None:
         return hidden
@@ -111,7 +111,7 @@ def guided(hidden: Tensor, guidance: float | None) -> Tensor:
 
 
 class TokenHead(nn.Module):
-    """Dense, GELU, norm, and one logit a code (MoMask); `tied` gives the last matrix, else it is learnt."""
+    """Dense, GELU, norm, and one logit a code (MoMask); `tied` gives the last matrix, else it is learned."""
 
     def __init__(self, width: int, codes: int, *, tied: bool) -> None:
         super().__init__()
@@ -140,7 +140,7 @@ class MaskedTransformer(nn.Module):
         codes = config.tokenizer.codes
         self.mask_token = codes
         self.compact = config.compact
-        self.text = TextEncoder(config.condition)
+        self.text = GraphEncoder(config.condition)
         self.condition = Condition(config.condition, config.masked.width)
         self.embedding = nn.Embedding(codes + 1, config.masked.width)  # the last is [MASK]
         self.sequence = SequenceModel(config.masked, config.condition.slots, config.max_tokens)
@@ -148,7 +148,7 @@ class MaskedTransformer(nn.Module):
         initialize(self)
 
     def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
-        """Make ready for inference; matrices in `dtype`, sequences shared among `batch_threads`."""
+        """Prepare for inference: matrices in `dtype`, sequences shared among `batch_threads`."""
         self.sequence.transformer.prepare_inference(dtype, batch_threads)
         self.head.prepare_inference(dtype)
 
@@ -163,8 +163,8 @@ class MaskedTransformer(nn.Module):
         trim: bool = True,
         guidance: float | None = None,
     ) -> Tensor:
-        """Logits (B, n, K) at the `wanted` tokens (B, n) bool, elsewhere they mean nothing; with `guidance` (B / 2, n,
-        K): see `guided`.
+        """Logits (B, n, K) at the `wanted` tokens (B, n) bool, undefined elsewhere; with `guidance` (B / 2, n, K): see
+        `guided`.
 
         `tokens` (B, n) in 0 … K, K = [MASK], any value where not `valid`; for the rest see `SequenceModel`.
         """
@@ -175,7 +175,7 @@ class MaskedTransformer(nn.Module):
 
 
 class LossPredictor(nn.Module):
-    """G_φ: reads the UNMASKED base tokens and the condition, says which tokens F_θ finds hard (eq. 5)."""
+    """G_φ: reads the UNMASKED base tokens and the condition, predicts which tokens are hard for F_θ (eq. 5)."""
 
     def __init__(self, config: HGM3Config) -> None:
         super().__init__()
@@ -186,7 +186,7 @@ class LossPredictor(nn.Module):
         initialize(self)
 
     def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
-        """Difficulty (B, n), only its order means something; zero where not `valid`."""
+        """Difficulty (B, n), only its order is meaningful; zero where not `valid`."""
         embedded = self.embedding(tokens.masked_fill(~valid, 0))
         hidden, index = self.sequence(embedded, valid, condition, visible)
         return at_tokens(self.head(hidden).float().squeeze(-1), index, valid.shape[1]) * valid
@@ -224,24 +224,24 @@ class ResidualTransformer(nn.Module):
             self.output = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         initialize(self)
-        if config.compact:  # as loud as the positions, like embeddings
+        if config.compact:  # the scale of the positions, as embeddings have
             nn.init.normal_(self.in_proj.weight, std=0.5 * t.code_width**-0.5)
-            nn.init.zeros_(self.out_proj.weight)  # first guess: how often each code occurs
+            nn.init.zeros_(self.out_proj.weight)  # first prediction: how often each code occurs
 
     def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
-        """Make ready for inference; matrices in `dtype`, sequences shared among `batch_threads`."""
+        """Prepare for inference: matrices in `dtype`, sequences shared among `batch_threads`."""
         self.sequence.transformer.prepare_inference(dtype, batch_threads)
         if not self.compact:
             self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
 
     def set_codebooks(self, codebooks: Tensor) -> None:
-        """Hand over the tokenizer's codebooks (V, K, d); without effect unless compact."""
+        """Set the tokenizer's codebooks (V, K, d); no effect unless compact."""
         if self.compact:
             self.code_std.copy_(codebooks.std((1, 2)).clamp(min=1e-6))
             self.codebooks.copy_(codebooks / self.code_std[:, None, None])
 
     def embed(self, tokens: Tensor, level: int) -> Tensor:
-        """What level `level` of tokens (B, n) adds to the input of the levels above: (B, n, d or w)."""
+        """Return the input (B, n, d or w) that `level` of tokens (B, n) adds for the levels above."""
         if not self.compact:
             return F.embedding(tokens.clamp(min=0), self.embedding[level])
         # relative to the first level, so that the input has about unit scale

@@ -1,10 +1,10 @@
-"""More to learn from: what a finished bundle makes of training captions, where the checker says that it obeyed (ours).
+"""Self-training (ours): motions that a finished bundle generates from training captions and the checker accepts.
 
     marey train self-train hgm3-starter DATA --run RUN
 
-Asked for mostly are sequences, which captures show and the model obeys least; who fails may try again. What is kept
-lies in the run folder, where the masked stage finds it: one round of Gulcehre et al. 2023, "Reinforced Self-Training
-(ReST) for Language Modeling".
+Most captions are sequences, which captures rarely show and the model follows least; a failed caption is tried again.
+Accepted motions are written to the run folder, where the masked stage reads them: one round of Gulcehre et al. 2023,
+"Reinforced Self-Training (ReST) for Language Modeling".
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from marey.text.pipeline import TextPipeline
 from marey.training.drawn import Drawn
 
 ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
-"""Shares of the captions by how many acts they ask for."""
+"""Shares of the captions by their number of actions."""
 TRIES = 3
 
 Expected = tuple[Expectation, ...]
@@ -36,7 +36,7 @@ Expected = tuple[Expectation, ...]
 
 @dataclass(frozen=True)
 class _Try:
-    """A caption of a clip, and how often it was tried in vain."""
+    """A caption of a clip, with the number of its failed tries."""
 
     clip: int
     caption: str
@@ -52,15 +52,15 @@ def self_train(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Drawn:
-    """Draw motions for training captions, and keep those that obey.
+    """Generate motions for training captions, and keep those that the checker accepts.
 
     Args:
         generator: the loaded bundle.
-        pipeline: how it reads prompts.
-        prepared: the data whose captions are asked for.
-        captions: how many, each up to `TRIES` times.
+        pipeline: its text pipeline.
+        prepared: the data whose captions are used.
+        captions: number of captions, each tried up to `TRIES` times.
         seed: of the choice and of the motions.
-        progress: told how many obeyed, now and then.
+        progress: called now and then with a line about accepted motions.
     """
     rng = np.random.default_rng(seed)
     waiting = deque(_chosen(prepared.clips, captions, rng))
@@ -82,12 +82,13 @@ def self_train(
                 waiting.append(_Try(each.clip, each.caption, each.expected, each.failed + 1))
         drawn += len(some)
         shares = ", ".join(f"{obeyed[acts]}/{asked[acts]} of {acts}" for acts in sorted(asked))
-        progress(f"{drawn} drawn, {len(waiting)} to come; obeyed by acts: {shares}")
+        progress(f"{drawn} drawn, {len(waiting)} to come; accepted by number of actions: {shares}")
     return Drawn.of(kept)
 
 
 def _chosen(clips: Sequence[Clip], count: int, rng: np.random.Generator) -> list[_Try]:
-    """Captions of training clips whose acts can be checked; rare pairs of acts oftener than they occur."""
+    """Choose captions of training clips whose actions can be checked; rare pairs of actions more often than they
+    occur."""
     groups: dict[int, dict[Expected, list[int]]] = defaultdict(lambda: defaultdict(list))
     for number, clip in enumerate(clips):
         expected = expectations(clip.acts, clip.sides)
@@ -113,7 +114,7 @@ def self_train_into(
     seed: int,
     progress: Callable[[str], None],
 ) -> int:
-    """Self-train for so many captions, leave what is kept in a run folder, and return how many motions that are.
+    """Self-train on `captions` captions, write accepted motions to the run folder, and return their number.
 
     Raises:
         NotFound, InvalidInput: the run has no tokenizer, or another one than the bundle.

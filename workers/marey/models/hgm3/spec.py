@@ -1,4 +1,4 @@
-"""HGM³ as the registry knows it. Standard library only."""
+"""Registry entry of HGM³. Standard library only."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ The same prompt, seed, settings and bundle give the same motion.""",
             Stage("masked", "Train the masked transformer, with hard token mining."),
             Stage("residual", "Train the residual transformer."),
             Stage("length", "Train the length estimator."),
-            Stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on."),
+            Stage("all", "All stages one after another, --max-minutes for them together; a second call continues."),
         ),
         config="marey.models.hgm3.config:named_config",
         train="marey.models.hgm3.train:train_stage",
         assemble="marey.models.hgm3.assembly:assemble",
-        unpack="marey.models.hgm3.assembly:take_apart",
-        choices=(Choice("mask", ("hard", "random"), "hard or random; none given = as the configuration says."),),
+        unpack="marey.models.hgm3.assembly:unpack",
+        choices=(Choice("mask", ("hard", "random"), "hard or random; default: as the configuration says."),),
     ),
     tokenizer="marey.models.hgm3.tokenizer:build_tokenizer",
     random_bundle="marey.models.hgm3.bundle:random_bundle",

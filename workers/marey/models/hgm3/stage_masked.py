@@ -26,8 +26,8 @@ from marey.training.pairs import Pairs, pieces_of
 
 
 @dataclass(frozen=True)
-class Sample:
-    """A piece of a batch of (clip, caption) pairs, with everything random already drawn."""
+class MaskedSample:
+    """Part of a batch of (clip, caption) pairs, with all random choices made."""
 
     tokens: Tensor  # (B, n) base tokens, -1 beyond a clip's own length
     lengths: Tensor  # (B,)
@@ -37,10 +37,10 @@ class Sample:
     dropped: Tensor  # (B,) bool: without condition, at every level and for G
     level: Tensor  # (B,) condition level
 
-    def select(self, rows: Tensor) -> Sample:
-        """The samples at `rows`, cut to their longest."""
+    def select(self, rows: Tensor) -> MaskedSample:
+        """Return the samples at `rows`, cut to their longest."""
         size = int(self.lengths[rows].max())
-        return Sample(
+        return MaskedSample(
             self.tokens[rows, :size],
             self.lengths[rows],
             self.graphs.select(rows),
@@ -50,10 +50,10 @@ class Sample:
             self.level[rows],
         )
 
-    def at_level(self, level: int) -> Sample:
-        """The same samples, noise and τ under another condition."""
+    def at_level(self, level: int) -> MaskedSample:
+        """Return the same samples, noise and τ under another condition."""
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return Sample(**{**fields, "level": torch.full_like(self.level, level)})
+        return MaskedSample(**{**fields, "level": torch.full_like(self.level, level)})
 
 
 class MaskedModule(nn.Module):
@@ -67,7 +67,7 @@ class MaskedModule(nn.Module):
 
 
 class MaskedStage:
-    """F and G trained together."""
+    """Training stage of F and G."""
 
     name = "masked"
 
@@ -85,11 +85,11 @@ class MaskedStage:
             self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """F (with the graph) and G apart."""
+        """Return F (with the graph) and G as separate groups."""
         return [list(self.module.masked.parameters()), list(self.module.predictor.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """L_rec + L_pred (eq. 7, 12, 13), averaged over levels."""
+        """Return L_rec + L_pred (eq. 7, 12, 13), averaged over levels."""
         rng, c = context.rng, self.config
         clips = self.pairs.draw(rng, self.optimisation.batch)
         sample = self.sample(clips, rng)
@@ -120,17 +120,17 @@ class MaskedStage:
         return rec + pred, logs
 
     def after_step(self, context: StepContext) -> None:
-        """Eq. 6: the teacher follows the student."""
+        """Update the teacher as the student's moving average (eq. 6)."""
         momentum = warm_momentum(self.config.mining.momentum, context.step)
         update_average(self.module.teacher, self.module.predictor, momentum)
 
-    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Sample:
+    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator) -> MaskedSample:
         """Draw phase, caption, τ, noise, drop and level for each clip."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
         captions = self.captions.choose(clips, rng)
-        return Sample(
+        return MaskedSample(
             tokens[..., 0],
             lengths,
             self.captions.graphs(captions),
@@ -140,8 +140,9 @@ class MaskedStage:
             torch.from_numpy(rng.integers(LEVELS, size=len(clips))).to(device),
         )
 
-    def masks(self, sample: Sample, nodes: Tensor, alpha: float) -> Tensor:
-        """Tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at random."""
+    def masks(self, sample: MaskedSample, nodes: Tensor, alpha: float) -> Tensor:
+        """Return the tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at
+        random."""
         valid = frame_mask(sample.lengths, sample.tokens.shape[1])
         counts = mask_counts(sample.progress, sample.lengths)
         if alpha == 0:
@@ -151,8 +152,8 @@ class MaskedStage:
             difficulty = self._predict(teacher, sample, nodes, valid)
         return easy_to_hard_mask(difficulty, sample.noise, valid, counts, alpha)
 
-    def _piece(self, sample: Sample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """ℓ (B, n), mask (B, n), which were right (B, n), ranking loss (B,)."""
+    def _piece(self, sample: MaskedSample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return ℓ (B, n), mask (B, n), correct predictions (B, n), ranking loss (B,)."""
         model = self.module.masked
         valid = frame_mask(sample.lengths, sample.tokens.shape[1])
         nodes = model.text(sample.graphs)  # C, (B, S, W)
@@ -165,13 +166,13 @@ class MaskedStage:
         predicted = self._predict(self.module.predictor, sample, nodes.detach(), valid)
         return losses, masked, logits.argmax(-1) == targets, ranking_loss(predicted, losses, masked)
 
-    def _predict(self, predictor: LossPredictor, sample: Sample, nodes: Tensor, valid: Tensor) -> Tensor:
+    def _predict(self, predictor: LossPredictor, sample: MaskedSample, nodes: Tensor, valid: Tensor) -> Tensor:
         condition = predictor.condition(nodes, sample.dropped)
         visible = predictor.condition.visible(sample.graphs.present, sample.level, sample.dropped)
         return predictor(sample.tokens.clamp(min=0), valid, condition, visible)
 
     def _shown(self, targets: Tensor, masked: Tensor) -> Tensor:
-        """What stands in the place of masked tokens: [MASK] (eq. 3), or now and then another token (MoMask)."""
+        """Replace masked tokens by [MASK] (eq. 3), or sometimes by another token (MoMask)."""
         mining, codes = self.config.mining, self.config.tokenizer.codes
         shown = targets.masked_fill(masked, self.module.masked.mask_token)
         if mining.replace_random == 0 and mining.replace_mask == 1:
@@ -184,7 +185,7 @@ class MaskedStage:
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """Cross-entropy and accuracy of random masks on validation clips, per level of condition."""
+        """Return cross-entropy and accuracy of random masks on validation clips, per level of condition."""
         rng = np.random.default_rng(0)
         totals = np.zeros((LEVELS, 3))
         ranks = 0.0
@@ -205,6 +206,6 @@ class MaskedStage:
         return loss | accuracy | {"ranking": ranks}
 
 
-def _pieces(sample: Sample) -> Iterator[Sample]:
+def _pieces(sample: MaskedSample) -> Iterator[MaskedSample]:
     for rows in pieces_of(sample.lengths):
         yield sample.select(rows)

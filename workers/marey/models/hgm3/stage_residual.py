@@ -22,7 +22,7 @@ from marey.training.pairs import Pairs, pieces_of
 
 
 class ResidualStage:
-    """Level v + 1 from the true levels up to v; one random level a sample."""
+    """Training stage that predicts level v + 1 from the true levels up to v; one random level per sample."""
 
     name = "residual"
 
@@ -47,11 +47,11 @@ class ResidualStage:
             self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes)[1:])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """One group."""
+        """Return one group."""
         return [list(self.module.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Mean cross-entropy over the tokens of the drawn levels (App. A.2, eq. 1, as a mean)."""
+        """Return the mean cross-entropy over the tokens of the drawn levels (App. A.2, eq. 1, as a mean)."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
         losses, right, counts = self._batch(clips, context.rng, None)
         total = counts.sum().clamp(min=1)
@@ -59,11 +59,11 @@ class ResidualStage:
         return loss, {"loss": loss.detach(), "accuracy": right.sum() / total}
 
     def after_step(self, context: StepContext) -> None:
-        """Nothing."""
+        """Do nothing: the stage has no state to update."""
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """Cross-entropy and accuracy on validation clips, per level."""
+        """Return cross-entropy and accuracy on validation clips, per level."""
         rng = np.random.default_rng(0)
         result: dict[str, float] = {}
         for level in range(1, self.module.levels):
@@ -77,7 +77,7 @@ class ResidualStage:
     def _batch(
         self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Summed loss, right answers and tokens (B,) of a batch; `level` None = one drawn a sample."""
+        """Return summed loss, correct answers and tokens (B,) of a batch; `level` None = one drawn per sample."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
@@ -106,8 +106,9 @@ class ResidualStage:
 
 
 class LengthStage:
-    """Number of tokens from the sentence, as it is natural: looped and held clips are as long as they were drawn to be,
-    and a hand that stays up for long looks like a wave."""
+    """Training stage of the length: number of tokens from the sentence, on clips of natural length. Looped and held
+    clips have drawn lengths, and a hand that stays up for long looks like a wave.
+    """
 
     name = "length"
 
@@ -123,21 +124,21 @@ class LengthStage:
         self.module.normalizer.std.copy_(std)
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """One group."""
+        """Return one group."""
         return [list(self.module.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Cross-entropy of the length class."""
+        """Return the cross-entropy of the length class."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
         loss, error = self._batch(clips, context.rng)
         return loss, {"loss": loss.detach(), "error_tokens": error}
 
     def after_step(self, context: StepContext) -> None:
-        """Nothing."""
+        """Do nothing: the stage has no state to update."""
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """Cross-entropy and mean absolute error of the expected length, in tokens."""
+        """Return cross-entropy and mean absolute error of the expected length, in tokens."""
         rng = np.random.default_rng(0)
         found = [self._batch(clips, rng) for clips in self.pairs.validation_batches(self.optimisation.batch)]
         return {

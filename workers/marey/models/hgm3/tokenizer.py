@@ -90,7 +90,7 @@ class Decoder(nn.Module):
 
 
 class Tokenizer(MotionTokenizer):
-    """Features in their own units to tokens and back; normalisation is inside."""
+    """Tokenizer of features in their own units; normalisation is inside."""
 
     def __init__(self, config: HGM3Config) -> None:
         super().__init__(config.features, config.tokenizer.frames_per_token)

@@ -1,4 +1,4 @@
-"""Training HGM³: tokenizer, tokens, masked transformer, residual transformer, length estimator, then the bundle."""
+"""Training of HGM³: tokenizer, tokens, masked transformer, residual transformer, length estimator, then the bundle."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from marey.training.tokenizing import TokenizerStage
 
 
 def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float]:
-    """Train one stage and write its part; returns its metrics. `all` is all of them.
+    """Train one stage, or with `all` every stage, and write its part; return its metrics.
 
     Raises:
         NotFound: a stage it builds on has not finished, or captions have no text features.
-        InvalidInput: no such stage, or parts of another configuration.
+        InvalidInput: unknown stage, or parts of another configuration.
     """
     if name == "all":
         return train_all(RECIPE, train_stage, options)
@@ -45,7 +45,7 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     codebooks = tokenizer.quantizer.codebooks
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
-    data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
+    data = dataclasses.replace(data, features=data.features[:0])  # only the tokens are needed: release the memory
     if name == "masked":
         drawn = load_drawn(options.run, tokenizer, data.prepared)
         if drawn is not None:
@@ -68,7 +68,7 @@ def _train_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> dic
 
 
 def load_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> Tokenizer:
-    """The run's trained tokenizer, with the statistics of the data it was trained on.
+    """Load the run's trained tokenizer, with the statistics of the data it was trained on.
 
     Raises:
         NotFound: not trained yet.

@@ -1,12 +1,12 @@
-"""What MOGO's own parts are worth: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane.
+"""Ablation of MOGO's own parts: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane.
 
     marey train ablate data/prepared mogo-starter --what tokenizer --steps 1500 -o report
     marey train ablate data/prepared mogo-starter --what transformer --steps 600 --batch 8 -o report
 
-Each variant is trained from nothing with as many steps as the others, on the same seeds; what it is not about is the
-bundle's. `tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer`
-compares the ways of level and depth by cross-entropy of validation clips, and by the evaluation prompts where the
-product can draw from a variant. What is finished is kept: called again, it goes on.
+Each variant is trained from scratch for the same number of steps, on the same seeds; all other parts are the bundle's.
+`tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer` compares
+the ways of level and depth by cross-entropy of validation clips, and by the evaluation prompts where the product can
+generate with a variant. Finished variants are kept: a second call continues.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from torch import Tensor, nn
 
 from marey.bundles import find_bundle
 from marey.checks.prompts import evaluation_prompts
-from marey.models.mogo.assembly import RECIPE, assemble, take_apart
+from marey.models.mogo.assembly import RECIPE, assemble, unpack
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.model import RQHCTransformer
@@ -40,8 +40,8 @@ from marey.training.staging import TrainOptions, finish, use_threads
 class LevelToken(RQHCTransformer):
     """The level as a token of its own behind the prompt, in place of its embedding beside the prompt (eq. 7).
 
-    The token takes the place of the first frame, so frames stand one further away from the prompt, and the first
-    one is predicted by it. For comparison alone: streams do not know it.
+    The token takes the place of the first frame: frames are one position further from the prompt, and the token's
+    output predicts the first frame. For comparison alone: streams do not support it.
     """
 
     def __init__(self, config: MOGOConfig) -> None:
@@ -52,7 +52,7 @@ class LevelToken(RQHCTransformer):
     def states(
         self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
     ) -> Tensor:
-        """As in `RQHCTransformer`."""
+        """Return the trunk's states; arguments as in `RQHCTransformer`."""
         first, frames = self.inputs(prompts, tokens, skipped, seam)
         token = self.level_token[None, :, None].expand(len(tokens), -1, -1, -1)
         x = torch.cat([first, token, frames], 2).flatten(0, 1)
@@ -64,14 +64,14 @@ class LevelToken(RQHCTransformer):
 
 @dataclass(frozen=True)
 class Variant:
-    """One way of level and depth."""
+    """One way to draw levels and depth."""
 
     joint: bool
     depth: int
     network: type[RQHCTransformer] = RQHCTransformer
 
     def of(self, config: MOGOConfig) -> MOGOConfig:
-        """The configuration with it."""
+        """Return the configuration with this variant."""
         share = config.depth.share if self.depth else 1.0
         return replace(
             config,
@@ -96,18 +96,18 @@ SCALES: dict[str, Scale] = {
 
 
 def train_tokenizer(scale: Scale, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
-    """Train one tokenizer; its errors on captured test clips, in millimetres, and how many codes it uses."""
+    """Train one tokenizer; return its errors on captured test clips, in mm, and how many codes it uses."""
     tokenizer = replace(options.config.tokenizer, scale=scale)
     found = train_stage("tokenizer", replace(options, config=replace(options.config, tokenizer=tokenizer)))
     return {name.removeprefix("test/"): value for name, value in found.items() if name.startswith("test/")}
 
 
 def train_transformer(bundle: str, variant: Variant, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
-    """Train one transformer on the bundle's tokens; what validation says, and the evaluation prompts where the
-    product can draw from it."""
+    """Train one transformer on the bundle's tokens; return its validation metrics, and the judged evaluation prompts
+    where the product can generate with it."""
     config, run = variant.of(options.config), options.run
     options = replace(options, config=config)
-    take_apart(find_bundle(bundle), run)
+    unpack(find_bundle(bundle), run)
     for made in run.parent.glob("*.safetensors"):  # tokens and steers, the same for all
         shutil.copy(made, run)
     stage, sha256 = transformer_stage(options, variant.network)

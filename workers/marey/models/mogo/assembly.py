@@ -1,4 +1,4 @@
-"""From the parts of a run to a bundle, and back."""
+"""Assembly of a bundle from the parts of a run, and its inverse."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from marey.models.mogo.bundle import MODEL, load_networks
 from marey.models.mogo.config import MOGOConfig
 from marey.nn.bundling import write_generator
 from marey.training.assembly import gather, scatter
-from marey.training.staging import Recipe
+from marey.training.staging import TrainingRecipe
 
-RECIPE = Recipe(
+RECIPE = TrainingRecipe(
     read=MOGOConfig.from_dict,
     built_from={
         "tokenizer": ("layout", "features", "joints", "tokenizer"),
@@ -39,7 +39,7 @@ def assemble(
     )  # fmt: skip
 
 
-def take_apart(bundle: Bundle, run: Path) -> MOGOConfig:
+def unpack(bundle: Bundle, run: Path) -> MOGOConfig:
     """Write the parts of a bundle into a run folder, as if its stages had just finished there.
 
     Returns:

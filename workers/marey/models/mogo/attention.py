@@ -2,8 +2,8 @@
 
     A_ij = q_i·k_j + q_i·φ_{i−j} + u·k_j + v·φ_{i−j} = (q_i + u)·k_j + (q_i + v)·φ_{i−j}
 
-φ_d = W_r·(sinusoids of d), one learnt matrix W_r a layer: "learned" as in Transformer-XL (ours, the paper is silent).
-A sequence is [prompts | frames]: every prompt stands at position 0 and reads itself alone, frame i stands at i.
+φ_d = W_r·(sinusoids of d), one learned matrix W_r per layer, as in Transformer-XL (ours: the paper does not say).
+A sequence is [prompts | frames]: every prompt is at position 0 and reads itself alone, frame i is at i.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 HIDDEN = -1e30
-"""Added to the score of what may not be read."""
+"""Added to the attention score of a hidden position."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What the frames of a batch may read, beside all frames up to themselves."""
+    """Positions that the frames of a batch may read, beside all frames up to themselves."""
 
     prompts: int  # P
     to_prompt: Tensor  # (1 or N, n) int64: relative distance of each frame to position 0
@@ -43,21 +43,21 @@ class RelativeAttention(nn.Module):
         self.out = nn.Linear(width, width)
 
     def terms(self, sinusoids: Tensor) -> Tensor:
-        """φ of all distances 0 … D from their sinusoids (D + 1, w): (H, w / H, D + 1), already over √(w / H)."""
+        """Return φ of all distances 0 … D from their sinusoids (D + 1, w): (H, w / H, D + 1), divided by √(w / H)."""
         phi = self.relative(sinusoids).view(len(sinusoids), self.heads, -1)
         return phi.permute(1, 2, 0) * phi.shape[-1] ** -0.5
 
     def project(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Queries, keys and values (…, H, w / H) of (…, w)."""
+        """Return queries, keys and values (…, H, w / H) of (…, w)."""
         query, key, value = self.qkv(x).view(*x.shape[:-1], 3, self.heads, -1).unbind(-3)
         return query, key, value
 
     def forward(self, x: Tensor, terms: Tensor, reach: Reach) -> Tensor:
-        """Whole sequences (N, P + n, w) -> (N, P + n, w)."""
+        """Attend in whole sequences: (N, P + n, w) -> (N, P + n, w)."""
         return self.out(self.mix(*self.project(x), terms, reach))
 
     def mix(self, query: Tensor, key: Tensor, value: Tensor, terms: Tensor, reach: Reach) -> Tensor:
-        """What each position reads (N, P + n, w) from `project`'s (N, P + n, H, w / H)."""
+        """Attend with the queries, keys and values (N, P + n, H, w / H) of `project`; returns (N, P + n, w)."""
         query, key, value = (part.transpose(1, 2) for part in (query, key, value))  # (N, H, P + n, w / H)
         frames = query[:, :, reach.prompts :]
         bias = self._positions(frames, terms, reach)
@@ -67,13 +67,13 @@ class RelativeAttention(nn.Module):
         return mixed.transpose(1, 2).flatten(2)
 
     def _positions(self, query: Tensor, terms: Tensor, reach: Reach) -> Tensor:
-        """(q_i + v)·φ_{i−j} of frames (N, H, n, w / H) over prompts and frames: (N, H, n, P + n)."""
+        """Return (q_i + v)·φ_{i−j} of frames (N, H, n, w / H) over prompts and frames: (N, H, n, P + n)."""
         size = query.shape[2]
         query = query + self._heads(self.v)
         prompt = terms[:, :, reach.to_prompt].permute(2, 0, 3, 1)  # (1 or N, H, n, w / H)
         to_prompt = (query * prompt).sum(-1, keepdim=True).expand(-1, -1, -1, reach.prompts)
         among = query @ terms[..., :size].flip(-1)  # (N, H, n, n), column c is distance n - 1 - c
-        # Transformer-XL's shift: row i moves left by n - 1 - i; what wraps around lies above the diagonal
+        # Transformer-XL's shift: row i moves left by n - 1 - i; wrapped entries lie above the diagonal
         shifted = F.pad(among, (1, 0)).view(*among.shape[:2], size + 1, size)[:, :, 1:]
         return torch.cat([to_prompt, shifted], -1)
 
@@ -82,12 +82,12 @@ class RelativeAttention(nn.Module):
 
 
 class Slots(NamedTuple):
-    """Where S sessions stand in what they remember: worked out once a frame, for all layers."""
+    """Positions of S sessions in their caches: computed once per frame, for all layers."""
 
     rows: Tensor  # (S,) 0 … S - 1
     newest: Tensor  # (S,) int64: the slot of the newest frame
     distance: Tensor  # (S, 1, 1, slots) int64: relative distance of each slot
-    hidden: Tensor  # (S, 1, 1, slots): `HIDDEN` where nothing may be read, else 0
+    hidden: Tensor  # (S, 1, 1, slots): `HIDDEN` where a slot is not readable, else 0
 
 
 class LookBack(nn.Module):
@@ -103,14 +103,14 @@ class LookBack(nn.Module):
         self.v = attention.v.detach().view(1, attention.heads, 1, -1)
 
     def forward(self, x: Tensor, memory: Tensor, terms: Tensor, slots: Slots) -> Tensor:
-        """(S, L, w) -> (S, L, w).
+        """Attend from one new position: (S, L, w) -> (S, L, w).
 
         Args:
             x: (S, L, w).
             memory: (2, S, H, L, slots, w / H) keys and values, in the type of the products over them; the new
-                position's are put into it.
+                position's are written into it.
             terms: from `RelativeAttention.terms`.
-            slots: where the sessions stand.
+            slots: positions of the sessions.
         """
         sessions, lanes = x.size(0), x.size(1)
         qkv = self.qkv(x).view(sessions, lanes, 3, self.heads, -1).permute(0, 2, 3, 1, 4)  # (S, 3, H, L, w / H)
@@ -127,7 +127,7 @@ class LookBack(nn.Module):
         return self.out(mixed.transpose(1, 2).reshape(sessions, lanes, -1))
 
     def _positions(self, query: Tensor, terms: Tensor) -> Tensor:
-        """(q + v)·φ_d of all distances (S, H, L, D + 1), from q + v (S, H, L, w / H)."""
+        """Return (q + v)·φ_d of all distances (S, H, L, D + 1), from q + v (S, H, L, w / H)."""
         if self.rowwise:  # session by session: with more rows some processors' products add in another order
             return torch.stack([torch.bmm(each, terms) for each in query.unbind()])
         together = torch.bmm(query.transpose(0, 1).flatten(1, 2), terms)  # one product for each head

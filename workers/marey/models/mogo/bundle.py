@@ -1,4 +1,4 @@
-"""MOGO's networks as one bundle: assembling, loading, and a random one for the machinery's tests."""
+"""MOGO's networks as one bundle: assembly, loading, and a random bundle for tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Tokenizer, RQHCTransforme
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
     if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"is a bundle of {bundle.manifest.model}, not of {MODEL}", where=str(bundle.path))
+        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
     config = MOGOConfig.from_dict(bundle.manifest.parameters)
     tokenizer, transformer = Tokenizer(config), RQHCTransformer(config)
     fill(tokenizer, bundle, "tokenizer")
@@ -34,9 +34,9 @@ def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Tokenizer, RQHCTransforme
 
 
 def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int = 0) -> Bundle:
-    """A real bundle with random weights: it exercises everything and generates nonsense (manifest `random` = true).
+    """Write a bundle with random weights, for tests: it runs like a trained one (manifest `random` = true).
 
-    Statistics are those of a person standing still, so that joints stay in sight.
+    Statistics are those of a person standing still, so that joints stay within a sane range.
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config

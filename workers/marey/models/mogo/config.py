@@ -42,11 +42,11 @@ class TransformerConfig:
     feedforward: int = 4096
     dropout: float = 0.15
     level_gain: bool = False
-    """Ours: each level has its own gains on the shared embedding. Without, a sum of embeddings does not tell which
+    """Ours: each level has its own gains on the shared embedding. Without them, a sum of embeddings does not show which
     level a code came from."""
     joint: bool = False
-    """Ours: one sequence for all levels, of whole frames; the depth head, which it needs, tells them apart. A sixth of
-    the trunk's work."""
+    """Ours: one sequence of whole frames for all levels; the depth head, which it needs, separates the levels. A sixth
+    of the trunk's work."""
 
 
 @dataclass(frozen=True)
@@ -57,54 +57,54 @@ class DepthConfig:
     heads: int = 8
     width: int = 512
     feedforward: int = 1024
-    share: float = 1.0  # of the frames that training asks at all levels; the others at level 0 alone
+    share: float = 1.0  # of the frames whose loss covers all levels; the others cover level 0 alone
 
 
 @dataclass(frozen=True)
 class ConditionConfig:
-    """The prompt, one vector a sentence."""
+    """The prompt, one vector per sentence."""
 
     text_width: int = 768
     drop: float = 0.1  # share of samples trained without prompt, for guidance
-    every_frame: bool = False  # ours: the prompt in force is told to every frame, beside standing at position 0
-    noise: float = 0.0  # ours: std of what training adds to standardised text features
-    clock: bool = False  # ours: each frame is told how long ago its act began
-    clockless: float = 0.3  # share of the acts that training tells no time of: a stream outlasts what was captured
+    every_frame: bool = False  # ours: the current prompt is added to every frame, beside being position 0
+    noise: float = 0.0  # ours: std of the noise added to standardised text features in training
+    clock: bool = False  # ours: the time since its action began is added to every frame
+    clockless: float = 0.3  # share of actions without that time in training: a stream outlasts every capture
 
 
 @dataclass(frozen=True)
 class InferenceConfig:
-    """Drawing tokens."""
+    """Sampling of tokens."""
 
     temperature: float = 1.0  # of level 0
     top_k: float = 0.1  # share of the codes that level 0 may draw
     upper_temperature: float = 0.6  # of all other levels: against jitter
     upper_top_k: float = 0.1
     guidance: float = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
-    upper_guidance: float = 1.0  # of all other levels: level 0 decides what is done, the others how exactly
+    upper_guidance: float = 1.0  # of all other levels: level 0 decides the action, the others its details
     window: int = 196  # frames that attention reaches back, at most `max_frames`
 
 
 @dataclass(frozen=True)
 class MOGOConfig(ModelConfig):
-    """Everything that decides the shapes of one bundle."""
+    """Configuration of one bundle."""
 
     name: str = "paper"
     layout: str = "humanml3d-263"
     features: int = 263  # D
     joints: int = 22
     fps: float = 20.0
-    min_frames: int = 16  # shortest motion; a drawn end is not listened to before
-    max_frames: int = 196  # longest training sequence: no relative distance beyond it is ever learnt
+    min_frames: int = 16  # shortest motion; END is ignored before
+    max_frames: int = 196  # longest training sequence: no relative distance beyond it is learned
     corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
     first_level: float = 1.0  # weight of level 0 in the loss, to 1 of each other level
     ahead: tuple[int, ...] = ()
-    """Ours: frames by which training also asks level 0 ahead of the next one (Gloeckle et al. 2024, "Better & Faster
-    Large Language Models via Multi-token Prediction"). The past says the next frame; what comes a second later the
-    prompt does."""
+    """Ours: frames by which level 0 is also predicted ahead of the next one (Gloeckle et al. 2024, "Better & Faster
+    Large Language Models via Multi-token Prediction"). The past determines the next frame; the prompt determines the
+    frame a second later."""
     ahead_weight: float = 1.0  # of that loss, to 1 of the loss of eq. 11
     steers: int = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
-    rollouts: int = 0  # as many more that leave what the model itself makes, where training starts from a finished one
+    rollouts: int = 0  # further ones that start from the model's own motions, where training starts from a finished one
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
@@ -115,7 +115,7 @@ class MOGOConfig(ModelConfig):
     train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4)
 
     def __post_init__(self) -> None:
-        """Refuse levels that nothing could tell apart."""
+        """Refuse a joint sequence without a depth head: its levels would be indistinguishable."""
         if self.transformer.joint and not self.depth.layers:
             raise InvalidInput("one sequence for all levels needs a depth head", where="transformer.joint")
 
@@ -124,8 +124,8 @@ PAPER = MOGOConfig()
 
 STARTER = MOGOConfig(
     name="starter",
-    corruption=1.0,  # with .5 a frame tells so much of the next that prompts are hardly read
-    first_level=5.0,  # it decides what is done; the others how exactly
+    corruption=1.0,  # with .5 the last frame predicts the next so well that the model ignores prompts
+    first_level=5.0,  # level 0 decides the action; the others its details
     ahead=(5, 12, 24),
     steers=4000,
     rollouts=3000,
@@ -136,7 +136,7 @@ STARTER = MOGOConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384, share=0.25),
-    inference=InferenceConfig(temperature=0.8, guidance=3.5, upper_guidance=2.0),  # by prompts of development
+    inference=InferenceConfig(temperature=0.8, guidance=3.5, upper_guidance=2.0),  # chosen on development prompts
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
@@ -162,7 +162,7 @@ CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, STARTER, TINY)}
 
 
 def named_config(name: str) -> MOGOConfig:
-    """A configuration by name.
+    """Return a configuration by name.
 
     Raises:
         InvalidInput: no such configuration.

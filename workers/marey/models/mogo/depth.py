@@ -12,7 +12,7 @@ from marey.nn.transformer import Block
 
 
 class DepthHead(nn.Module):
-    """Trunk states and the codes drawn below them to states that know those codes."""
+    """Transformer from trunk states and the codes below them to states that depend on those codes."""
 
     def __init__(self, config: DepthConfig, levels: int, width: int) -> None:
         super().__init__()
@@ -29,12 +29,12 @@ class DepthHead(nn.Module):
 
     @property
     def layers(self) -> list[Block]:
-        """The blocks, typed."""
+        """Return the blocks, typed."""
         return [block for block in self.blocks if isinstance(block, Block)]
 
     def forward(self, states: Tensor, below: Tensor) -> Tensor:
-        """States (N, V or 1, w) of the levels, or of all of them, and embeddings (N, V - 1, w) of the codes below
-        each: (N, V, w)."""
+        """States (N, V or 1, w), one per level or one for all, and embeddings (N, V - 1, w) of the codes below each, to
+        (N, V, w)."""
         size = below.shape[1] + 1
         x = self.state(states) + self.level[:size] + F.pad(self.code(below), (0, 0, 1, 0))
         mask = torch.ones(size, size, dtype=torch.bool, device=x.device).tril()[None, None]
@@ -44,10 +44,11 @@ class DepthHead(nn.Module):
 
 
 class DepthFrame:
-    """One frame through the depth head level by level, as codes are drawn; keys and values below are kept."""
+    """One frame's pass through the depth head, level by level as codes are drawn; keeps keys and values of lower
+    levels."""
 
     def __init__(self, head: DepthHead, step: DepthStep, states: Tensor) -> None:
-        """Begin with trunk states (S, b, V or 1, w) of S sessions, b branches each; `step` is the head's."""
+        """Start with trunk states (S, b, V or 1, w) of S sessions, b branches each; `step` is the head's."""
         sessions, branches, lanes, _ = states.shape
         levels = len(head.level)
         self._step, self._level = step, 0
@@ -57,19 +58,19 @@ class DepthFrame:
         self._memory = states.new_empty(len(head.layers), sessions, branches, 2, heads, levels, width // heads)
 
     def keep_first_branch(self) -> None:
-        """Go on without the others."""
+        """Continue with the first branch alone."""
         self._states, self._entered = self._states[:, :1], self._entered[:, :1]
         self._memory = self._memory[:, :, :1]
 
     def next(self, below: Tensor | None) -> Tensor:
-        """The state (S, b, w) of the next level, given the embedding (S, w) of the code just drawn (None: level 0)."""
+        """Return the state (S, b, w) of the next level, given the embedding (S, w) of the last code (None: level 0)."""
         level = self._level
         self._level += 1
         return self._step(self._states[:, :, level], self._entered[:, :, level], below, self._memory, level)
 
 
 class DepthStep(nn.Module):
-    """One level through the depth head: the same layers as in `DepthHead.forward`, over kept keys and values."""
+    """One level of the depth head: the layers of `DepthHead.forward`, over cached keys and values."""
 
     def __init__(self, head: DepthHead) -> None:
         """Share the layers of `head`, packed or not."""
@@ -78,13 +79,13 @@ class DepthStep(nn.Module):
         self.blocks = nn.ModuleList(_StepBlock(block) for block in head.layers)
 
     def forward(self, state: Tensor, x: Tensor, below: Tensor | None, memory: Tensor, level: int) -> Tensor:
-        """The level's state (S, b, w).
+        """Return the level's state (S, b, w).
 
         Args:
             state: (S, b, w) of the trunk.
-            x: (S, b, dw) what it enters the head as.
+            x: (S, b, dw) the level's input to the head.
             below: (S, w) embedding of the code of the level below; None on level 0.
-            memory: (blocks, S, b, 2, H, V, dw / H) keys and values; this level's are put into it.
+            memory: (blocks, S, b, 2, H, V, dw / H) keys and values; this level's are written into it.
             level: from 0.
         """
         if below is not None:
@@ -104,7 +105,7 @@ class _StepBlock(nn.Module):
         self.norm2, self.wide, self.gelu, self.narrow = block.norm2, block.wide, block.gelu, block.narrow
 
     def forward(self, x: Tensor, memory: Tensor, level: int) -> Tensor:
-        """(S, b, dw) of one level over it and those below."""
+        """Attend from (S, b, dw) of one level to it and the levels below."""
         qkv = self.qkv(self.norm1(x)).view(x.size(0), x.size(1), 3, self.heads, 1, -1)
         memory[..., level : level + 1, :] = qkv[:, :, 1:]
         past = memory[..., : level + 1, :].flatten(0, 1)  # (S · b, 2, H, level + 1, dw / H)

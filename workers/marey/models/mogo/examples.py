@@ -1,10 +1,10 @@
-"""Which prompts does a bundle of MOGO obey best while it streams? `/live` offers these as examples.
+"""Choice of the example prompts of `/live`: those that a MOGO bundle follows best while it streams.
 
     python -m marey.models.mogo.examples models/mogo-starter
 
-Candidates are short prompts of one act from the evaluation sets. Each begins sessions and each is steered to, out of
-another act; the checker judges both from the joints of the live frames. Of each act the best prompt becomes an example,
-if it is obeyed in at least `LEAST` of its sessions. The result is kept by the exact bundle it was measured with.
+Candidates are short prompts of one action from the evaluation sets. Each begins sessions, and each is the second prompt
+of sessions with another action; the checker judges both from the joints of the live frames. The best prompt of each
+action becomes an example if at least `LEAST` of its sessions pass. Results are kept per exact bundle.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.bundles import find_bundle
-from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.checks.prompts import HeldOutPrompt, evaluation_prompts
 from marey.core.checkout import checkout
 from marey.core.errors import MareyError
 from marey.models.mogo.adherence import AFTER, BEFORE, SESSIONS, played, steered
@@ -29,10 +29,10 @@ from marey.text.features import TextFeatures
 from marey.training.adherence import pipeline_of
 
 OUTPUT = Path("services", "marey", "api", "live", "examples.json")
-"""In the checkout."""
+"""Path in the checkout."""
 SETS = ("evaluation", "development")
 CANDIDATES = 3
-"""Prompts of each act."""
+"""Prompts per action."""
 LONGEST = 48
 """Characters: an example is read at a glance."""
 LEAST = 0.9
@@ -42,9 +42,9 @@ Act = tuple[str, str]
 """An action and its side."""
 
 
-def candidates() -> list[EvaluationPrompt]:
-    """The shortest prompts of each act that training never saw."""
-    by_act: dict[Act, list[EvaluationPrompt]] = defaultdict(list)
+def candidates() -> list[HeldOutPrompt]:
+    """Return the shortest prompts of each action that are not in the training data."""
+    by_act: dict[Act, list[HeldOutPrompt]] = defaultdict(list)
     for prompt in sorted(itertools.chain(*map(evaluation_prompts, SETS)), key=lambda p: len(p.text)):
         named = prompt.text.startswith(("a person", "someone", "somebody"))
         if len(prompt.expected) == 1 and not prompt.separate and len(prompt.text) <= LONGEST and named:
@@ -54,14 +54,14 @@ def candidates() -> list[EvaluationPrompt]:
     return [prompt for prompts in by_act.values() for prompt in prompts]
 
 
-def act_of(prompt: EvaluationPrompt) -> Act:
-    """The act that a prompt asks for."""
+def act_of(prompt: HeldOutPrompt) -> Act:
+    """Return the action that a prompt asks for."""
     return prompt.expected[0].act, prompt.expected[0].side
 
 
-def pairs(prompts: Sequence[EvaluationPrompt], seeds: int) -> list[tuple[EvaluationPrompt, EvaluationPrompt]]:
-    """Sessions in which each prompt comes first and is steered to `seeds` times, between different acts."""
-    count, found = len(prompts), list[tuple[EvaluationPrompt, EvaluationPrompt]]()
+def pairs(prompts: Sequence[HeldOutPrompt], seeds: int) -> list[tuple[HeldOutPrompt, HeldOutPrompt]]:
+    """Pair prompts of different actions, so that each comes first and second in `seeds` sessions."""
+    count, found = len(prompts), list[tuple[HeldOutPrompt, HeldOutPrompt]]()
     steps = (CANDIDATES + (count // seeds) * k for k in itertools.count())
     while len(found) < seeds * count:
         step = next(steps) % count
@@ -71,19 +71,19 @@ def pairs(prompts: Sequence[EvaluationPrompt], seeds: int) -> list[tuple[Evaluat
 
 
 def measure(
-    generator: Generator, sessions: Sequence[tuple[EvaluationPrompt, EvaluationPrompt]], texts: dict[str, TextFeatures]
+    generator: Generator, sessions: Sequence[tuple[HeldOutPrompt, HeldOutPrompt]], texts: dict[str, TextFeatures]
 ) -> dict[str, list[bool]]:
-    """For each prompt, whether it was obeyed within 2 s, as a first prompt and as a steer."""
+    """Return for each prompt if it passed within 2 s, as a first prompt and as a steer."""
     fps = generator.limits.fps
     obeyed: dict[str, list[bool]] = defaultdict(list)
     for start in range(0, len(sessions), SESSIONS):
         some = sessions[start : start + SESSIONS]
-        room = LiveSessionPool(generator, len(some))
-        names = [room.start(texts[first.text], start + k) for k, (first, _) in enumerate(some)]
-        before = played(room, names, round((BEFORE + 1) * fps))
+        pool = LiveSessionPool(generator, len(some))
+        names = [pool.start(texts[first.text], start + k) for k, (first, _) in enumerate(some)]
+        before = played(pool, names, round((BEFORE + 1) * fps))
         for name, (_, second) in zip(names, some, strict=True):
-            room.steer(name, texts[second.text])
-        after = played(room, names, round(AFTER * fps))
+            pool.steer(name, texts[second.text])
+        after = played(pool, names, round(AFTER * fps))
         for k, pair in enumerate(some):
             for joints, prompt in zip((before[k], after[k]), pair, strict=True):
                 obeyed[prompt.text].append(steered(joints, fps, prompt).passed)
@@ -91,8 +91,8 @@ def measure(
     return obeyed
 
 
-def choose(prompts: Sequence[EvaluationPrompt], obeyed: dict[str, list[bool]]) -> list[dict[str, Any]]:
-    """The best prompt of each act: first one of every act, then of its other sides; the surest first."""
+def choose(prompts: Sequence[HeldOutPrompt], obeyed: dict[str, list[bool]]) -> list[dict[str, Any]]:
+    """Choose the best prompt of each action: first one per action, then its other sides; highest share first."""
     best: dict[Act, dict[str, Any]] = {}
     for prompt in prompts:
         sessions = obeyed[prompt.text]
@@ -110,7 +110,7 @@ def choose(prompts: Sequence[EvaluationPrompt], obeyed: dict[str, list[bool]]) -
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure one bundle and keep its examples beside those of other bundles."""
+    """Measure one bundle and write its examples beside those of other bundles."""
     parser = argparse.ArgumentParser(prog="python -m marey.models.mogo.examples")
     parser.add_argument("bundle")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="sessions that begin with each prompt")

@@ -1,4 +1,4 @@
-"""Prompts' features in, whole motions out: MOGO in batches, drawn by the streams that also serve live sessions."""
+"""MOGO's inference of whole motions in batches, drawn by the streams that also serve live sessions."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from numpy.typing import NDArray
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidInput
-from marey.generation.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.mogo.bundle import load_networks
 from marey.models.mogo.config import InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel, sessions_of_product
 from marey.models.mogo.state import NEVER
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.motion.features import FeatureLayout, layout
 from marey.text.features import TextFeatures
 
 MAX_SESSIONS = 32
-"""Motions drawn side by side."""
+"""Motions drawn in parallel."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Uniform over a batch; None = what the bundle says."""
+class SamplingSettings:
+    """Sampling settings, uniform over a batch; None = the bundle's value."""
 
     temperature: float | None = None
     top_k: float | None = None
@@ -39,7 +39,7 @@ class Settings:
     upper_guidance: float | None = None
 
     def inference(self, default: InferenceConfig) -> InferenceConfig:
-        """The bundle's drawing with this batch's changes.
+        """Return the bundle's sampling settings with this batch's changes.
 
         Raises:
             InvalidInput: a value out of range.
@@ -55,14 +55,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Generated:
-    """One motion as the network made it: before decoding to joints and clean-up."""
+    """One motion as the network generated it, before decoding to joints and clean-up."""
 
     tokens: NDArray[np.int16]  # (V, T)
     features: NDArray[np.float32]  # (T, D), in the layout's own units
 
 
 class Generator:
-    """A loaded bundle. Not thread-safe; one a process."""
+    """A loaded bundle. Not thread-safe; one per process."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Generator:
         transformer: RQHCTransformer,
         dtype: torch.dtype,
     ) -> None:
-        """Put a generator together; most callers want `load`."""
+        """Create a generator from its parts; most callers use `load`."""
         self.bundle, self.config = bundle, config
         self.tokenizer, self.transformer = tokenizer, transformer
         self.device, self.dtype = transformer.head.weight.device, dtype
@@ -80,7 +80,7 @@ class Generator:
         self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
         self._packed: dict[int, PackedModel] = {}
-        self._streams: tuple[InferenceConfig, Streams] | None = None
+        self._streams: tuple[InferenceConfig, StreamBatch] | None = None
 
     @classmethod
     def load(
@@ -91,71 +91,75 @@ class Generator:
         Args:
             bundle: a verified bundle, or its name or path.
             device: `auto`, `cpu`, `cuda`, `cuda:N`.
-            threads: of torch; 0 leaves torch's own choice.
+            threads: of torch; 0 = torch's default.
             dtype: of the matrices on a CPU; None = bfloat16 where that is fast, else float32.
 
         Raises:
             InvalidBundle: not MOGO, or damaged.
-            InvalidInput: no such device.
+            InvalidInput: unknown device.
         """
         verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
         config, tokenizer, transformer = load_networks(verified)
         return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
 
     def packed(self, sessions: int = MAX_SESSIONS) -> PackedModel:
-        """What draws up to so many motions side by side; products of the same shape for any number of them, so the same
-        tokens. Made once for each shape."""
+        """Return the packed model for up to `sessions` motions in parallel, built once per shape; its products have the
+        same shape for any number of motions, so tokens do not depend on it."""
         group = sessions_of_product(self.transformer, sessions) if self.device.type == "cpu" else 1
         if group not in self._packed:
             self._packed[group] = PackedModel(self.transformer, dtype=self.dtype, group=group)
         return self._packed[group]
 
-    def settings(self, values: Mapping[str, Any]) -> Settings:
-        """An item's settings, checked. Raises InvalidInput."""
-        settings = read_settings(Settings, values, Settings.__dataclass_fields__)
+    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
+        """Check an item's settings. Raises InvalidInput."""
+        settings = read_settings(SamplingSettings, values, SamplingSettings.__dataclass_fields__)
         settings.inference(self.config.inference)
         return settings
 
-    def described(self, settings: Settings) -> dict[str, Any]:
-        """Everything that decides how tokens are drawn."""
+    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
+        """Return all settings that decide how tokens are drawn."""
         return asdict(settings.inference(self.config.inference))
 
-    def settled(self, request: Request) -> Request:
-        """The request itself, checked: an open length is decided while it is drawn."""
+    def resolve_length(self, request: Request) -> Request:
+        """Check the request and return it unchanged: an open length is decided while drawing."""
         self.limits.check(request)
         return request
 
     def bucket(self, request: Request) -> int:
-        """One for all: sessions of any length go side by side."""
+        """Return one bucket for all: sessions of any length run in parallel."""
         return 1
 
-    def acts(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
-        """The acts of a prompt (A, W), and the frames that each usually takes (A,)."""
-        acts = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.device)
-        return acts, self.transformer.natural_frames(acts)
+    def actions(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
+        """Return the action vectors of a prompt (A, W), and the usual frames of each (A,)."""
+        actions = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.device)
+        return actions, self.transformer.natural_frames(actions)
 
-    def streams(self, count: int, inference: InferenceConfig) -> Streams:
-        """Room for a batch of so many motions, empty. On a GPU that of the last batch, where it was drawn likewise: to
-        record a step takes as long as to draw a motion."""
+    def streams(self, count: int, inference: InferenceConfig) -> StreamBatch:
+        """Return empty streams for `count` motions. On a GPU those of the last batch are reused if settings are equal:
+        recording a step takes as long as drawing a motion."""
         if self.device.type == "cpu":
-            return Streams(self.packed(), max(1, min(MAX_SESSIONS, count)), inference)
+            return StreamBatch(self.packed(), max(1, min(MAX_SESSIONS, count)), inference)
         if self._streams is None or self._streams[0] != inference:
-            self._streams = None  # its memory first
-            self._streams = inference, Streams(self.packed(), MAX_SESSIONS, inference)
+            self._streams = None  # release its memory first
+            self._streams = inference, StreamBatch(self.packed(), MAX_SESSIONS, inference)
         return self._streams[1]
 
     @torch.inference_mode()
     def generate(
-        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+        self,
+        requests: Sequence[Request],
+        settings: SamplingSettings | None = None,
+        *,
+        control: GenerationControl | None = None,
     ) -> list[Generated | None]:
-        """Make one motion a request; None where `control` dropped it.
+        """Generate one motion per request; None where `control` dropped it.
 
-        The tokens of an item do not depend on the others, on their number or order.
+        The tokens of an item do not depend on the number or order of the others.
 
         Raises:
             InvalidInput: a length or seed out of range, or features of another encoder.
         """
-        inference = (settings or Settings()).inference(self.config.inference)
+        inference = (settings or SamplingSettings()).inference(self.config.inference)
         control = control or NoControl()
         for request in requests:
             self.limits.check(request)
@@ -170,10 +174,10 @@ class Generator:
         return [None if columns is None else self._decode(torch.stack(columns)) for columns in drawing.columns]
 
     def columns(self, tokens: NDArray[np.int16]) -> torch.Tensor:
-        """Tokens (n, V) that were drawn elsewhere, on this device.
+        """Move tokens (n, V) of another process to this device.
 
         Raises:
-            InvalidInput: they are none of this bundle's.
+            InvalidInput: not tokens of this bundle.
         """
         config = self.config.tokenizer
         if tokens.ndim != 2 or tokens.shape[1] != config.levels or tokens.min() < 0 or tokens.max() >= config.codes:
@@ -182,13 +186,13 @@ class Generator:
         return torch.from_numpy(tokens.astype(np.int64)).to(self.device)
 
     def _decode(self, tokens: torch.Tensor) -> Generated:
-        """One by one: a convolution rounds differently in another batch, files would differ."""
+        """Decode one by one: a convolution rounds differently in another batch, and files would differ."""
         features = self.tokenizer.decode(tokens[None])[0]
         return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
 
 
 class _Drawing:
-    """Requests on their way through the sessions of one `Streams`."""
+    """Requests in progress in the sessions of one `StreamBatch`."""
 
     def __init__(
         self,
@@ -210,11 +214,11 @@ class _Drawing:
 
     @property
     def done(self) -> int:
-        """Frames drawn."""
+        """Return the frames drawn so far."""
         return sum(len(columns or ()) for columns in self.columns)
 
     def step(self, dropped: set[int]) -> bool:
-        """Draw one frame of every session; False when there is none left."""
+        """Draw one frame of every session; return False when none is left."""
         self._leave_out(dropped)
         while self.waiting and len(self.playing) < self.streams.capacity:
             row = self.waiting.pop()
@@ -222,7 +226,7 @@ class _Drawing:
         if not self.playing:
             return False
         drawn = self.streams.step()
-        ends = (torch.stack(list(drawn.values()))[:, 0] < 0).tolist()  # the device is asked once for all of them
+        ends = (torch.stack(list(drawn.values()))[:, 0] < 0).tolist()  # one transfer from the device for all of them
         for (session, column), ended in zip(drawn.items(), ends, strict=True):
             row = self.playing[session]
             columns = self.columns[row]
@@ -234,7 +238,7 @@ class _Drawing:
         return True
 
     def close(self) -> None:
-        """Leave the room, whatever became of the requests."""
+        """Stop all sessions."""
         for session in list(self.playing):
             self._stop(session)
 
@@ -247,13 +251,14 @@ class _Drawing:
             self.columns[row] = None
 
     def _start(self, request: Request, lasts: Sequence[int]) -> int:
-        acts, _ = self._generator.acts(request.text)
+        actions, _ = self._generator.actions(request.text)
         ends_from = NEVER if request.frames is not None else self._generator.config.min_frames
-        return self.streams.start(acts, request.seed, ends_from=ends_from, lasts=lasts)
+        return self.streams.start(actions, request.seed, ends_from=ends_from, lasts=lasts)
 
     def _lasts(self, request: Request) -> list[int]:
-        """Frames of each act: as many as is natural, together as many as are asked for or can be made at most."""
-        natural = np.array(self._generator.acts(request.text)[1])
+        """Return the frames of each action: in natural proportion, in total the requested or the largest possible
+        length."""
+        natural = np.array(self._generator.actions(request.text)[1])
         whole = request.frames or min(int(natural.sum()), self._generator.config.max_frames)
         return np.diff(np.round(np.cumsum([0, *natural]) * whole / natural.sum())).astype(int).tolist()
 

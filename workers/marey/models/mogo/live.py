@@ -1,6 +1,6 @@
 """Live sessions of one bundle: prompts in, finished frames out; all sessions advance together, one frame per step.
 
-A session has three kinds of state, each with a row per session: keys and values of the transformer (`Streams`), the
+A session has three kinds of state, each with a row per session: keys and values of the transformer (`StreamBatch`), the
 past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). To resume a session after
 its worker died, its tokens, its prompts and the starts of their actions must be kept elsewhere.
 """
@@ -19,8 +19,8 @@ from marey.core.errors import InvalidBundle, InvalidInput
 from marey.core.settings import settings as configuration
 from marey.generation.port import Request
 from marey.models.mogo.bundle import MODEL
-from marey.models.mogo.generate import Generator, Settings
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.generate import Generator, SamplingSettings
+from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.tokenizer import DecoderState
 from marey.motion.features import HeadingLayout
 from marey.motion.live import LiveMotion, LiveState
@@ -58,7 +58,7 @@ class _Paused:
 class LiveSessionPool:
     """Sessions of one loaded bundle; they join, are steered and leave between frames. Not thread-safe."""
 
-    def __init__(self, generator: Generator, capacity: int, settings: Settings | None = None) -> None:
+    def __init__(self, generator: Generator, capacity: int, settings: SamplingSettings | None = None) -> None:
         """Allocate `capacity` sessions, all sampled with the same settings.
 
         Raises:
@@ -69,10 +69,10 @@ class LiveSessionPool:
             where = str(generator.bundle.path)
             raise InvalidBundle(f"layout {generator.layout.name!r} has no live decoder", where=where)
         self.generator = generator
-        inference = (settings or Settings()).inference(generator.config.inference)
+        inference = (settings or SamplingSettings()).inference(generator.config.inference)
         self.skeleton = generator.layout.skeleton
         self.capacity = capacity
-        self._streams = Streams(generator.packed(capacity), capacity, inference)
+        self._streams = StreamBatch(generator.packed(capacity), capacity, inference)
         self._streams.prepare()
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # session of each row of the two states below
@@ -145,8 +145,8 @@ class LiveSessionPool:
             columns = self.generator.columns(past)
             features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
             body = self._motion.after(features[0].cpu().numpy())
-        acts, lasts = self.generator.acts(text)
-        stream = self._streams.start(acts, seed, lasts=lasts, past=columns, began=began)
+        actions, lasts = self.generator.actions(text)
+        stream = self._streams.start(actions, seed, lasts=lasts, past=columns, began=began)
         self._started += 1
         self._sessions[self._started] = _Session(0 if columns is None else len(columns), prompt, stream)
         self._join(self._started, decoder, body)
@@ -160,7 +160,7 @@ class LiveSessionPool:
         """
         self.generator.limits.check(Request(text, 0))
         about = self._playing(session)
-        self._streams.steer(about.stream, *self.generator.acts(text))
+        self._streams.steer(about.stream, *self.generator.actions(text))
         about.prompt += 1
 
     def stop(self, session: int) -> None:
@@ -237,13 +237,13 @@ class LiveSessionPool:
             left, left_toe, right, right_toe = shown.contacts[row].tolist()
             stands = (left, left_toe, right, right_toe)
             frame = Frame(about.shown, shown.root[row], shown.rotations[row], stands, about.prompt)
-            frames[session] = LiveFrame(frame, tokens[row], self._streams.act(about.stream))
+            frames[session] = LiveFrame(frame, tokens[row], self._streams.action(about.stream))
             about.shown += 1
         return frames
 
     def _playing(self, session: int) -> _Session:
         if session not in self._sessions:
-            raise InvalidInput(f"there is no session {session}", hint="It was stopped, or never started.")
+            raise InvalidInput(f"unknown session {session}", hint="It was stopped, or never started.")
         if session in self._paused:
             raise InvalidInput(f"session {session} is paused", hint="Resume it first.")
         return self._sessions[session]

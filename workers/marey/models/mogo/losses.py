@@ -1,4 +1,4 @@
-"""What MOGO's networks are trained on beside what all tokenizers are (eq. 6 and eq. 11)."""
+"""Losses of MOGO's networks beyond those that all tokenizers share (eq. 6 and eq. 11)."""
 
 from __future__ import annotations
 
@@ -14,47 +14,47 @@ from marey.models.mogo.tokenizer import Tokenizer
 
 
 def scale_penalty(model: Tokenizer, config: TokenizerConfig) -> Tensor:
-    """The last term of eq. 6: what holds scales at one and biases at zero; added to `tokenizer_loss`."""
+    """Return the last term of eq. 6, which keeps scales near one and biases near zero; added to `tokenizer_loss`."""
     return config.regularizer * model.quantizer.regularizer()
 
 
 @dataclass(frozen=True)
 class LevelSums:
-    """Over all codes asked for, level by level: all (V,)."""
+    """Sums over all predicted codes, per level: all (V,)."""
 
     losses: Tensor  # cross-entropies
-    right: Tensor  # codes that were the likeliest
-    asked: Tensor  # codes
+    right: Tensor  # codes predicted correctly
+    asked: Tensor  # codes predicted
 
     def __add__(self, other: LevelSums) -> LevelSums:
-        """Both together."""
+        """Add two sums."""
         return LevelSums(self.losses + other.losses, self.right + other.right, self.asked + other.asked)
 
     @property
     def means(self) -> Tensor:
-        """(V,) cross-entropy of a code."""
+        """Return (V,), the mean cross-entropy of a code."""
         return self.losses / self.asked.clamp(min=1)
 
     def loss(self, first_level: float) -> Tensor:
-        """Eq. 11 as a mean over codes (ours: its sum would weigh clips by their length), `first_level` times the weight
-        on level 0."""
+        """Return eq. 11 as a mean over codes (ours: its sum would weigh clips by their length), `first_level` times the
+        weight on level 0."""
         weights = torch.ones_like(self.losses)
         weights[0] = first_level
         return (weights * self.means).sum() / weights.sum()
 
 
 def level_sums(model: RQHCTransformer, states: Tensor, targets: Tensor, share: float = 1.0) -> LevelSums:
-    """How well states predict codes.
+    """Sum how well states predict codes.
 
     Args:
-        model: to score them.
+        model: the transformer.
         states: (B, n, L, w) from `RQHCTransformer.states`.
         targets: (B, V, n) from `next_targets`.
-        share: of the frames asked at all levels, drawn at random; the others are asked at level 0 alone (ours). Without
-            a depth head there is nothing to be saved by less than 1.
+        share: of the frames whose loss covers all levels, drawn at random; the others cover level 0 alone (ours).
+            Without a depth head less than 1 saves nothing.
     """
     targets, states = targets.transpose(1, 2).flatten(0, 1), states.flatten(0, 1)
-    whole = targets[:, -1] != NOT_ASKED  # the end of a clip is asked at level 0 alone
+    whole = targets[:, -1] != NOT_ASKED  # the end of a clip is a target of level 0 alone
     if share < 1:
         whole &= torch.rand(len(whole), device=whole.device) < share
     brief = (targets[:, 0] != NOT_ASKED) & ~whole
@@ -68,14 +68,14 @@ def level_sums(model: RQHCTransformer, states: Tensor, targets: Tensor, share: f
 
 
 def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Tensor | None, share: float) -> Tensor:
-    """Cross-entropy of level 0 further ahead (`MOGOConfig.ahead`), a mean over what is asked; 0 where nothing is.
+    """Return the cross-entropy of level 0 further ahead (`MOGOConfig.ahead`), a mean over targets; 0 without any.
 
     Args:
-        model: to score with.
+        model: the transformer.
         states: (B, n, L, w) from `RQHCTransformer.states`.
         targets: (B, V, n) from `next_targets`.
-        seam: (B,) as in `states`: before a steer nobody can tell what comes after it.
-        share: of the frames that are asked, drawn at random.
+        seam: (B,) as in `states`: frames after a steer are not predictable before it.
+        share: of the frames to predict, drawn at random.
     """
     losses: list[Tensor] = []
     size, position = states.shape[1], torch.arange(states.shape[1], device=states.device)
@@ -91,7 +91,7 @@ def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Te
 
 
 def _sums(logits: Tensor, codes: Tensor) -> LevelSums:
-    """Of logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
+    """Sum over logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
     losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), reduction="none").view(codes.shape).sum(0)
     right = (logits.detach().argmax(-1) == codes).sum(0)
     return LevelSums(losses, right, right.new_full(right.shape, len(codes)))

@@ -1,7 +1,7 @@
 """MOGO's RQHC-Transformer (Sec. 2.2, Alg. 2), read top to bottom.
 
     prompt + level ── Prompt (PnQ, eq. 7)                 ── position 0 of each level
-    time           ── Clock (ours)                        ── what frames are told beside it
+    time           ── Clock (ours)                        ── added to every frame, beside the prompt
     tokens         ── RQHCTransformer.columns (eq. 8)     ── positions 1 … n: sums of the levels up to one's own
     both           ── Trunk (eq. 9-10), shared by levels  ── states
     states, codes  ── DepthHead (ours)                    ── states that know the levels drawn below
@@ -33,18 +33,18 @@ NOT_ASKED = -1
 """Target that counts in no loss."""
 RIDGE = 100.0
 TRANSITION = 10
-"""Frames that joined clips of the training data blend over."""
+"""Frames of the blend between joined clips of the training data."""
 STRETCHES = (1, 1, 8, 24)
-"""Frames that are hidden together in training."""
+"""Frames that training hides together."""
 
 
 def lanes(config: MOGOConfig) -> int:
-    """L, sequences of a clip: one a level (the paper's), or one for all of them."""
+    """Return L, the sequences of a clip: one per level (the paper's), or one for all levels."""
     return 1 if config.transformer.joint else config.tokenizer.levels
 
 
 class Prompt(nn.Module):
-    """Sentence features to position 0 of every lane (eq. 7), and to every frame (ours)."""
+    """Projection of sentence features to position 0 of every lane (eq. 7), and to every frame (ours)."""
 
     mean: Tensor  # (W,) of the training captions; standardising them is ours, as in HGM³
     std: Tensor  # (W,)
@@ -61,28 +61,27 @@ class Prompt(nn.Module):
         self.null = nn.Parameter(torch.zeros(width))  # in place of the prompt, the same at all levels (ours)
 
     def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """p + q_emb: (B, W) -> (B, L, w), the null prompt where `dropped` (B,) bool; and what is added to every frame
-        (B, w), nothing there."""
+        """Return p + q_emb, (B, W) -> (B, L, w), the null prompt where `dropped` (B,) bool; and the term that is added
+        to every frame (B, w), zero where dropped."""
         x = self.standardised(sentence)
         if self.training and self.noise > 0:
             x = x + self.noise * torch.randn_like(x)
         prompt = self.project(x)
-        told = torch.zeros_like(prompt) if self.tell is None else self.tell(x)
+        prompt_term = torch.zeros_like(prompt) if self.tell is None else self.tell(x)
         if dropped is not None:
             prompt = torch.where(dropped[:, None], self.null.to(prompt.dtype), prompt)
-            told = told.masked_fill(dropped[:, None], 0)
-        return prompt[:, None] + self.level.weight, told
+            prompt_term = prompt_term.masked_fill(dropped[:, None], 0)
+        return prompt[:, None] + self.level.weight, prompt_term
 
     def standardised(self, sentence: Tensor) -> Tensor:
-        """(…, W) to zero mean and unit deviation over the training captions."""
+        """Standardise (…, W) to zero mean and unit deviation over the training captions."""
         return (sentence.float() - self.mean) / self.std
 
 
-class Pace(nn.Module):
-    """How long an act takes, from its sentence alone (ours): ridge regression of the logarithm of its frames.
+class DurationRegression(nn.Module):
+    """Duration of an action from its sentence alone (ours): ridge regression of the logarithm of its frames.
 
-    Where a clip should end no local look at the motion tells: an arm that came down again looks like one that has not
-    been raised yet.
+    The motion does not show locally where a clip should end: a lowered arm looks like one that has not been raised yet.
     """
 
     weight: Tensor  # (W,) of standardised features
@@ -95,7 +94,7 @@ class Pace(nn.Module):
         self.register_buffer("bias", torch.tensor(4 * config.fps).log())
 
     def fit(self, features: Tensor, frames: Tensor) -> None:
-        """Learn from standardised features (N, W) of acts that take so many frames (N,)."""
+        """Fit standardised features (N, W) of actions to their frames (N,)."""
         x, y = F.pad(features.double(), (0, 1), value=1.0), frames.double().log()
         ridge = RIDGE * torch.eye(x.shape[1], dtype=x.dtype, device=x.device)
         ridge[-1, -1] = 0
@@ -104,7 +103,7 @@ class Pace(nn.Module):
         self.bias.copy_(found[-1])
 
     def forward(self, features: Tensor) -> Tensor:
-        """Frames (A,), whole numbers, of acts with standardised features (A, W)."""
+        """Return frames (A,), whole numbers, of actions with standardised features (A, W)."""
         frames = (features @ self.weight + self.bias).exp()
         return frames.round().clamp(self.least, self.most).long()
 
@@ -122,7 +121,7 @@ class TrunkBlock(nn.Module):
         self.norm2 = nn.LayerNorm(config.width)
 
     def forward(self, x: Tensor, attend: Callable[[Tensor], Tensor]) -> Tensor:
-        """(…, w) -> (…, w); `attend` is the attention over whatever may be read."""
+        """Map (…, w) to (…, w); `attend` is the attention over the readable positions."""
         x = x + self._drop(attend(self.norm1(x)))
         return x + self._drop(self.narrow(self._drop(F.gelu(self.wide(self.norm2(x))))))
 
@@ -158,7 +157,7 @@ class Trunk(nn.Module):
         self.register_buffer("sinusoids", table, persistent=False)
 
     def forward(self, x: Tensor, reach: Reach) -> Tensor:
-        """[prompts | frames] (N, P + n, w) to states of the same shape, float32."""
+        """Map [prompts | frames] (N, P + n, w) to states of the same shape, float32."""
         kind = x.device.type
         x = x.to(torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else x.dtype)
         for block in self.layers:
@@ -168,7 +167,7 @@ class Trunk(nn.Module):
 
     @property
     def layers(self) -> list[TrunkBlock]:
-        """The blocks, typed."""
+        """Return the blocks, typed."""
         return [block for block in self.blocks if isinstance(block, TrunkBlock)]
 
 
@@ -184,7 +183,7 @@ class RQHCTransformer(nn.Module):
         self.levels, self.lanes = levels, lanes(config)
         self.codes = config.tokenizer.codes
         self.prompt = Prompt(config)
-        self.pace = Pace(config)
+        self.pace = DurationRegression(config)
         self.clock = Clock(width, config.max_frames, config.condition.clockless) if config.condition.clock else None
         self.embedding = nn.Embedding(self.codes, width)  # one for all levels (Alg. 2)
         # residuals get smaller from level to level
@@ -193,7 +192,7 @@ class RQHCTransformer(nn.Module):
         self.trunk = Trunk(t, config.max_frames)
         self.depth = DepthHead(config.depth, levels, width) if config.depth.layers else None
         self.head = nn.Linear(width, self.codes + 1)  # one for all levels; the last is END
-        self.ahead = nn.ModuleList(nn.Linear(width, width) for _ in config.ahead)  # asked in training alone
+        self.ahead = nn.ModuleList(nn.Linear(width, width) for _ in config.ahead)  # used in training alone
         no_end = torch.zeros(levels, self.codes + 1, dtype=torch.bool)
         no_end[1:, -1] = True
         self.register_buffer("no_end", no_end, persistent=False)
@@ -205,17 +204,18 @@ class RQHCTransformer(nn.Module):
         if self.clock is not None:
             nn.init.zeros_(self.clock.project.weight)
         for weight in (w for w in self.ahead.parameters() if w.ndim == 2):
-            nn.init.eye_(weight)  # what comes later is what comes next, until training knows better
+            nn.init.eye_(weight)  # until trained, later frames are predicted as the next one
 
     @property
     def end(self) -> int:
-        """K, the token of level 0 that ends a clip; never an input."""
+        """Return K, the token of level 0 that ends a clip; never an input."""
         return self.codes
 
     def forward(
         self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
     ) -> Tensor:
-        """Logits (B, V, n + 1, K + 1) of the frames 1 … n + 1 of clips, all at once; arguments as in `states`."""
+        """Return logits (B, V, n + 1, K + 1) of the frames 1 … n + 1 of clips, all at once; arguments as in
+        `states`."""
         states = self.states(prompts, tokens, skipped=skipped, seam=seam)
         next_codes = F.pad(tokens, (0, 0, 0, 1), value=-1)[..., :-1]  # (B, n + 1, V - 1): of the frame predicted
         refined = self.refine(states.flatten(0, 1), next_codes.flatten(0, 1))
@@ -224,10 +224,10 @@ class RQHCTransformer(nn.Module):
     def states(
         self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
     ) -> Tensor:
-        """What the trunk knows before the frames 1 … n + 1 of clips: (B, n + 1, L, w).
+        """Return the trunk's states before the frames 1 … n + 1 of clips: (B, n + 1, L, w).
 
-        In training mode the prompt of some samples is dropped and frame columns of the input are corrupted; the depth
-        head is asked about what was not corrupted.
+        In training mode the prompt of some samples is dropped and frame columns of the input are corrupted; the targets
+        of the depth head are not.
 
         Args:
             prompts: (B, P, W) sentence features.
@@ -245,47 +245,47 @@ class RQHCTransformer(nn.Module):
     def inputs(
         self, prompts: Tensor, tokens: Tensor, skipped: Tensor | None, seam: Tensor | None
     ) -> tuple[Tensor, Tensor]:
-        """Position 0 of each prompt (B, L, P, w) and the frames (B, L, n, w); arguments as in `states`."""
+        """Return position 0 of each prompt (B, L, P, w) and the frames (B, L, n, w); arguments as in `states`."""
         training = self.training
         dropped = torch.rand(len(tokens), device=tokens.device) < self.config.condition.drop if training else None
         inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
         read = [self.prompt(p, dropped) for p in prompts.unbind(1)]
         first = torch.stack([opening for opening, _ in read], 2)
-        told = in_force([told for _, told in read], tokens.shape[1], seam)
+        prompt_term = in_force([prompt_term for _, prompt_term in read], tokens.shape[1], seam)
         if self.clock is not None:
-            time = self.clock.of_acts(len(tokens), tokens.shape[1], skipped, seam)
-            told = told + (time if dropped is None else time.masked_fill(dropped[:, None, None], 0))
-        return first, self.columns(inputs).to(first.dtype) + told[:, None]
+            time = self.clock.of_actions(len(tokens), tokens.shape[1], skipped, seam)
+            prompt_term = prompt_term + (time if dropped is None else time.masked_fill(dropped[:, None, None], 0))
+        return first, self.columns(inputs).to(first.dtype) + prompt_term[:, None]
 
-    def natural_frames(self, acts: Tensor) -> list[int]:
-        """How many frames each act (A, W) of a prompt usually takes, with the way there from the one before."""
-        first, *others = self.pace(self.prompt.standardised(acts)).tolist()
+    def natural_frames(self, actions: Tensor) -> list[int]:
+        """Return the usual frames of each action (A, W) of a prompt, with the transition from the one before."""
+        first, *others = self.pace(self.prompt.standardised(actions)).tolist()
         return [first, *(TRANSITION + frames for frames in others)]
 
     def columns(self, tokens: Tensor) -> Tensor:
-        """Inputs (B, L, n, w) of frames (B, n, V): lane l gets the sum over levels up to l, a single lane that over
-        all; -1 adds nothing."""
+        """Return inputs (B, L, n, w) of frames (B, n, V): lane l gets the sum over levels up to l, a single lane the
+        sum over all; -1 adds zero."""
         x = self._embed(tokens)  # (B, n, V, w)
         x = x if self.gains is None else x * self.gains
         return x.sum(2)[:, None] if self.lanes == 1 else x.cumsum(2).transpose(1, 2)
 
     def refine(self, states: Tensor, codes: Tensor) -> Tensor:
-        """States (N, m, w) of the first m levels, or of all, from those of the lanes (N, 1 or m, w), given the codes
-        (N, m - 1) of the frame they predict."""
+        """Return states (N, m, w) of the first m levels, or of all, from those of the lanes (N, 1 or m, w), given the
+        codes (N, m - 1) of the frame they predict."""
         return states if self.depth is None else self.depth(states, self._embed(codes))
 
     def score(self, states: Tensor, level: int = 0) -> Tensor:
-        """Logits (…, m, K + 1), float32, of states (…, m, w) of the levels `level` … `level` + m - 1."""
+        """Return logits (…, m, K + 1), float32, of states (…, m, w) of the levels `level` … `level` + m - 1."""
         hidden = self.no_end[level : level + states.shape[-2]]
         return self.head(states).float().masked_fill(hidden, torch.finfo(torch.float32).min)
 
     def reach(self, size: int, prompts: int = 1, skipped: Tensor | None = None, seam: Tensor | None = None) -> Reach:
-        """What `size` frames may read; see `forward`."""
+        """Return the positions that `size` frames may read; see `forward`."""
         device, farthest = self.trunk.sinusoids.device, self.config.max_frames
         if size > farthest:
-            raise ValueError(f"{size} frames are more than the {farthest} that distances are learnt for")
+            raise ValueError(f"{size} frames exceed the {farthest} learned distances")
         if (prompts == 2) != (seam is not None):
-            raise ValueError("a seam and a second prompt come together")
+            raise ValueError("a seam needs a second prompt, and a second prompt a seam")
         position = torch.arange(1, size + 1, device=device)
         later = (position[:, None] < position)[None]  # (1, n, n)
         unread = torch.zeros(1, size, prompts, dtype=torch.bool, device=device)
@@ -300,21 +300,21 @@ class RQHCTransformer(nn.Module):
         return self.embedding(tokens.clamp(min=0)) * (tokens >= 0)[..., None]
 
 
-def in_force(told: Sequence[Tensor], size: int, seam: Tensor | None) -> Tensor:
-    """What each of `size` frames is told, (B, 1 or n, w), of one or two prompts' (B, w): the frame behind which the
-    second prompt replaces the first is told the second, for it predicts the first frame of it."""
+def in_force(prompt_term: Sequence[Tensor], size: int, seam: Tensor | None) -> Tensor:
+    """Return the prompt term of each of `size` frames, (B, 1 or n, w), from one or two prompts' (B, w). The frame
+    behind which the second prompt replaces the first gets the second, because it predicts the second's first frame."""
     if seam is None:
-        return told[0][:, None]
+        return prompt_term[0][:, None]
     position = torch.arange(1, size + 1, device=seam.device)
-    return torch.where((position >= seam[:, None])[..., None], told[1][:, None], told[0][:, None])
+    return torch.where((position >= seam[:, None])[..., None], prompt_term[1][:, None], prompt_term[0][:, None])
 
 
 def corrupt(tokens: Tensor, codes: int, most: float) -> Tensor:
     """Replace whole frame columns of (B, n, V) by random codes, at a rate from U(0, `most`) a sample (ours).
 
-    The public repository replaces half of the tokens always. What a stream reads are its own slips, and those come as
-    frames: a wrong level 0 takes the levels above along. Half of the samples lose frames one by one, the others whole
-    stretches, behind which only the prompt says what is going on.
+    The public repository always replaces half of the tokens. A stream reads its own errors, and those affect whole
+    frames: a wrong level 0 makes the levels above wrong. Half of the samples lose single frames, the others stretches,
+    after which only the prompt shows the current action.
     """
     batch, size = tokens.shape[:2]
     device = tokens.device
@@ -329,14 +329,14 @@ def corrupt(tokens: Tensor, codes: int, most: float) -> Tensor:
 def next_targets(
     tokens: Tensor, lengths: Tensor, end: int, *, ends: Tensor | None = None, skipped: Tensor | None = None
 ) -> Tensor:
-    """What `RQHCTransformer.forward` should predict: (B, V, n + 1), NOT_ASKED where nothing is.
+    """Return the targets of `RQHCTransformer.forward`: (B, V, n + 1), NOT_ASKED where there is none.
 
     Args:
         tokens: (B, n, V).
         lengths: (B,) frames of each clip.
-        end: token that ends a clip, asked behind its last frame on level 0.
+        end: token that ends a clip, the target of level 0 behind its last frame.
         ends: (B,) bool, clips that really end there (no crop); None = all.
-        skipped: (B,), as in `forward`: what follows a prompt in the middle of a clip is not asked.
+        skipped: (B,), as in `forward`: the first frame of a crop is no target.
     """
     size = tokens.shape[1]
     targets = tokens.masked_fill(~frame_mask(lengths, size)[..., None], NOT_ASKED)

@@ -1,5 +1,5 @@
 """The inference twin of a model: matrices packed or in fewer bits, steps compiled, position terms computed once; any
-number of `Streams` share it."""
+number of `StreamBatch` share it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from marey.nn.compiled import Module, compiled
 from marey.nn.packed import cast_linears, is_small, pack_linears
 
 MOST_GROUPED = 8
-"""Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
+"""Sessions of one product: 48 rows. Beyond them the product takes the time, not reading the weights."""
 
 
 def sessions_of_product(model: RQHCTransformer, sessions: int) -> int:
-    """`group` of a `PackedModel` that serves up to so many `sessions` well: large weights are read once for all."""
+    """Return `group` of a `PackedModel` for up to `sessions` sessions: large weights are read once for all of them."""
     return 1 if is_small(model) else min(sessions, MOST_GROUPED)
 
 
 class PackedModel:
-    """A model ready to draw frame by frame; it takes a tenth of a second and more to make, so make it once."""
+    """A model prepared to draw frame by frame. Building it takes over a tenth of a second, so build it once."""
 
     def __init__(self, model: RQHCTransformer, *, dtype: torch.dtype = torch.float32, group: int = 1) -> None:
         """Copy and pack a model.
 
         Args:
-            model: stays as it is.
-            dtype: of the matrices; bfloat16 halves what a frame reads. On a GPU also of the keys and values that
-                sessions keep.
+            model: not changed.
+            dtype: of the matrices; bfloat16 halves the memory that a frame reads. On a GPU also of the cached keys and
+                values.
             group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
         """
         self.network = copy.deepcopy(model).eval().requires_grad_(False)
@@ -39,16 +39,16 @@ class PackedModel:
         self.blocks = self.network.trunk.layers
         self.terms = [block.attention.terms(self.network.trunk.sinusoids).contiguous() for block in self.blocks]
         clock = self.network.clock
-        told = torch.arange(self.network.config.max_frames + 1, device=self.device)
-        # the last row, `UNTOLD`: nothing
-        self.times = None if clock is None else F.pad(clock(told), (0, 0, 0, 1))
+        frames = torch.arange(self.network.config.max_frames + 1, device=self.device)
+        # the last row, for `UNKNOWN_TIME`, is zero
+        self.times = None if clock is None else F.pad(clock(frames), (0, 0, 0, 1))
         on_cpu = self.device.type == "cpu"
         self.kept = torch.float32 if on_cpu else dtype  # type of keys and values
         if on_cpu:
             pack_linears(self.network, dtype, group=group)
         else:
             cast_linears(self.network, dtype)
-        # elsewhere calls are recorded and replayed, and a compiler that looks on would record itself
+        # elsewhere calls are recorded and replayed, and an active compiler would be recorded too
         made = compiled if on_cpu else _as_it_is
         self.steps = [made(TrunkStep(block)) for block in self.blocks]
         self.depth = None if self.network.depth is None else made(DepthStep(self.network.depth))

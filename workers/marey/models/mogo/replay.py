@@ -1,8 +1,8 @@
 """Steps replayed as CUDA graphs.
 
-A frame is hundreds of small kernels, and a GPU runs them faster than Python can start them. Recorded once, they are
-started together. A graph has one shape, so a step is always of all rows, and those that nobody sits in are computed
-along: then what a session draws does not depend on how many there are, either.
+A frame is hundreds of small kernels, and a GPU runs them faster than Python starts them. A recorded graph starts them
+all at once. A graph has one shape, so a step always computes all rows, unused ones included: a session's tokens then
+do not depend on the number of sessions either.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from torch import Tensor
 log = structlog.get_logger()
 
 WARM_CALLS = 3
-"""Before a step is recorded: libraries choose and load their kernels in the first calls."""
+"""Calls before a step is recorded: libraries choose and load their kernels in the first calls."""
 
 
 class Replayed:
-    """A step, recorded when it is first asked for. Where CUDA refuses that, the log says so and the step is run as it
-    is: the same frames, several times slower."""
+    """A step that is recorded at its first call. Where CUDA refuses, the log says so and the step runs unrecorded: the
+    same frames, several times slower."""
 
     def __init__(self, step: Callable[[int], Tensor], rows: int, device: torch.device) -> None:
         """Wrap a step.
 
         Args:
-            step: from a number of rows to (rows, …); of tensors that stay where they are, without a look at a value,
-                and with the same effect when it runs twice.
+            step: function of a number of rows, returns (rows, …); its tensors stay in place, it reads no value, and
+                running it twice has the same effect.
             rows: of every step.
             device: of the tensors.
         """
@@ -37,7 +37,7 @@ class Replayed:
         self._refused = False
 
     def __call__(self, rows: int) -> Tensor:
-        """What the step gives for the first `rows` rows."""
+        """Run the step and return its result for the first `rows` rows."""
         self.prepare()
         if self._recorded is None:
             return self._step(self._rows)[:rows]
@@ -46,10 +46,10 @@ class Replayed:
         return result[:rows].clone()  # the next replay overwrites it
 
     def prepare(self) -> None:
-        """Record the step now: it takes a good part of a second, which no session should wait for.
+        """Record the step now: it takes most of a second, which would delay a session.
 
         Raises:
-            torch.OutOfMemoryError: the device has no room for it.
+            torch.OutOfMemoryError: not enough device memory.
         """
         if self._recorded is not None or self._refused:
             return
@@ -72,7 +72,7 @@ class Replayed:
                     self._step(self._rows)
             torch.cuda.current_stream().wait_stream(aside)
             graph = torch.cuda.CUDAGraph()
-            # cuBLAS keeps its workspace for each stream: no graph may use one that goes when another graph does
+            # cuBLAS keeps one workspace per stream: a graph must not use one that is freed with another graph
             torch._C._cuda_clearCublasWorkspaces()
             # other threads of a worker may use the device meanwhile
             with torch.cuda.graph(graph, stream=aside, capture_error_mode="thread_local"):

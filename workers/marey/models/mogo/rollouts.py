@@ -1,8 +1,8 @@
-"""Motion as the model itself makes it, to be left at any moment (ours).
+"""Motions that the model itself generates, as pasts of steered training motions (ours).
 
-A session that is steered shows what the model drew, not what was captured: an act that is long over, a slip. A model
-that learned from captures alone has never seen that past; here it learns what to do from where it gets by itself
-(Ross et al. 2011, "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning": DAgger).
+A steered session continues the model's own motion, not a captured one: an action that is long over, or an error. A
+model trained on captures alone has never seen such a past; rollouts train it on the states that it reaches itself (Ross
+et al. 2011, "A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning": DAgger).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from torch import Tensor
 
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.training.motions import fingerprint
 from marey.training.sentences import SentenceData
 
 SESSIONS = 32
 LEAST, MOST = 12, 130
-"""Frames after which a session is left: acts are over after 40 to 110, and a stream plays on."""
+"""Frames after which a rollout is steered: actions are over after 40 to 110, and a stream continues."""
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """What a session showed of one prompt."""
+    """Motion of one session under one prompt."""
 
     clip: int  # whose caption was the prompt
     tokens: Tensor  # (n, V) int64
@@ -37,22 +37,22 @@ class Rollout:
 
 
 class Rollouts:
-    """Sessions of a model that is being trained, as a stream would play them."""
+    """Sessions of a model in training, drawn as a stream draws them."""
 
     def __init__(self, model: RQHCTransformer, tokenizer: Tokenizer, captions: SentenceData, seed: int = 0) -> None:
-        """Draw with `model` as it is now, from `captions` of single acts."""
+        """Draw with `model` as it is now, from `captions` of single actions."""
         self.fingerprint = fingerprint(model)
         self._packed, self._tokenizer, self._captions = PackedModel(model), tokenizer, captions
         self._rng = np.random.default_rng(seed)
 
     @torch.inference_mode()
     def draw(self, clips: Sequence[int], most: int) -> Iterator[Rollout]:
-        """A session for each clip, whose prompt is one of its captions, of `most` frames at most; in the order in which
-        they are done."""
+        """Run one session per clip, prompted by one of the clip's captions, for up to `most` frames; yield them as they
+        finish."""
         network = self._packed.network
         sentences = self._captions.sentences(self._captions.choose(np.asarray(clips), self._rng))
         frames = self._rng.integers(min(LEAST, most), min(MOST, most) + 1, len(clips)).tolist()
-        streams, waiting = Streams(self._packed, min(SESSIONS, len(clips))), list(range(len(clips)))[::-1]
+        streams, waiting = StreamBatch(self._packed, min(SESSIONS, len(clips))), list(range(len(clips)))[::-1]
         playing: dict[int, tuple[int, list[Tensor]]] = {}  # session to its clip and what it showed
         while waiting or playing:
             while waiting and len(playing) < streams.capacity:

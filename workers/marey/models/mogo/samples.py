@@ -1,9 +1,9 @@
-"""What the RQHC-Transformer is trained on: acts from beginning to end, crops, and acts whose prompt changes (ours).
+"""Training samples of the RQHC-Transformer: whole actions, crops, and actions whose prompt changes (ours).
 
-A sample has one act, or two with a seam: a prompt of several acts is drawn as one steer after another
-(`marey.text.actions`), and END says that an act is done. Crops teach what a stream sees behind its window: the prompt
-far away, motion in full swing. Seams teach steering: between the acts of joined clips, and at any moment
-(`marey.models.mogo.steers`).
+A sample has one action, or two with a seam: a prompt of several actions is drawn as one steer after another
+(`marey.text.actions`), and END marks the end of an action. Crops teach the situation of a stream past its window: the
+prompt is far away, and motion is in progress. Seams teach steering: between the actions of joined clips, and at any
+moment (`marey.models.mogo.steers`).
 """
 
 from __future__ import annotations
@@ -24,51 +24,51 @@ from marey.training.sentences import SentenceData
 
 MIN_FRAMES = 16
 BEFORE_SEAM = 4
-"""Frames left before a seam, so that there is a prompt to be replaced."""
+"""Smallest number of frames before a seam, so that there is a prompt to replace."""
 CROPPED = 0.4
 """Share of the samples that are cropped."""
 STEERED = 0.5
-"""Share of the samples of joined clips that have two acts."""
+"""Share of the samples of joined clips that have two actions."""
 ANYTIME = 0.35
-"""Share of all samples whose prompt changes at any moment, where there are such motions."""
+"""Share of all samples whose prompt changes at any moment, if there are such motions."""
 
 
 @dataclass(frozen=True)
-class Sample:
+class SequenceSample:
     """Sequences with their prompts; see `RQHCTransformer.forward`."""
 
     prompts: Tensor  # (B, 2, W)
     tokens: Tensor  # (B, n, V)
     lengths: Tensor  # (B,)
     skipped: Tensor  # (B,)
-    seam: Tensor  # (B,), beyond the last frame where nothing is steered
+    seam: Tensor  # (B,), beyond the last frame without a steer
     ends: Tensor  # (B,) bool
 
-    def select(self, rows: Tensor) -> Sample:
-        """The samples at `rows`, cut to their longest."""
+    def select(self, rows: Tensor) -> SequenceSample:
+        """Return the samples at `rows`, cut to their longest."""
         size = int(self.lengths[rows].max())
         fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
-        return Sample(**{**fields, "tokens": fields["tokens"][:, :size]})
+        return SequenceSample(**{**fields, "tokens": fields["tokens"][:, :size]})
 
-    def pieces(self) -> Iterator[Sample]:
-        """In `pieces_of` alike length, each padded to its own longest."""
+    def pieces(self) -> Iterator[SequenceSample]:
+        """Yield the samples in `pieces_of` similar length, each padded to its own longest."""
         return map(self.select, pieces_of(self.lengths))
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """Tokens that belong together, and what is said of them."""
+class TokenSpan:
+    """A range of tokens with its captions."""
 
     first: int  # token of its first frame
     frames: int
-    skipped: int  # frames between the prompt and the first; 1 = it does not begin from rest
+    skipped: int  # frames between the prompt and the first; 1 = it starts in motion
     before: int  # caption, until the seam
     after: int  # caption, from the seam on
     seam: int  # frames before it; 0 = none
-    ends: bool  # its last frame is the last of an act
+    ends: bool  # its last frame is the last of an action
 
-    def cropped(self, by: int) -> Stretch:
-        """Without its first frames."""
+    def cropped(self, by: int) -> TokenSpan:
+        """Return the span without its first frames."""
         return replace(
             self,
             first=self.first + by,
@@ -77,25 +77,25 @@ class Stretch:
             seam=max(self.seam - by, 0),
         )
 
-    def shortened(self, most: int) -> Stretch:
-        """Its first `most` frames; a seam behind them is left out too."""
+    def shortened(self, most: int) -> TokenSpan:
+        """Return its first `most` frames; a seam behind them is dropped too."""
         if self.frames <= most:
             return self
         return replace(self, frames=most, seam=self.seam if self.seam <= most else 0, ends=False)
 
 
 class Samples:
-    """Draws stretches of clips and of steered motions."""
+    """Source of spans of clips and of steered motions."""
 
     def __init__(
         self, clips: Sequence[Clip], tokens: TokenData, captions: SentenceData, steers: Steers | None, most: int
     ) -> None:
-        """Put together what is drawn from.
+        """Collect the sources.
 
         Args:
-            clips: all of them.
-            tokens: theirs.
-            captions: theirs.
+            clips: all clips.
+            tokens: tokens of the clips.
+            captions: captions of the clips.
             steers: motions that are steered at any moment.
             most: frames of the longest sample.
         """
@@ -107,53 +107,53 @@ class Samples:
         columns = {} if steers is None else vars(steers)
         self._columns = {name: column.cpu().numpy() for name, column in columns.items() if name != "tokens"}
 
-    def draw(self, clips: NDArray[np.int64], rng: np.random.Generator) -> list[Stretch]:
-        """A stretch a clip (B,); some are of any steered motion instead."""
+    def draw(self, clips: NDArray[np.int64], rng: np.random.Generator) -> list[TokenSpan]:
+        """Draw one span per clip (B,); some are of a steered motion instead."""
         anytime = rng.random(len(clips)) < (ANYTIME if self.steers is not None else 0)
         return [
             self.anytime(rng) if other else self.of_clip(int(c), rng) for c, other in zip(clips, anytime, strict=True)
         ]
 
-    def of_clip(self, clip: int, rng: np.random.Generator) -> Stretch:
-        """An act, or two acts that follow each other, perhaps from the middle."""
-        edges, says = self._acts(clip, rng)
+    def of_clip(self, clip: int, rng: np.random.Generator) -> TokenSpan:
+        """Draw one action, or two consecutive actions, of a clip; some are cropped."""
+        edges, says = self._actions(clip, rng)
         last = len(edges) - 2
         two = last > 0 and rng.random() < STEERED
-        act = int(rng.integers(last if two else last + 1))
-        stop = edges[act + 1 + two]
-        start, seam = edges[act], edges[act + 1] - edges[act] if two else 0
-        # a later act does not begin from rest: its first frame is not asked
-        whole = Stretch(
-            int(self._starts[clip]) + start, stop - start, int(act > 0), says[act], says[act + two], seam, True
+        action = int(rng.integers(last if two else last + 1))
+        stop = edges[action + 1 + two]
+        start, seam = edges[action], edges[action + 1] - edges[action] if two else 0
+        # a later action does not begin from rest: its first frame is not asked
+        whole = TokenSpan(
+            int(self._starts[clip]) + start, stop - start, int(action > 0), says[action], says[action + two], seam, True
         )  # fmt: skip
         return self._cut(whole, rng)
 
-    def anytime(self, rng: np.random.Generator) -> Stretch:
-        """One of the steered motions."""
+    def anytime(self, rng: np.random.Generator) -> TokenSpan:
+        """Draw one of the steered motions."""
         row = int(rng.integers(len(self._columns["starts"])))
         about = {name: int(column[row]) for name, column in self._columns.items()}
-        whole = Stretch(
+        whole = TokenSpan(
             self._steered_from + about["starts"], about["lengths"], 0, self._caption(about["left"], rng),
             self._caption(about["entered"], rng), about["seams"], bool(about["ends"]),
         )  # fmt: skip
         return self._cut(whole, rng)
 
-    def acts_said(self, clips: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-        """Captions (N,) of all acts of some clips, and the frames (N,) of each act."""
+    def captioned_actions(self, clips: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
+        """Return captions (N,) of all actions of some clips, and the frames (N,) of each action."""
         said: list[tuple[int, int]] = []
         for clip in clips.tolist():
             first, count = int(self.captions.first[clip]), int(self.captions.count[clip])
             edges = [0, *self.clips[clip].seams, int(self.lengths[clip])]
-            acts = np.diff(edges).tolist()
-            if len(acts) > 1:
-                said += [(first + count + act, frames) for act, frames in enumerate(acts)]
+            actions = np.diff(edges).tolist()
+            if len(actions) > 1:
+                said += [(first + count + action, frames) for action, frames in enumerate(actions)]
             else:
-                said += [(first + k, acts[0]) for k in range(count)]
+                said += [(first + k, actions[0]) for k in range(count)]
         captions, frames = torch.tensor(said, device=self.tokens.device).unbind(1)
         return captions, frames
 
-    def collate(self, stretches: Sequence[Stretch]) -> Sample:
-        """Tokens and prompts of stretches."""
+    def collate(self, stretches: Sequence[TokenSpan]) -> SequenceSample:
+        """Collect tokens and prompts of spans."""
         device = self.tokens.device
         columns = np.array([(s.first, s.frames, s.skipped, s.before, s.after, s.seam) for s in stretches])
         first, lengths, skipped, before, after, seam = torch.from_numpy(columns).to(device).unbind(1)
@@ -164,21 +164,21 @@ class Samples:
         prompts = torch.stack([self.captions.sentences(before), self.captions.sentences(after)], 1)
         seam = torch.where(seam > 0, seam, size + 1)
         ends = torch.tensor([s.ends for s in stretches], device=device)
-        return Sample(prompts, tokens, lengths, skipped, seam, ends)
+        return SequenceSample(prompts, tokens, lengths, skipped, seam, ends)
 
-    def _acts(self, clip: int, rng: np.random.Generator) -> tuple[list[int], list[int]]:
-        """Where the acts of a clip begin and end, and a caption of each."""
+    def _actions(self, clip: int, rng: np.random.Generator) -> tuple[list[int], list[int]]:
+        """Return the edges of a clip's actions, and a caption of each."""
         about, length = self.clips[clip], int(self.lengths[clip])
         if not about.seams:
             return [0, length], [self._caption(clip, rng)]
         own = int(self.captions.first[clip] + self.captions.count[clip])
-        return [0, *about.seams, length], [own + act for act in range(len(about.seams) + 1)]
+        return [0, *about.seams, length], [own + action for action in range(len(about.seams) + 1)]
 
     def _caption(self, clip: int, rng: np.random.Generator) -> int:
         return int(self.captions.first[clip] + rng.integers(self.captions.count[clip]))
 
-    def _cut(self, whole: Stretch, rng: np.random.Generator) -> Stretch:
-        """Perhaps from the middle on, and no longer than the longest."""
+    def _cut(self, whole: TokenSpan, rng: np.random.Generator) -> TokenSpan:
+        """Crop some spans, and cut all to the longest length."""
         if rng.random() < CROPPED:
             last = whole.seam - BEFORE_SEAM if whole.seam else whole.frames - MIN_FRAMES
             if last > 0:

@@ -1,4 +1,4 @@
-"""MOGO as the registry knows it. Standard library only."""
+"""Registry entry of MOGO. Standard library only."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ The same prompt, seed, settings and bundle give the same motion.""",
         stages=(
             Stage("tokenizer", "Train the MoSA-VQ."),
             Stage("transformer", "Train the RQHC-Transformer."),
-            Stage("all", "Both stages one after another, --max-minutes for them together; called again, it goes on."),
+            Stage("all", "Both stages one after another, --max-minutes for them together; a second call continues."),
         ),
         config="marey.models.mogo.config:named_config",
         train="marey.models.mogo.train:train_stage",
         assemble="marey.models.mogo.assembly:assemble",
-        unpack="marey.models.mogo.assembly:take_apart",
+        unpack="marey.models.mogo.assembly:unpack",
     ),
     tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
     random_bundle="marey.models.mogo.bundle:random_bundle",

@@ -14,7 +14,7 @@ from marey.data.manifest import Clip
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums
 from marey.models.mogo.model import RQHCTransformer, next_targets
-from marey.models.mogo.samples import MIN_FRAMES, Sample, Samples
+from marey.models.mogo.samples import MIN_FRAMES, Samples, SequenceSample
 from marey.models.mogo.steers import Steers
 from marey.training.loop import StepContext
 from marey.training.motions import TokenData
@@ -23,7 +23,7 @@ from marey.training.sentences import SentenceData, text_statistics
 
 
 class TransformerStage:
-    """The stage; what it draws is `samples`."""
+    """Training stage of the transformer; `samples` draws its batches."""
 
     name = "transformer"
 
@@ -45,17 +45,17 @@ class TransformerStage:
         mean, std = text_statistics(captions.strings, spoken)
         self.module.prompt.mean.copy_(mean)
         self.module.prompt.std.copy_(std)
-        acts, frames = self.samples.acts_said(self.pairs.train)
-        self.module.pace.fit(self.module.prompt.standardised(captions.sentences(acts)), frames)
-        with torch.no_grad():  # the head starts at how often codes occur
+        actions, frames = self.samples.captioned_actions(self.pairs.train)
+        self.module.pace.fit(self.module.prompt.standardised(captions.sentences(actions)), frames)
+        with torch.no_grad():  # the head starts at the codes' frequencies
             self.module.head.bias[: self.module.codes] = tokens.log_shares(self.module.codes).logsumexp(0)
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """One group."""
+        """Return one group."""
         return [list(self.module.parameters())]
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """One batch in pieces."""
+        """Return the loss of one batch, computed in pieces."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
         pieces = list(self.samples.collate(self.samples.draw(clips, context.rng)).pieces())
         found = [self._losses(piece, self.config.depth.share) for piece in pieces]
@@ -66,11 +66,11 @@ class TransformerStage:
         return loss + self.config.ahead_weight * ahead, shown
 
     def after_step(self, context: StepContext) -> None:
-        """Nothing."""
+        """Do nothing: the stage has no state to update."""
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """Cross-entropy and accuracy of validation clips, per level; the same stretches of them every time."""
+        """Return cross-entropy and accuracy on validation clips, per level; the spans are the same at every call."""
         rng = np.random.default_rng(0)
         batches = self.pairs.validation_batches(self.optimisation.batch)
         stretches = ([self.samples.of_clip(int(clip), rng) for clip in clips] for clips in batches)
@@ -82,7 +82,7 @@ class TransformerStage:
         metrics |= {f"loss/{level}": float(mean) for level, mean in enumerate(sums.means)}
         return metrics | {f"accuracy/{level}": float(share) for level, share in enumerate(sums.right / sums.asked)}
 
-    def _losses(self, piece: Sample, share: float) -> tuple[LevelSums, Tensor]:
+    def _losses(self, piece: SequenceSample, share: float) -> tuple[LevelSums, Tensor]:
         states = self.module.states(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
         targets = next_targets(piece.tokens, piece.lengths, self.module.end, ends=piece.ends, skipped=piece.skipped)
         ahead = ahead_loss(self.module, states, targets, piece.seam, share)

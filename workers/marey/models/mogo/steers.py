@@ -1,8 +1,8 @@
-"""Motion whose prompt changes at any moment, for training (ours): a captured clip, or what the model makes itself
-(`marey.models.mogo.rollouts`), is left wherever it is, and another clip is entered at its beginning, with an
+"""Training motions whose prompt changes at any moment (ours): a captured clip, or the model's own motion
+(`marey.models.mogo.rollouts`), is cut at any frame and continued by the beginning of another clip, with an
 inertialized transition (`marey.data.splice`).
 
-Splices of the prepared folder leave an act when it is done, as sequences do. Who steers does not wait for that.
+Splices of the prepared folder change actions at their end, as sequences do. A user who steers does not wait for that.
 """
 
 from __future__ import annotations
@@ -27,38 +27,38 @@ from marey.training.motions import MotionData, fingerprint, made_once
 
 FILE = "steers.safetensors"
 LEAST_LEFT, MOST_LEFT, LEAST_ENTERED = 8, 110, 12
-"""Frames of the clip that is left, and of the one that is entered."""
+"""Frames of the clip before the cut, and of the clip after it."""
 WORST_SEAM = 1.0
-"""Squared metres (`seam_costs`): nobody's limbs fly through the room in half a second."""
+"""Squared metres (`seam_costs`): largest cost of a cut; limbs cannot move further in half a second."""
 TRIES = 20
 BATCH = 64
 
 
 @dataclass(frozen=True)
 class Steers:
-    """S steered motions, their tokens end to end."""
+    """S steered motions; their tokens are concatenated."""
 
     tokens: Tensor  # (N, V) int64
     starts: Tensor  # (S,) first token of each
     lengths: Tensor  # (S,) frames
-    seams: Tensor  # (S,) frames of the clip that is left
+    seams: Tensor  # (S,) frames of the clip before the cut
     left: Tensor  # (S,) that clip
-    entered: Tensor  # (S,) the other
-    ends: Tensor  # (S,) bool: the other is there to its end
+    entered: Tensor  # (S,) the clip after it
+    ends: Tensor  # (S,) bool: the second clip is complete
 
 
 @dataclass(frozen=True)
 class _Left:
-    """A motion that is left where it ends."""
+    """A motion up to the cut."""
 
     clip: int
     joints: NDArray[np.float64]  # (n, J, 3)
-    tokens: Tensor | None = None  # (n, V) where the model drew it; captured ones are encoded with what comes after them
+    tokens: Tensor | None = None  # (n, V) of the model's own motion; captured ones are encoded with their continuation
 
 
 @dataclass(frozen=True)
 class _Joined:
-    """It, and what is entered from there."""
+    """A motion with its continuation after the cut."""
 
     features: NDArray[np.float32]
     left: _Left
@@ -66,7 +66,7 @@ class _Joined:
     ends: bool
 
     def tokens(self, encoded: Tensor) -> Tensor:
-        """Those of all of it as encoded, but what was drawn stays as it was drawn."""
+        """Return the tokens of the whole motion as encoded, but the model's own tokens as drawn."""
         drawn = self.left.tokens
         return encoded if drawn is None else torch.cat([drawn, encoded[len(drawn) :]])
 
@@ -80,16 +80,17 @@ def load_steers(
     weights: Sequence[float],
     rollouts: Rollouts | None = None,
 ) -> Steers:
-    """The steered motions of a run: made once for a tokenizer, its data and these clips, then read from the folder.
+    """Return the steered motions of a run: made once per tokenizer, data and clips, then read from the folder.
 
     Args:
         run: the run folder.
-        config: says how many, and how long at most.
+        config: their number and greatest length.
         tokenizer: in evaluation mode.
-        data: what the clips are of.
-        clips: (C,) those that may be joined: single acts.
+        data: the data of the clips.
+        clips: (C,) clips that may be joined: single actions.
         weights: (C,) how often each is drawn.
-        rollouts: `config.rollouts` more leave what these draw; None = all leave captured motion.
+        rollouts: source of `config.rollouts` further motions that start from the model's own; None = all start from
+            captured motion.
     """
     drawn = "" if rollouts is None else f":{config.rollouts}:{rollouts.fingerprint}"
     key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}{drawn}"
@@ -119,20 +120,20 @@ def _encoded(tokenizer: Tokenizer, data: MotionData, made: Sequence[_Joined]) ->
 
 
 class _Making:
-    """Draws motions to leave and clips to enter, and joins them."""
+    """Sampler of motions to cut and clips to continue with, which joins them."""
 
     def __init__(
         self, config: MOGOConfig, prepared: PreparedData, clips: NDArray[np.int64], weights: NDArray[np.float64]
     ) -> None:
         layout = prepared.layout
         if not isinstance(layout, HeadingLayout):
-            raise InvalidInput(f"motions of layout {layout.name!r} cannot be joined", where="layout")
+            raise InvalidInput(f"layout {layout.name!r} does not support joining motions", where="layout")
         self._config, self._prepared, self._layout = config, prepared, layout
         self._clips, self._shares = clips, weights / weights.sum()
         self._rng = np.random.default_rng(0)
 
     def joined(self, rollouts: Rollouts | None) -> Iterator[_Joined]:
-        """Every motion that is left, with what is entered from there; without those that no clip goes on from."""
+        """Yield every cut motion with its continuation; motions that no clip continues are left out."""
         yield from filter(None, map(self._enter, self._captured()))
         if rollouts is not None:
             yield from filter(None, map(self._enter, self._drawn(rollouts)))

@@ -1,10 +1,10 @@
-"""Motion that is drawn frame by frame: cached keys and values, many sessions in one forward.
+"""Motion drawn frame by frame: cached keys and values, many sessions in one forward pass.
 
-`StreamState` holds everything a session is, as plain tensors; `Streams` moves all of them on by one frame a `step`. A
-session's cache has 1 + W slots for each layer and lane: slot 0 keeps position 0 (the prompt) for good, frame p stands
-in slot 1 + (p - 1) mod W, so that an endless motion needs no more memory and no copy. A lane is a level, twice where
-guidance wants a second branch. The attention always reads all slots: tokens depend neither on how long the sessions
-beside one are, nor on how many there are (`marey.nn.sampling.uniform`).
+`SessionState` holds the whole state of the sessions as plain tensors; each `StreamBatch.step` draws one frame of all of
+them. A session's cache has 1 + W slots for each layer and lane: slot 0 keeps position 0 (the prompt), frame p is in
+slot 1 + (p - 1) mod W, so an endless motion needs no more memory and no copy. A lane is a level, twice if guidance
+needs a second branch. Attention always reads all slots: tokens depend neither on the length nor on the number of the
+other sessions (`marey.nn.sampling.uniform`).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from marey.models.mogo.attention import RelativeAttention
 from marey.models.mogo.config import InferenceConfig
 from marey.models.mogo.next_frame import NextFrame
 from marey.models.mogo.packed_model import PackedModel
-from marey.models.mogo.plan import PLAN, Plan
+from marey.models.mogo.plan import PLAN, ActionPlan
 from marey.models.mogo.replay import Replayed
-from marey.models.mogo.state import NEVER, StreamState
+from marey.models.mogo.state import NEVER, SessionState
 from marey.streams.actions import ActionStart
 
 
-class Streams:
-    """Sessions that share the forward passes of one model; they join, leave and are steered between steps."""
+class StreamBatch:
+    """Sessions that share the forward passes of one model; they start, stop and are steered between steps."""
 
     def __init__(
         self,
@@ -34,11 +34,11 @@ class Streams:
         capacity: int,
         config: InferenceConfig | None = None,
     ) -> None:
-        """Make room for `capacity` sessions.
+        """Allocate `capacity` sessions.
 
         Args:
             packed: the model, shared with other streams.
-            capacity: sessions at most.
+            capacity: largest number of sessions.
             config: None = the model's own.
 
         Raises:
@@ -52,19 +52,19 @@ class Streams:
                 f"a window of {self.window} frames", hint=f"This model can look back 1 to {self.farthest} frames."
             )
         self.branches = 1 if self.config.guidance == self.config.upper_guidance == 1 else 2
-        self.state = StreamState.empty(packed, capacity, self.branches, self.window)
+        self.state = SessionState.empty(packed, capacity, self.branches, self.window)
         self.capacity = capacity
         self.sessions: list[int] = []  # the session in each row: the active rows come first
         self._next = NextFrame(packed, self.state, self.config)
         self._draw: Callable[[int], Tensor] = self._next
         if packed.device.type == "cuda":
             self._draw = Replayed(self._next, capacity, packed.device)
-        self._plans: dict[int, Plan] = {}
-        self._made: dict[int, int] = {}  # frames of each session: the host never asks the device for what it knows
+        self._plans: dict[int, ActionPlan] = {}
+        self._made: dict[int, int] = {}  # frames of each session, kept on the host to avoid reading the device
         self._started = 0
 
     def prepare(self) -> None:
-        """Do now what the first frames would wait for, where there is anything."""
+        """Do one-time work now that would delay the first frames."""
         if isinstance(self._draw, Replayed):
             self._draw.prepare()
 
@@ -79,58 +79,58 @@ class Streams:
         skipped: int = 0,
         began: ActionStart | None = None,
     ) -> int:
-        """A new session; its first frame comes with the next step.
+        """Start a session; its first frame comes with the next step.
 
         Args:
-            sentence: (W,) sentence features, or (A, W) of acts in order: where END is drawn the next one is steered to.
+            sentence: (W,) sentence features, or (A, W) of actions in order: where END is drawn the next one starts.
             seed: of its random numbers.
-            ends_from: END of the last act may be drawn after so many frames (no length was asked for).
-            lasts: frames (A,) that each act usually takes: where another comes it is over then although END was not
-                drawn, and END may be drawn near it only. None = an act goes on until END is drawn.
-            past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
-                What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
-            skipped: frames that were made before `past`.
-            began: the act that plays behind `past`, and the frame of the session at which it began; None = the first
-                act begins behind them.
+            ends_from: frames after which END of the last action may be drawn (no length was requested).
+            lasts: usual frames (A,) of each action: if another follows, it is over then even without END, and END is
+                allowed only near it. None = an action continues until END is drawn.
+            past: (m, V) columns drawn before, to continue from: the last window is read in one pass. The continuation
+                is continuous with them, but not bit for bit the lost session's.
+            skipped: number of frames before `past`.
+            began: the current action at the end of `past`, with the frame at which it began; None = the first action
+                begins there.
 
         Returns:
-            the session's name in all other methods.
+            the session's id in all other methods.
 
         Raises:
-            InvalidInput: no room, `skipped` without `past`, or an act that is none of these or still to come.
+            InvalidInput: no free row, `skipped` without `past`, or an unknown or future action.
         """
         if skipped and (past is None or len(past) == 0):
-            raise InvalidInput("a session goes on behind frames that are not given")
+            raise InvalidInput("`skipped` needs `past`: the frames to continue from are missing")
         before = 0 if past is None else len(past)
-        acts = len(torch.atleast_2d(sentence))
-        if began is not None and not (0 <= began.act < acts and 0 <= began.frame <= skipped + before):
-            raise InvalidInput(f"{began} is no place among {acts} acts and {skipped + before} frames", where="began")
+        actions = len(torch.atleast_2d(sentence))
+        if began is not None and not (0 <= began.action < actions and 0 <= began.frame <= skipped + before):
+            raise InvalidInput(f"{began} is not among {actions} actions and {skipped + before} frames", where="began")
         row = self._take_row()
         past = self.state.last.new_zeros(0, self.model.levels) if past is None else past[-self.window :]
         mine = self.state.row(row)
-        mine["memory"].zero_()  # a number that is none would go on through slots that are hidden
+        mine["memory"].zero_()  # a NaN would spread through hidden slots
         mine["seeds"].fill_(seed)
         mine["skipped"].fill_(skipped + before - len(past))
         mine["made"].fill_(skipped + before)
         mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
         session = self.sessions[row]
-        plan = self._plans[session] = Plan.of(sentence, ends_from, lasts)
+        plan = self._plans[session] = ActionPlan.of(sentence, ends_from, lasts)
         self._made[session] = skipped + before
         self._begin(row, plan, past, began)
         return session
 
     def steer(self, session: int, sentence: Tensor, lasts: Sequence[int] | None = None) -> None:
-        """Another prompt, (W,) or (A, W) with `lasts` as in `start`, from the next frame on: position 0 alone is
-        computed anew, on each level; what the frames so far were told stays."""
-        plan = self._plans[session] = Plan.of(sentence, NEVER, lasts)
+        """Replace the prompt from the next frame on: (W,) or (A, W), with `lasts` as in `start`. Position 0 alone is
+        computed anew, on each level; the inputs of earlier frames stay."""
+        plan = self._plans[session] = ActionPlan.of(sentence, NEVER, lasts)
         self._begin(self._row(session), plan)
 
-    def act(self, session: int) -> int:
-        """Number of the act that plays, among those of the prompt in force."""
+    def action(self, session: int) -> int:
+        """Return the number of the current action among those of the current prompt."""
         return self._plans[session].number
 
     def stop(self, session: int) -> None:
-        """Forget a session; its row goes to the last one."""
+        """Remove a session; the last session moves to its row."""
         row, last = self._row(session), len(self.sessions) - 1
         if row != last:
             source = self.state.row(last)
@@ -141,7 +141,7 @@ class Streams:
         del self._plans[session], self._made[session]
 
     def step(self, only: int | None = None) -> dict[int, Tensor]:
-        """Draw one frame of every session, or of one alone: its column (V,) of tokens, -1 where it has ended."""
+        """Draw one frame of every session, or of session `only`: its column (V,) of tokens, -1 where it has ended."""
         if only is not None:
             self._exchange(self._row(only), 0)
         rows = len(self.sessions) if only is None else 1
@@ -152,18 +152,18 @@ class Streams:
                 self._begin(row, plan)
         column = self._draw(rows)
         while due := self._due(column):
-            for row, plan in due:  # the first frame of the next act comes in place of END; others draw what they drew
+            for row, plan in due:  # the first frame of the next action replaces END; others keep their columns
                 self._begin(row, plan)
             column = self._draw(rows)
         self.accept(column)
         return dict(zip(self.sessions[:rows], column.unbind(), strict=True))
 
     def states(self) -> Tensor:
-        """Trunk states (s, L, w) of the active rows, from which their next frame is drawn."""
+        """Return the trunk's states (s, L, w) of the active rows, from which their next frame is drawn."""
         return self._next.states(len(self.sessions))
 
     def accept(self, columns: Tensor) -> None:
-        """Take columns (s, V) as the next frame of the first s rows, drawn or known."""
+        """Take columns (s, V), drawn or known, as the next frame of the first s rows."""
         rows = len(columns)
         self.state.last[:rows] = columns
         self.state.made[:rows] += 1
@@ -171,16 +171,16 @@ class Streams:
             self._made[session] += 1
 
     def save(self, session: int) -> dict[str, Tensor]:
-        """All of a session as plain tensors in the host's memory: a device has less. `resume` goes on with the very
-        tokens that it would have drawn."""
+        """Return all state of a session as plain tensors in host memory; `resume` continues with exactly the tokens
+        that it would have drawn."""
         tensors = {name: part.to("cpu", copy=True) for name, part in self.state.row(self._row(session)).items()}
         return {**tensors, **self._plans[session].save()}
 
     def resume(self, saved: Mapping[str, Tensor]) -> int:
-        """A session from what `save` gave.
+        """Start a session from the result of `save`.
 
         Raises:
-            InvalidInput: no room, or a session of another model, window or guidance.
+            InvalidInput: no free row, or a session of another model, window or guidance.
         """
         row = self._take_row()
         mine = self.state.row(row)
@@ -191,45 +191,46 @@ class Streams:
         for name, part in mine.items():
             part.copy_(saved[name])
         session = self.sessions[row]
-        self._plans[session], self._made[session] = Plan.load(saved), int(saved["made"])
+        self._plans[session], self._made[session] = ActionPlan.load(saved), int(saved["made"])
         return session
 
-    def _unfinished(self, rows: int) -> list[tuple[int, Plan]]:
-        """Those of the first rows that have acts to come."""
+    def _unfinished(self, rows: int) -> list[tuple[int, ActionPlan]]:
+        """Return those of the first rows that have actions left."""
         plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions[:rows]))
-        return [(row, plan) for row, plan in plans if len(plan.acts)]
+        return [(row, plan) for row, plan in plans if len(plan.actions)]
 
-    def _due(self, columns: Tensor) -> list[tuple[int, Plan]]:
-        """Rows that have acts to come and have just drawn END."""
+    def _due(self, columns: Tensor) -> list[tuple[int, ActionPlan]]:
+        """Return the rows that have actions left and have just drawn END."""
         unfinished = self._unfinished(len(columns))
         ended = (columns[:, 0] < 0).tolist() if unfinished else []
         return [(row, plan) for row, plan in unfinished if ended[row]]
 
-    def _begin(self, row: int, plan: Plan, past: Tensor | None = None, began: ActionStart | None = None) -> None:
-        """Tell a row the next act of its plan, or the one that plays already."""
+    def _begin(self, row: int, plan: ActionPlan, past: Tensor | None = None, began: ActionStart | None = None) -> None:
+        """Start the next action of a row's plan, or the current one."""
         began = began or ActionStart(self._made[self.sessions[row]], 0)
-        act = plan.take(began.frame, began.act)
+        action = plan.take(began.frame, began.action)
         mine = self.state.row(row)
         mine["began"].fill_(began.frame)
         mine["stops"].fill_(plan.stops)
-        self._read(row, act, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
-        shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.acts) else 0
-        ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
+        self._read(row, action, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
+        shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.actions) else 0
+        ends_from = max(shortest, plan.earliest, 0 if len(plan.actions) else plan.ends_from)
         mine["ends_from"].fill_(ends_from)
         mine["ended"].fill_(False)
 
     @torch.no_grad()
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:
-        """Write position 0, and behind it frames `past` (n, V), into a row's memory; one pass for all of it."""
+        """Write position 0 and after it frames `past` (n, V) to a row's cache; one pass for all of it."""
         null = torch.arange(self.branches, device=past.device) > 0
-        prompt, told = self.model.prompt(sentence.expand(self.branches, -1), null)  # (branches, V, w), (branches, w)
+        prompts = sentence.expand(self.branches, -1)
+        prompt, prompt_term = self.model.prompt(prompts, null)  # (branches, V, w), (branches, w)
         skipped = self.state.skipped[row]
         position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1
-        frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + told[:, None, None]
+        frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + prompt_term[:, None, None]
         if self.packed.times is not None:
             frames[0] += self._next.time(1 + position, self.state.began[row], self.state.stops[row])
         x = torch.cat([prompt[:, :, None], frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
-        self.state.told[row] = told.repeat_interleave(self.model.lanes, 0)
+        self.state.prompt_term[row] = prompt_term.repeat_interleave(self.model.lanes, 0)
         reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
         slots = torch.cat([position.new_zeros(1), 1 + position % self.window])
         for layer, block in enumerate(self.packed.blocks):
@@ -251,7 +252,7 @@ class Streams:
         return len(self.sessions) - 1
 
     def _exchange(self, row: int, other: int) -> None:
-        """Let two sessions change rows."""
+        """Swap the rows of two sessions."""
         if row != other:
             second = self.state.row(other)
             for name, first in self.state.row(row).items():
@@ -262,5 +263,5 @@ class Streams:
 
     def _row(self, session: int) -> int:
         if session not in self.sessions:
-            raise InvalidInput(f"there is no session {session}", hint="It was stopped, or never started.")
+            raise InvalidInput(f"unknown session {session}", hint="It was stopped, or never started.")
         return self.sessions.index(session)

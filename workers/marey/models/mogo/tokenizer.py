@@ -25,18 +25,18 @@ from marey.nn.stored_names import keep_stored_names
 
 @dataclass(frozen=True)
 class DecoderState:
-    """What the decoder's convolutions remember of frames already decoded; rows are sessions."""
+    """State of the decoder's convolutions: frames already decoded; rows are sessions."""
 
     pasts: tuple[Tensor, ...]  # one a convolution that reaches back: (B, C, frames it reaches back)
 
     def select(self, rows: Tensor) -> DecoderState:
-        """The sessions at `rows` (indices or bool)."""
+        """Return the sessions at `rows` (indices or bool)."""
         rows = rows.to(self.pasts[0].device)
         return DecoderState(tuple(past[rows] for past in self.pasts))
 
     @classmethod
     def join(cls, states: Sequence[Self]) -> DecoderState:
-        """Several states as one batch, in their order."""
+        """Concatenate several states as one batch, in their order."""
         return DecoderState(tuple(torch.cat(pasts) for pasts in zip(*(s.pasts for s in states), strict=True)))
 
 
@@ -48,14 +48,14 @@ class CausalConv(nn.Conv1d):
         self.reach = (kernel - 1) * dilation
 
     def advance(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, C, T) behind `past` (B, C, reach) to (B, C', T) and the new past."""
+        """Advance by frames (B, C, T) behind `past` (B, C, reach): returns (B, C', T) and the new past."""
         one = x.shape[-1] == 1
         x = torch.cat([past, x], -1)
         return (self._last(x) if one and not self.training else self(x)), x[..., x.shape[-1] - self.reach :]
 
     def _last(self, x: Tensor) -> Tensor:
-        """The one frame (B, C', 1) that (B, C, reach + 1) gives: on a CPU products of a vector each, so that streams do
-        not change each other's bits, in a tenth of the time of a convolution."""
+        """Return the one frame (B, C', 1) that (B, C, reach + 1) gives: on a CPU one vector product per session, so
+        that streams do not change each other's bits, in a tenth of a convolution's time."""
         seen, weight = x[..., :: self.dilation[0]].flatten(1), self.weight.flatten(1)  # (B, C · kernel)
         if x.device.type != "cpu":
             return F.linear(seen, weight, self.bias)[..., None]
@@ -111,7 +111,7 @@ class Decoder(nn.Module):
         keep_stored_names(self)
 
     def start(self, batch: int) -> DecoderState:
-        """Before the first frame: zeros, as if motionless latents of zero had come before."""
+        """Return the state before the first frame: zeros, as after motionless latents of zero."""
         convolutions = [part for part in self.modules() if isinstance(part, CausalConv) and part.reach]
         return DecoderState(tuple(c.weight.new_zeros(batch, c.in_channels, c.reach) for c in convolutions))
 
@@ -129,7 +129,7 @@ class Decoder(nn.Module):
 
 
 class Tokenizer(MotionTokenizer):
-    """Features in their own units to tokens and back; normalisation is inside."""
+    """Tokenizer of features in their own units; normalisation is inside."""
 
     def __init__(self, config: MOGOConfig) -> None:
         super().__init__(config.features, frames_per_token=1)
@@ -173,7 +173,7 @@ class Tokenizer(MotionTokenizer):
 
     @torch.no_grad()
     def decode_next(self, tokens: Tensor, state: DecoderState) -> tuple[Tensor, DecoderState]:
-        """Features (B, T, D) of the next T columns (B, T, V) of streams, and the state to go on from.
+        """Return features (B, T, D) of the next T columns (B, T, V) of streams, and the state to continue from.
 
         The same columns in the same chunks give the same bits; other chunks agree to rounding.
         """

@@ -1,4 +1,4 @@
-"""Training MOGO: the MoSA-VQ tokenizer, then the RQHC-Transformer on its tokens."""
+"""Training of MOGO: the MoSA-VQ tokenizer, then the RQHC-Transformer on its tokens."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from marey.training.tokenizing import TokenizerStage
 
 
 def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
-    """Train one stage and write its part; returns its metrics. `all` is both.
+    """Train one stage, or with `all` both, and write its part; return its metrics.
 
     Raises:
         NotFound: the tokenizer has not finished, or captions have no text features.
-        InvalidInput: no such stage, or parts of another configuration.
+        InvalidInput: unknown stage, or parts of another configuration.
     """
     if name == "all":
         return train_all(RECIPE, train_stage, options)
@@ -59,9 +59,9 @@ def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
 def transformer_stage(
     options: TrainOptions[MOGOConfig], network: type[RQHCTransformer] = RQHCTransformer
 ) -> tuple[TransformerStage, str]:
-    """The transformer's stage on the tokens of the run, made where they are missing, and the hash of the data.
+    """Return the transformer's stage on the tokens of the run, encoded if missing, and the hash of the data.
 
-    Features are read for that alone: their memory is free again behind it.
+    Features are read for the tokens alone, and their memory is released afterwards.
     """
     data = _data(options)
     device = data.features.device
@@ -84,7 +84,8 @@ def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
 def _steers(
     options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs, captions: SentenceData
 ) -> Steers | None:
-    """Steered motions between training clips of one act each; some leave what the finished model draws, if any has."""
+    """Return steered motions between training clips of one action each; some start from the finished model's motion, if
+    there is one."""
     if not options.config.steers:
         return None
     single = np.array([not data.prepared.clips[int(clip)].seams for clip in pairs.train])

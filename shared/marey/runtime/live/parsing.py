@@ -17,7 +17,7 @@ from marey.text.features import TextFeatures
 log = logger(__name__)
 
 
-class Reading:
+class PromptParsing:
     """Features of some prompts, computed on a daemon thread.
 
     Args:
@@ -59,18 +59,18 @@ class Reading:
 
 
 @dataclass(eq=False)
-class Opening:
+class StartingStream:
     """A taken stream whose prompts are being parsed; its lease is renewed like any other.
 
     Attributes:
-        reading: parsing of the first prompt, and of the one in force if that is another.
+        parsing: parsing of the first prompt, and of the one in force if that is another.
         lost: True if another worker has it.
     """
 
     past: StreamPast
     frames: FrameStream
     lease: Lease
-    reading: Reading
+    parsing: PromptParsing
     lost: bool = False
 
     @property
