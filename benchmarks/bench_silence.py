@@ -34,6 +34,7 @@ import sqlalchemy as sa
 
 from benchmarks.platform import Platform
 from marey.cli.watching import watch_job
+from marey.client import Client
 from marey.core.errors import Unreachable
 from marey.db import transaction
 from marey.embedded import postgres_url, socket_folder
@@ -207,7 +208,7 @@ class _Fault:
             return conn.execute(query, {"job": self._long}).scalar_one()
 
     def _watch(self, job: UUID) -> float:
-        with self._platform.client() as client:
+        with self._platform.client() as transport, Client(transport.server) as client:
             watch_job(client, str(job), quiet=True)
         return max(0.0, time.monotonic() - self._zero)  # 0: it returned during the fault, which did not concern it
 

@@ -11,6 +11,7 @@ import httpx2
 import pytest
 
 from marey.cli.watching import watch_job
+from marey.client import Client
 from marey.client.transport import Transport
 from marey.core.errors import Busy
 from marey.embedded import EmbeddedServer
@@ -84,7 +85,9 @@ def test_a_key_that_follows_all_it_may_is_told_to_come_back_and_others_are_let_i
         watching = threading.Timer(0.5, lambda: client.post(f"/v1/jobs/{job}/cancel"))
         with client.stream(path, SSE), client.stream(path, SSE):
             watching.start()
-            assert watch_job(client, job, quiet=True)["state"] == "cancelled", "it looks instead of following"
+            assert watch_job(Client(client.server), job, quiet=True).state == "cancelled", (
+                "it looks instead of following"
+            )
 
 
 def _opens(client: Transport, path: str) -> bool:

@@ -109,7 +109,7 @@ def test_a_name_in_use_is_asked_about_at_a_terminal_and_refused_elsewhere(
     (second,) = admin.json("keys", "create", "ci", "--allow-duplicate")
     with monkeypatch.context() as terminal:
         terminal.setattr(_NamedTextIOWrapper, "isatty", lambda _: True)
-        admin("keys", "create", "ci", stdin="n\n").refused(130, "Make another one?", "nothing was done")
+        admin("keys", "create", "ci", stdin="n\n").refused(130, "Create another one?", "nothing was done")
         admin("keys", "create", "ci", stdin="y\n").ok()
     assert len(admin.json("keys", "list", "--tenant", "default")) == 3
     for each in admin.json("keys", "list", "--tenant", "default"):

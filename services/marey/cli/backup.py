@@ -29,7 +29,7 @@ from marey.tenants import get_tenant
 
 MANIFEST = "manifest.json"
 MOST_BYTES = 2**31
-"""Of a job's records: 100,000 items take about 0.5 GiB."""
+"""Bytes of a job's records: 100,000 items take about 0.5 GiB."""
 TRIES = 3
 
 
@@ -43,7 +43,7 @@ class Entry(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What a backup says of itself."""
+    """The manifest of a backup."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -60,12 +60,12 @@ class Manifest(BaseModel):
 def export_tenant(
     engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
 ) -> tuple[Manifest, int]:
-    """Back up every job of a tenant that has ended; the manifest, and how many jobs are left out for they have not.
+    """Back up the ended jobs of a tenant; return the manifest, and the number of jobs that have not ended.
 
     Raises:
-        InvalidInput: the folder holds something, or cannot be written.
+        InvalidInput: the folder is not empty, or cannot be written.
         Conflict: a job changed meanwhile.
-        NotFound: no such tenant; or the store lacks a file: data loss, told and not passed over.
+        NotFound: no such tenant; or the store lacks a file, which is a loss of data.
     """
     with transaction(engine, BACKUP) as conn:
         get_tenant(conn, tenant)
@@ -96,13 +96,13 @@ def export_tenant(
 def import_tenant(
     engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
 ) -> tuple[Manifest, int]:
-    """Check a backup wholly, then write what is not there yet; its manifest, and how many jobs were written.
+    """Verify a whole backup, then restore the jobs that do not exist; return its manifest, and the number of jobs.
 
-    Each job is one transaction: broken off, it is run again and goes on.
+    Each job is one transaction: an import that broke off continues when it is run again.
 
     Raises:
         NotFound: there is no backup, or no such tenant.
-        InvalidFile: anything is missing, has another hash, or is none of ours; nothing was written then.
+        InvalidFile: a file is missing, has another hash or is foreign; nothing was written then.
         Conflict: another tenant has a job of it.
     """
     with transaction(engine, BACKUP) as conn:
@@ -119,7 +119,7 @@ def import_tenant(
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The manifest of a backup; raises as `import_tenant`."""
+    """Read the manifest of a backup; raises as `import_tenant`."""
     path = folder / MANIFEST
     try:
         return Manifest.model_validate_json(_plain(path).read_bytes())
@@ -132,7 +132,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def read_job(folder: Path, job: UUID, entry: Entry) -> JobBackup:
-    """The records of a job, checked; raises as `import_tenant`."""
+    """Read and check the records of a job; raises as `import_tenant`."""
     path = folder / "jobs" / f"{job}.jsonl"
     try:
         size = _plain(path).stat().st_size
@@ -147,7 +147,7 @@ def read_job(folder: Path, job: UUID, entry: Entry) -> JobBackup:
             ((kind, value),) = json.loads(line).items()
             parts[kind].append(value)
         except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
-            raise InvalidFile("is no record of a backup", where=f"{path}: line {number}") from None
+            raise InvalidFile("is not a record of a backup", where=f"{path}: line {number}") from None
     try:
         (own,) = parts["job"]
         backup = JobBackup.model_validate({"job": own, "items": parts["item"], "events": parts["event"]})
@@ -221,10 +221,10 @@ def _content(folder: Path, sha256: str) -> Path:
 
 
 def _plain(path: Path) -> Path:
-    """A file, and no way out of the backup.
+    """Return a path if it is a regular file inside the backup.
 
     Raises:
-        FileNotFoundError: there is none.
+        FileNotFoundError: there is no such file.
         InvalidFile: a link, a folder, a device.
     """
     for part in (path, path.parent):

@@ -1,4 +1,4 @@
-"""What `marey doctor` looks at. Each check stands alone: what is broken in one hides no other."""
+"""Checks of `marey doctor`. They are independent: a failure of one hides no other."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
 
 
 def check_all() -> Iterator[Check]:
-    """Every check, in the order in which one would mend them."""
+    """Run every check, in the order in which problems are best solved."""
     old = sys.version_info < (3, 11)
     yield Check("python", "bad" if old else "ok", platform.python_version(), "Install Python 3.11." if old else None)
     yield _extra("motion", "numpy", "convert, render")
@@ -68,7 +68,7 @@ def _home() -> Check:
     from marey.client.place import home
 
     folder = home()
-    with contextlib.suppress(OSError):  # what hinders is told by the check
+    with contextlib.suppress(OSError):  # the check reports the reason
         folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
     try:
         check_folder(folder, hint="Make it writable for this user, or set MAREY_HOME to another folder.")
@@ -81,8 +81,9 @@ def _home() -> Check:
 
 
 def _server() -> Check:
+    from marey.client import Client
+    from marey.client.foreign import NoAnswer
     from marey.client.place import find_server
-    from marey.client.transport import Transport
     from marey.core.errors import Unreachable
 
     try:
@@ -92,35 +93,35 @@ def _server() -> Check:
     except MareyError as error:
         return broken("server", error)
     try:
-        with Transport(server, timeout=ANSWER_SECONDS, attempts=2) as client:
-            client.get("/v1/jobs", limit=1)
+        with Client(server, timeout=ANSWER_SECONDS, attempts=2) as client:
+            next(client.jobs.list(limit=1), None)
     except MareyError as error:
-        return (_stalled(server, error) if isinstance(error, Unreachable) else None) or broken("server", error)
+        return (_stalled(server) if isinstance(error, NoAnswer) else None) or broken("server", error)
     return Check("server", "ok", server.url)
 
 
-def _stalled(server: Server, error: MareyError) -> Check | None:
-    """Say what hangs of a server that takes connections and does not answer; None where it is another error."""
-    import httpx2
+def _stalled(server: Server) -> Check | None:
+    """Name the part that stalls of a server that accepts connections and does not answer; None for another error."""
+    from marey.client.foreign import NoAnswer
+    from marey.client.health import OK, health_status
+    from marey.core.errors import Unreachable
 
-    if not isinstance(error.__cause__, httpx2.ReadTimeout):
-        return None
     hint = "See its log, then restart it; `marey serve` and other supervisors restart what exits, not what hangs."
     try:
-        answer = httpx2.get(f"{server.url}/livez", timeout=httpx2.Timeout(LIVE_SECONDS))
-    except httpx2.ReadTimeout:
+        status = health_status(f"{server.url}/livez", timeout=LIVE_SECONDS)
+    except NoAnswer:
         message = f"{server.url} accepts connections, but answers nothing within {LIVE_SECONDS:g} s: it stalls"
         return Check("server", "bad", message, hint)
-    except httpx2.HTTPError:
+    except Unreachable:
         return None
-    if answer.status_code != httpx2.codes.OK:
+    if status != OK:
         return None
     message = f"{server.url} answers /livez, but not /v1/jobs within {ANSWER_SECONDS:g} s: it stalls, or its database"
     return Check("server", "bad", message, f"See the checks of the database on the server's machine. {hint}")
 
 
 def models(config: Settings) -> Iterator[Check]:
-    """Every bundle that is here: whole, and with what reads its prompts."""
+    """Check every bundle of this machine: its files, and the encoder and labeller of its prompts."""
     from marey.bundles import find_bundle, scan_bundles
     from marey.bundles.limits import seconds_of
     from marey.bundles.places import STARTER
@@ -145,7 +146,7 @@ def models(config: Settings) -> Iterator[Check]:
 
 
 def _reads(bundle: Bundle, config: Settings) -> Check:
-    """Whether what reads prompts for a bundle is here, and what it was trained with."""
+    """Check that the encoder and labeller that a bundle was trained with are installed."""
     from marey.bundles import find_bundle
     from marey.text.encoders import find_weights, weights_sha256
     from marey.text.keys import NO_LABELLER, labeller_bundle
@@ -168,7 +169,7 @@ def _reads(bundle: Bundle, config: Settings) -> Check:
 
 
 def device(config: Settings) -> Iterator[Check]:
-    """What computes."""
+    """Check the processor and the GPU."""
     import torch
 
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -1,4 +1,4 @@
-"""What a server stands on: database, queue, store, workers; for `marey doctor` on a machine that reaches them."""
+"""Checks of the database, queue, store and workers of a server, for `marey doctor` on a machine that reaches them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UNSWEPT = 30.0
 
 
 def check_backing() -> Iterator[Check]:
-    """Each thing by itself; nothing but the port where no server is named and none runs here."""
+    """Run each check by itself; only that of the port if no server is named and none runs here."""
     from marey.core.settings import settings
 
     config = settings_here()
@@ -69,7 +69,7 @@ def _port(config: Settings) -> Check:
 
 
 def database(engine: sa.Engine) -> Check:
-    """It answers, and its tables are those this version needs."""
+    """Check that the database answers and has the tables of this version."""
     from marey.db import check_revision, transaction
     from marey.jobs import server_version
 
@@ -94,7 +94,7 @@ def _clock(engine: sa.Engine) -> Check:
 
 
 def clock_check(there: datetime, before: datetime, after: datetime) -> Check:
-    """How far the database's clock is from this machine's, which was read before and after it."""
+    """Compare the database's clock with this machine's, which was read before and after it."""
     skew = max(before - there, there - after, timedelta()).total_seconds()
     state = "bad" if skew > SKEW_BAD else "warn" if skew > SKEW_WARN else "ok"
     hint = None if state == "ok" else "Let both machines take the time from one source (NTP)."
@@ -102,7 +102,7 @@ def clock_check(there: datetime, before: datetime, after: datetime) -> Check:
 
 
 def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
-    """That what waits is served, and none fell silent.
+    """Check that every queue with waiting items has a worker, and that every worker reports.
 
     Args:
         logs: of the `marey serve` that runs here and starts workers itself; None = there is none.
@@ -130,7 +130,7 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
 
 
 def scheduler(engine: sa.Engine) -> Check:
-    """One works: it said so a moment ago, and leases that ran out are taken back."""
+    """Check that a scheduler has reported lately and takes back expired leases."""
     from marey.db import transaction
     from marey.jobs import list_schedulers, overdue_leases
 
@@ -172,7 +172,7 @@ def _queues(config: Settings) -> Iterator[Check]:
 
 
 def queue(name: str, url: str) -> Check:
-    """A Redis that answers and throws nothing away."""
+    """Check that Redis answers and evicts no keys."""
     import redis
 
     from marey.runtime.queue import check_queue, redis_client
@@ -196,7 +196,7 @@ def queue(name: str, url: str) -> Check:
 
 
 def _memory_policy(client: object) -> str | None:
-    """None where the server does not say: hosted ones often refuse CONFIG."""
+    """Return the eviction policy; None if the server refuses CONFIG, as hosted ones often do."""
     import redis
 
     try:
@@ -206,7 +206,7 @@ def _memory_policy(client: object) -> str | None:
 
 
 def store(config: Settings) -> Iterator[Check]:
-    """It takes, gives and deletes."""
+    """Check that the store writes, reads and deletes."""
     from marey.storage import FolderStore, open_store
 
     try:

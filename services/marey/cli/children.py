@@ -25,7 +25,7 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 """Seconds before a child that ended is started again; doubled each time it ends within a minute."""
 STEADY = 60.0
 TAIL = 2**16
-"""Bytes of a log that are searched for why its process ended."""
+"""Bytes of a log that are searched for the reason why its process ended."""
 LONGEST_LINE = 500
 ERROR_LINE = re.compile(r'^marey: |\[(error|critical) *\]|"level": "(error|critical)"|^\w+(\.\w+)*(Error|Exception)\b')
 """A command's own words, a log line as text or as JSON, the end of a traceback."""
@@ -35,11 +35,11 @@ STOP_SECONDS = 35.0
 
 @dataclass
 class Child:
-    """A process of ours, started again when it ends.
+    """A child process, started again when it ends.
 
     Attributes:
-        log: where its output goes; None = where ours does.
-        log_from: where in the log this process begins.
+        log: the file of its output; None = the output of the parent.
+        log_from: position in the log where this process begins.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Child:
         self.pause = min(self.pause * 2, LONGEST_PAUSE)
 
     def _last_error(self) -> str | None:
-        """The last line of its log that tells of an error; None = there is none since it was started."""
+        """Return the last line of its log that reports an error; None if there is none since it was started."""
         if self.log is None:
             return None
         try:
@@ -83,7 +83,7 @@ class Child:
         return next((line[:LONGEST_LINE] for line in reversed(lines) if ERROR_LINE.search(line)), None)
 
     def start(self, now: float) -> None:
-        """Start it. It gets SIGTERM when we die, however we die."""
+        """Start it. It gets SIGTERM when the parent ends, in any way."""
         if self.log is not None:
             self.log_from = self.log.stat().st_size if self.log.exists() else 0
         with contextlib.nullcontext() if self.log is None else open_private(self.log, "ab") as output:
@@ -114,12 +114,12 @@ class Child:
 
 
 def marey(*arguments: str) -> list[str]:
-    """The command line of one of our own commands."""
+    """Return the command line of a command of `marey`."""
     return [sys.executable, "-m", "marey.cli", *arguments]
 
 
 def metrics_port(config: Settings, place: int) -> dict[str, str]:
-    """What a child's environment says of its metrics: two processes cannot have one port, so they count up."""
+    """Return the environment variable of a child's metrics port; ports count up, one for each child."""
     return {} if config.metrics_port is None else {"MAREY_METRICS_PORT": str(config.metrics_port + place)}
 
 
@@ -140,7 +140,7 @@ def keep_all(children: Sequence[Child]) -> None:
 
 
 def stop_all(children: Sequence[Child]) -> None:
-    """Ask all to end, and wait until they have."""
+    """Ask all children to end, and wait until they have."""
     for child in children:
         child.terminate()
     for child in children:

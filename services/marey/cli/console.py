@@ -1,4 +1,4 @@
-"""Where output goes: results on stdout, words for people on stderr, `--json` as one JSON object a line."""
+"""Output: results on stdout, messages on stderr, and with `--json` one JSON object a line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 INTERRUPTED = 130
-"""The exit code of a command that a person ended."""
+"""The exit code of a command that the user interrupted."""
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on stdout.")]
 Limit = Annotated[
     int | None, typer.Option("--limit", min=1, help="Show at most this many; none given = all.", show_default=False)
@@ -38,16 +38,16 @@ _WHOLE_ID = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 TIME_COLUMNS = frozenset({"created", "next", "due", "at", "last used", "expires", "revoked", "started", "finished"})
 SHORT = 8
 PAGE = 1000
-"""Elements of one request of a listing, and rows of one drawn table: a long one is not held in memory."""
+"""Elements of one request of a listing, and rows of one drawn table, so that long ones are not held in memory."""
 
 
 def stderr() -> Console:
-    """The console of words for people."""
+    """Return the console of messages."""
     return drawing(sys.stderr, soft_wrap=True)
 
 
 def drawing(stream: TextIO, **options: Any) -> Console:
-    """A console that draws on a stream: its own colours and cursor movements pass, those in the text are escaped."""
+    """Return a console that draws on a stream; control characters in the text are escaped."""
     from rich.console import Console
     from rich.segment import Segment
 
@@ -60,14 +60,14 @@ def drawing(stream: TextIO, **options: Any) -> Console:
 
 
 def escape_output() -> None:
-    """From here on nothing that is written to stdout or stderr holds control characters, whatever writes it: usage
+    """Escape control characters in everything that is written to stdout and stderr from now on, by any module: usage
     errors that quote an argument, warnings, tracebacks."""
     sys.stdout, sys.stderr = escaping(sys.stdout), escaping(sys.stderr)
 
 
 @contextmanager
 def escaped_output() -> Generator[None]:
-    """`escape_output` until the end of the block."""
+    """Do as `escape_output` until the end of the block."""
     before = sys.stdout, sys.stderr
     escape_output()
     try:
@@ -77,36 +77,36 @@ def escaped_output() -> Generator[None]:
 
 
 def say(text: str) -> None:
-    """A line for people, on stderr."""
+    """Print a message on stderr."""
     print(escape(text), file=sys.stderr, flush=True)  # noqa: T201
 
 
 def result(text: str) -> None:
-    """A result, on stdout."""
+    """Print a result on stdout."""
     print(escape(text), flush=True)  # noqa: T201
 
 
 def result_json(value: Any) -> None:
-    """A result as one line of JSON, on stdout; characters that a terminal would obey are `\\u` escapes."""
+    """Print a result as one line of JSON on stdout; control characters are `\\u` escapes."""
     utf8 = (getattr(sys.stdout, "encoding", None) or "").lower().replace("-", "") == "utf8"
     result(escape_json(json.dumps(value, ensure_ascii=not utf8, separators=(", ", ": "))))
 
 
 def short_id(identifier: str) -> str:
-    """The last digits of an id: they are random, where the first are those of the whole batch."""
+    """Return the last digits of an id, which are random; the first are a time."""
     return identifier.replace("-", "")[-SHORT:]
 
 
 def moment(time: str) -> str:
-    """`2026-11-24 08:05`: a time of the API for people, in UTC as it came."""
+    """Shorten a time of the API to `2026-11-24 08:05`, in UTC."""
     return time[:16].replace("T", " ")
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, full_ids: bool = False) -> None:
-    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe, each line as it comes.
+    """Print results as a table on stdout: drawn for a terminal, tab-separated for a pipe.
 
     Args:
-        full_ids: also where the table is drawn; a pipe always gets whole ids and times.
+        full_ids: print whole ids on a terminal too; a pipe always gets whole ids and times.
     """
     if not sys.stdout.isatty():
         for row in rows:
@@ -143,10 +143,11 @@ def listing(
     limit: int | None = None,
     full_ids: bool = False,
 ) -> None:
-    """Elements of a listing as they come: a line of JSON each, or a table with what `cell` makes of each column.
+    """Print the elements of a listing as they arrive: a line of JSON each, or a table.
 
     Args:
-        limit: show at most so many, and say if there are more; None = all.
+        cell: returns the value of a column, from an element's JSON.
+        limit: the largest number of elements to print, with a message if there are more; None = all.
     """
     left = iter(found)
     shown = islice(left, limit)
@@ -156,16 +157,16 @@ def listing(
     else:
         table(columns, ([cell(each, column) for column in columns] for each in shown), full_ids=full_ids)
     if limit is not None and next(left, None) is not None:
-        say(f"There are more than these {limit}: --limit shows more, without it all.")
+        say(f"Showing the first {limit}; use --limit to see more.")
 
 
 def page_size(limit: int | None) -> int:
-    """How many elements of a listing to ask for at a time, where at most `limit` are shown."""
+    """Return the number of elements of one request of a listing that shows at most `limit`."""
     return PAGE if limit is None else min(limit, PAGE)
 
 
 def bar() -> Progress:
-    """A progress bar on stderr; without a terminal it prints nothing by itself."""
+    """Return a progress bar on stderr; without a terminal it prints nothing by itself."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     return Progress(
@@ -179,7 +180,12 @@ def bar() -> Progress:
 
 @contextmanager
 def goes_on(what: str, hint: str) -> Generator[None]:
-    """Ctrl-C in here ends the command alone, and that is said: what goes on, and how to look at it."""
+    """Report on Ctrl-C in the block that only the command ends.
+
+    Args:
+        what: continues on the server.
+        hint: commands that watch or end it.
+    """
     try:
         yield
     except KeyboardInterrupt:
@@ -213,13 +219,13 @@ def confirm(question: str, *, yes: bool) -> None:
 
 
 def home_relative(path: str | os.PathLike[str]) -> str:
-    """The path as a person would type it from here."""
+    """Return a path relative to the working directory if it is below it, else as it is."""
     text = os.fspath(path)
     return os.path.relpath(text) if not os.path.relpath(text).startswith("..") else text
 
 
 def length_of_time(seconds: float) -> str:
-    """`45 s`, `12 min`, `3 h 20 min`."""
+    """Format seconds as `45 s`, `12 min` or `3 h 20 min`."""
     if seconds < 90:
         return f"{max(round(seconds), 1)} s"
     minutes = round(seconds / 60)
@@ -227,7 +233,7 @@ def length_of_time(seconds: float) -> str:
 
 
 def size(count: int) -> str:
-    """`512 B`, `1.5 GiB`."""
+    """Format bytes as `512 B` or `1.5 GiB`."""
     for place, unit in enumerate("TGMK"):
         of_it = 2 ** (40 - 10 * place)
         if count >= of_it:
@@ -236,7 +242,7 @@ def size(count: int) -> str:
 
 
 def _shown(column: str, cell: str, *, full_ids: bool) -> str:
-    """A cell of a drawn table."""
+    """Return the text of a cell of a drawn table."""
     if column in TIME_COLUMNS:
         return moment(cell) if cell[:1].isdigit() else cell
     is_id = column in ID_COLUMNS | TARGET_COLUMNS and _WHOLE_ID.fullmatch(cell)  # the id of a tenant is its name

@@ -1,4 +1,4 @@
-"""What commands need that work beside the database, without the API."""
+"""Settings and connections of commands that use the database without the API."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def settings_here() -> Settings:
-    """The settings; those of the embedded server of this home where no database is named.
+    """Return the settings, with the URLs of this home's embedded servers if no database is named.
 
     Raises:
         InvalidInput: the extra `server` is not installed.
@@ -36,7 +36,7 @@ def settings_here() -> Settings:
 
 
 def engine_of(config: Settings) -> sa.Engine:
-    """An engine for the database of `settings_here`."""
+    """Return an engine for the database of `settings_here`."""
     from marey.db import create_engine
 
     if config.database_url is None:
@@ -46,10 +46,10 @@ def engine_of(config: Settings) -> sa.Engine:
 
 @contextmanager
 def connection() -> Iterator[sa.Connection]:
-    """One transaction in the database of this place; raises as `settings_here`.
+    """Open a transaction in the database of `settings_here`; raises as that.
 
     Raises:
-        Unreachable: it does not answer.
+        Unreachable: the database does not answer.
     """
     config = settings_here()
     from marey.db import transaction
@@ -63,7 +63,7 @@ def connection() -> Iterator[sa.Connection]:
 
 
 def operator() -> Actor:
-    """Who runs this command, for the audit log."""
+    """Return the name of the operating-system user, for the audit log."""
     from marey.tenants import Actor
 
     try:

@@ -14,14 +14,14 @@ from typing import Any
 
 from marey.cli import console
 from marey.cli.watching import watch_job
-from marey.client.place import Server, find_server
-from marey.client.transport import Transport
+from marey.client.health import is_healthy
+from marey.client.place import find_server
 from marey.core.errors import MareyError, NotFound, TimedOut, Unreachable
 
 OUT = Path("out/demo")
 INTERRUPTED = 130
 START_SECONDS = 120.0
-"""Making the database, importing torch and loading the model: 15 s here; a slow disk takes longer."""
+"""Time to create the database, import torch and load the model: 15 s, longer with a slow disk."""
 JOB_SECONDS = 240.0
 PROMPTS = (
     {"prompt": "a person walks forward", "name": "walk", "seconds": 4, "seed": 1},
@@ -41,7 +41,7 @@ PROMPTS = (
 
 
 def main() -> int:
-    """Run it; gives the exit code."""
+    """Run the demo and return the exit code."""
     began = time.monotonic()
     home = OUT.absolute() / ".home"
     try:
@@ -66,7 +66,7 @@ def main() -> int:
 
 
 def _ensure_bundle(home: Path) -> bool:
-    """Whether the model that will be used has random weights; makes such a bundle where there is no model at all."""
+    """Return True if the default model has random weights; make such a bundle if there is no model at all."""
     os.environ["MAREY_HOME"] = str(home)
     from marey.bundles import choose_bundle
     from marey.cli.roles.generating import make_random_bundle
@@ -83,7 +83,7 @@ def _ensure_bundle(home: Path) -> bool:
 
 @contextlib.contextmanager
 def _server(home: Path) -> Iterator[None]:
-    """`marey serve` on a free port, as a child, until the end of the block."""
+    """Run `marey serve` on a free port as a child until the end of the block."""
     for name in ("MAREY_SERVER", "MAREY_DATABASE_URL", "MAREY_QUEUE_URL", "MAREY_STORE"):
         os.environ.pop(name, None)
     home.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -115,28 +115,24 @@ def _wait_until_ready(process: subprocess.Popen[bytes], log: Path) -> None:
 
 
 def _is_ready() -> bool:
-    import urllib.error
-    import urllib.request
-
     try:
-        server: Server = find_server()
-        with urllib.request.urlopen(f"{server.url}/readyz", timeout=5) as response:  # noqa: S310
-            return response.status == 200
-    except (Unreachable, urllib.error.URLError, OSError):
+        return is_healthy(f"{find_server().url}/readyz", timeout=5)
+    except Unreachable:
         return False
 
 
 def _run() -> list[dict[str, Any]]:
     from marey.cli.commands.fetch import fetch_job
+    from marey.client import Client
 
-    with Transport.here() as client:
-        job = client.submit([dict(item) for item in PROMPTS], name="demo")
-        watch_job(client, job["id"], timeout=JOB_SECONDS)
-        return fetch_job(client, job["id"], OUT, template="{name}", overwrite=True)
+    with Client() as client:
+        job = client.jobs.submit(PROMPTS, name="demo")
+        watch_job(client, job.id, timeout=JOB_SECONDS)
+        return fetch_job(client, job.id, OUT, template="{name}", overwrite=True)
 
 
 def _draw(lines: list[dict[str, Any]]) -> None:
-    """A contact sheet beside each npz."""
+    """Draw a contact sheet beside each npz."""
     from marey.motion.clip import load_npz
     from marey.viz.render import contact_sheet
 

@@ -1,4 +1,4 @@
-"""Drawing motions in processes of their own, one a core: a picture is all arithmetic, which threads cannot share."""
+"""Drawing motions in child processes, one for each core, because drawing holds the interpreter lock."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MOST_PROCESSES = 8
 FEW = 12
-"""So many pictures are drawn sooner than another process has started."""
+"""Pictures that are drawn sooner in this process than in a child that has to start first."""
 AHEAD = 4
 """Pictures of each process that are drawn before the first of them is taken: each waits in memory."""
 THEME = "light"

@@ -16,7 +16,7 @@ State = Literal["ok", "warn", "bad"]
 
 @dataclass(frozen=True)
 class Check:
-    """One finding. `warn` works, or is not needed for all that this machine could do; `bad` has to be mended."""
+    """One finding. `warn`: it works, or only some commands need it; `bad`: it has to be repaired."""
 
     name: str
     state: State
@@ -26,12 +26,12 @@ class Check:
 
 
 def broken(name: str, error: MareyError) -> Check:
-    """A check that ended with an expected error."""
+    """Return the finding of a check that ended with an expected error."""
     return Check(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
 
 
 def free_space(name: str, folder: os.PathLike[str]) -> Check:
-    """How full the disk of a folder is."""
+    """Check the free space of a folder's disk."""
     free = shutil.disk_usage(folder).free
     state = "bad" if free < SMALLEST_FREE else "warn" if free < LITTLE_FREE else "ok"
     hint = None if state == "ok" else "Make room: `marey admin gc` removes what nothing refers to."

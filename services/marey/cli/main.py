@@ -1,4 +1,4 @@
-"""The commands of `marey`. Each module of `commands` imports what it needs when it runs, not before."""
+"""The commands of `marey`. Each module of `commands` imports its dependencies when it runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from marey.cli import console
+from marey.cli import console, hints
 from marey.cli.commands import (
     admin,
     convert,
@@ -32,7 +32,7 @@ from marey.core.errors import MareyError
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 PATIENCE = 2.0
-"""Seconds that a command waits at its end for a collector that does not answer."""
+"""Seconds that a command waits at its end for a trace collector that does not answer."""
 
 HELP = """Text in, 3D human motion out.
 
@@ -56,7 +56,7 @@ class Commands(TyperGroup):
         except MareyError as error:
             if isinstance(ctx.obj, tracing.Span):
                 ctx.obj.fail(error)
-            console.say(f"marey: {error}")
+            console.say(f"marey: {hints.name_options(error)}")
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             console.say("marey: interrupted")
@@ -103,7 +103,7 @@ def root(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it.")] = False,
 ) -> None:
-    """Nothing but the trace: the help stands in `HELP`."""
+    """Begin the trace of the command; `HELP` has the help text."""
     _trace(ctx)
 
 

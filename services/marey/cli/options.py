@@ -1,7 +1,8 @@
-"""Options that several commands share, spelled once."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,20 @@ from typing import Annotated
 import typer
 
 from marey.client.names import DEFAULT_TEMPLATE
+from marey.core.errors import InvalidInput
+from marey.items.item import read_setting
+
+
+def settings_of(given: Sequence[str]) -> dict[str, float]:
+    """Read the settings of `--set NAME=VALUE`.
+
+    Raises:
+        InvalidInput: one is something else.
+    """
+    try:
+        return dict(map(read_setting, given))
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where="--set", hint=error.hint) from None
 
 
 class InputFormat(StrEnum):

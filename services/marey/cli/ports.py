@@ -1,4 +1,4 @@
-"""Whether a server may listen somewhere."""
+"""Checks of the ports of servers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ HINT = "Choose another with --port (0 = any) or MAREY_PORT."
 
 
 def try_port(host: str, port: int) -> int:
-    """The port, if it is free now; 0 = any that is.
+    """Return the port if it is free now, or any free port for 0.
 
     Raises:
-        Conflict: somebody listens there, or this machine has no such address.
+        Conflict: another process listens there, or this machine has no such address.
     """
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -1,8 +1,8 @@
-"""Ids as a person types them: whole, by their last digits, by name, `last`, or a motion by its place in a job."""
+"""References that a user types: a whole id, its last digits, a name, `last`, or a motion by its place in a job."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
@@ -11,7 +11,8 @@ from marey.cli import console
 from marey.core.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from marey.client.transport import Transport
+    from marey.client import Client, Result
+    from marey.client.references import ReferenceKind as Kind
 
 FORMS = "its id, the last 8 digits of it, a name, or last"
 MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX, JOB:INDEX.VARIANT, or last"
@@ -29,12 +30,12 @@ LISTS = {
 
 @dataclass(frozen=True)
 class Reference:
-    """The object that a command was given."""
+    """The object that an argument of a command names."""
 
     kind: str
     id: str
     match: Mapping[str, Any] | None = None
-    """As the server answered; None where the whole id was given, which the server was not asked about."""
+    """The server's description; None = the argument is a whole id, and the server was not asked."""
 
     def __str__(self) -> str:
         """`job 1a2b3c4d 'day 1' (120 items)`."""
@@ -42,49 +43,53 @@ class Reference:
 
 
 def whole_id(text: str) -> str | None:
-    """The text as an id, if it is a whole one."""
+    """Return the text as an id; None if it is not a whole one."""
     try:
         return str(UUID(text)) if len(text) in (32, 36) else None
     except ValueError:
         return None
 
 
-def find(client: Transport, kind: str, text: str, *, webhook: str | None = None) -> Reference:
-    """Resolve a reference; the server is asked where it is not a whole id.
+def find(client: Client, kind: Kind, text: str, *, webhook: str | None = None) -> Reference:
+    """Resolve a reference; the server is asked unless it is a whole id.
 
     Raises:
-        NotFound: nothing.
+        NotFound: there is no such object.
         InvalidInput: it is ambiguous; the error lists the candidates.
     """
     if (identifier := whole_id(text)) is not None:
         return Reference(kind, identifier)
-    matches = client.get("/v1/resolve", kind=kind, reference=text, webhook=webhook)["matches"]
-    return choose(kind, text, matches)
+    return choose(kind, text, [match.raw for match in client.references.resolve(kind, text, webhook=webhook)])
 
 
-def find_all(client: Transport, kind: str, texts: Iterable[str], *, webhook: str | None = None) -> list[Reference]:
-    """`find` for several, before anything is done to one of them."""
+def find_all(client: Client, kind: Kind, texts: Iterable[str], *, webhook: str | None = None) -> list[Reference]:
+    """Resolve several references before anything is done to one of them; the same object is listed once."""
     found = [find(client, kind, text, webhook=webhook) for text in texts]
     return list({each.id: each for each in found}.values())
 
 
-def named(client: Transport, path: str, found: Iterable[Reference]) -> Iterator[Reference]:
-    """Each with its name, so that a verb that cannot be taken back says what it met.
-
-    Args:
-        path: of the noun, such as `/v1/jobs`.
-    """
+def with_names(client: Client, found: Iterable[Reference]) -> Iterator[Reference]:
+    """Yield each object with its name, for the messages of commands that cannot be undone."""
     for each in found:
-        yield each if each.match is not None else of_view(each.kind, client.get(f"{path}/{each.id}"))
+        yield each if each.match is not None else of_view(each.kind, _view(client, each))
 
 
-def listed(found: Sequence[Reference]) -> str:
+def _view(client: Client, found: Reference) -> Mapping[str, Any]:
+    get: dict[str, Callable[[str], Result]] = {
+        "job": client.jobs.get,
+        "schedule": client.schedules.get,
+        "webhook": client.webhooks.get,
+    }
+    return get[found.kind](found.id).raw
+
+
+def describe_all(found: Sequence[Reference]) -> str:
     """Describe the objects of a question: each by name, or their number."""
     return ", ".join(map(str, found)) if len(found) <= LISTED else f"{len(found)} {found[0].kind}s"
 
 
 def choose(kind: str, text: str, matches: Sequence[Mapping[str, Any]]) -> Reference:
-    """The one match.
+    """Return the only match.
 
     Raises:
         NotFound, InvalidInput: as `find`.
@@ -102,7 +107,7 @@ def choose(kind: str, text: str, matches: Sequence[Mapping[str, Any]]) -> Refere
 
 
 def describe(match: Mapping[str, Any]) -> str:
-    """A match in a few words."""
+    """Describe a match in a few words."""
     words = [str(match["kind"]), console.short_id(str(match["id"]))]
     if match.get("name"):
         words.append(repr(match["name"]))

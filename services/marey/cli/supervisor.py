@@ -9,8 +9,6 @@ import os
 import secrets
 import signal
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import IO
@@ -19,6 +17,7 @@ from marey.cli import console
 from marey.cli.children import Child, marey, metrics_port, stop_all
 from marey.cli.ports import try_port
 from marey.cli.roles.serving import PLATFORM, check_device, live_models, role_of, threads_of
+from marey.client.health import is_healthy
 from marey.client.place import Server, read_server, write_server
 from marey.core.errors import Conflict, InvalidInput, MareyError
 from marey.core.private_home import make_private, open_private
@@ -33,8 +32,10 @@ from marey.webhooks.vault import Vault, key_file
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")
 TICK = 0.2
+HEALTH_SECONDS = 2.0
+"""Timeout of a health check of the API."""
 WARNINGS = 5
-"""Paths of a home that was open to other users which are told one by one."""
+"""The largest number of warnings about paths that were open to other users."""
 LOG_LIMIT = 10 * 2**20
 KEYS = (
     "{url}/live and other clients want a key: `marey admin keys create NAME` makes one. "
@@ -44,7 +45,7 @@ KEYS = (
 
 @dataclass
 class Backing:
-    """An embedded server, started again when it ends."""
+    """An embedded server that is restarted when it ends."""
 
     start: Callable[[], EmbeddedServer]
     server: EmbeddedServer = field(init=False)
@@ -53,7 +54,7 @@ class Backing:
         self.server = self.start()
 
     def keep(self) -> None:
-        """Start it again if it ended: its children are patient, and its files survive."""
+        """Restart it if it ended; its clients retry, and its files survive."""
         if not self.server.alive():
             console.say(f"{self.server.name} ended; starting it again. Its log: {self.server.log}")
             self.server.stop()
@@ -78,7 +79,7 @@ class Supervisor:
         Raises:
             Conflict: another server runs on this home, or the port is taken.
             NotFound: there is no model to serve.
-            InvalidInput: a setting says what no child could start with.
+            InvalidInput: a setting with which no child could start.
         """
         if (self.home / "lock").exists():
             with self._locked():  # who runs here is told first: another port would not help
@@ -179,11 +180,11 @@ class Supervisor:
                 backing.keep()
             for child in self._children:
                 child.keep(now)
-            if not announced and _answers(f"{url}/livez"):
+            if not announced and is_healthy(f"{url}/livez", timeout=HEALTH_SECONDS):
                 write_server(self._server, self.home)
                 announced = True
                 console.say(f"Marey answers at {url} (home {self.home}); loading the model …")
-            if announced and not ready and _answers(f"{url}/readyz"):
+            if announced and not ready and is_healthy(f"{url}/readyz", timeout=HEALTH_SECONDS):
                 ready = True
                 console.say("Ready. Submit with `marey submit 'a person waves'`; stop with Ctrl-C.")
                 console.say(KEYS.format(url=url, path=self.home / "server.json"))
@@ -240,11 +241,3 @@ class Supervisor:
 
 
 _WHO_HINT = "Use that one, stop it, or give this one its own MAREY_HOME and --port."
-
-
-def _answers(url: str) -> bool:
-    try:
-        with urllib.request.urlopen(url, timeout=2) as response:  # noqa: S310
-            return response.status == 200
-    except (urllib.error.URLError, OSError):
-        return False

@@ -19,45 +19,45 @@ from marey.core.lazy import lazy_names
 
 if TYPE_CHECKING:
     from marey.client.client import Client
+    from marey.client.evaluation_requests import EvaluationOptions
+    from marey.client.fetching import FetchObserver
     from marey.client.frames import Frame
     from marey.client.jobs import Defaults, FetchedItem, JobChanges, Progress
     from marey.client.place import Server
     from marey.client.results import Result
-    from marey.client.streams import LiveStream
-    from marey.client.types import (
-        CheckedJob,
+    from marey.client.schedules import ScheduleChanges
+    from marey.client.streams import FramesMissing, LiveStream, StreamChanged, StreamProblem
+    from marey.client.types.common import ErrorDetail, File
+    from marey.client.types.evaluations import (
         ComparedRun,
         Comparison,
-        Counters,
-        Erasure,
-        ErrorDetail,
-        Estimate,
         Evaluation,
         EvaluationDetail,
         EvaluationEvent,
         EvaluationJob,
         EvaluationRequest,
-        File,
+        MetricChange,
+        MetricPair,
+    )
+    from marey.client.types.jobs import (
+        CheckedJob,
+        Counters,
+        Erasure,
+        Estimate,
         Job,
         JobEvent,
         JobItem,
-        MetricChange,
-        MetricPair,
-        Model,
-        Motion,
-        MotionDetail,
         QueuePosition,
         Quota,
-        Reroll,
-        Review,
-        SamplingSetting,
         Speed,
-        Stream,
-        StreamDetail,
-        StreamPrompt,
-        StreamSkeleton,
-        TrainingData,
     )
+    from marey.client.types.models import BrokenModel, Model, ModelCatalogue, SamplingSetting, TrainingData
+    from marey.client.types.motions import Motion, MotionDetail, Reroll, Review
+    from marey.client.types.references import ReferenceMatch
+    from marey.client.types.schedules import Schedule
+    from marey.client.types.streams import Stream, StreamDetail, StreamPrompt, StreamSkeleton
+    from marey.client.types.webhooks import Delivery, DeliveryAttempt, DeliveryDetail, Webhook, WebhookSecret
+    from marey.client.webhooks import WebhookChanges
     from marey.core.errors import (
         Busy,
         Conflict,
@@ -86,17 +86,29 @@ __getattr__ = lazy_names(
     __name__,
     {
         "marey.client.client": "Client",
+        "marey.client.evaluation_requests": "EvaluationOptions",
+        "marey.client.fetching": "FetchObserver",
         "marey.client.frames": "Frame",
         "marey.client.jobs": "Defaults FetchedItem JobChanges Progress",
         "marey.client.place": "Server",
         "marey.client.results": "Result",
-        "marey.client.streams": "LiveStream",
-        "marey.client.types": (
-            "CheckedJob ComparedRun Comparison Counters Erasure ErrorDetail Estimate Evaluation "
-            "EvaluationDetail EvaluationEvent EvaluationJob EvaluationRequest File Job JobEvent JobItem "
-            "MetricChange MetricPair Model Motion MotionDetail QueuePosition Quota Reroll Review "
-            "SamplingSetting Speed Stream StreamDetail StreamPrompt StreamSkeleton TrainingData"
+        "marey.client.schedules": "ScheduleChanges",
+        "marey.client.streams": "FramesMissing LiveStream StreamChanged StreamProblem",
+        "marey.client.types.common": "ErrorDetail File",
+        "marey.client.types.evaluations": (
+            "ComparedRun Comparison Evaluation EvaluationDetail EvaluationEvent EvaluationJob "
+            "EvaluationRequest MetricChange MetricPair"
         ),
+        "marey.client.types.jobs": (
+            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem QueuePosition Quota Speed"
+        ),
+        "marey.client.types.models": "BrokenModel Model ModelCatalogue SamplingSetting TrainingData",
+        "marey.client.types.motions": "Motion MotionDetail Reroll Review",
+        "marey.client.types.references": "ReferenceMatch",
+        "marey.client.types.schedules": "Schedule",
+        "marey.client.types.streams": "Stream StreamDetail StreamPrompt StreamSkeleton",
+        "marey.client.types.webhooks": "Delivery DeliveryAttempt DeliveryDetail Webhook WebhookSecret",
+        "marey.client.webhooks": "WebhookChanges",
         "marey.core.errors": (
             "Busy Conflict InvalidBundle InvalidFile InvalidInput ItemsFailed MareyError NotFound "
             "Overloaded QuotaUsedUp Refused Regressed TimedOut TooLarge TooSlow Unauthenticated "
@@ -108,6 +120,7 @@ __getattr__ = lazy_names(
 )
 
 __all__ = [
+    "BrokenModel",
     "Busy",
     "CheckedJob",
     "Client",
@@ -116,6 +129,9 @@ __all__ = [
     "Conflict",
     "Counters",
     "Defaults",
+    "Delivery",
+    "DeliveryAttempt",
+    "DeliveryDetail",
     "Erasure",
     "ErrorDetail",
     "Estimate",
@@ -123,11 +139,14 @@ __all__ = [
     "EvaluationDetail",
     "EvaluationEvent",
     "EvaluationJob",
+    "EvaluationOptions",
     "EvaluationPrompt",
     "EvaluationRequest",
+    "FetchObserver",
     "FetchedItem",
     "File",
     "Frame",
+    "FramesMissing",
     "InvalidBundle",
     "InvalidFile",
     "InvalidInput",
@@ -143,6 +162,7 @@ __all__ = [
     "MetricChange",
     "MetricPair",
     "Model",
+    "ModelCatalogue",
     "Motion",
     "MotionDetail",
     "NotFound",
@@ -152,16 +172,21 @@ __all__ = [
     "QueuePosition",
     "Quota",
     "QuotaUsedUp",
+    "ReferenceMatch",
     "Refused",
     "Regressed",
     "Reroll",
     "Result",
     "Review",
     "SamplingSetting",
+    "Schedule",
+    "ScheduleChanges",
     "Server",
     "Speed",
     "Stream",
+    "StreamChanged",
     "StreamDetail",
+    "StreamProblem",
     "StreamPrompt",
     "StreamSkeleton",
     "TimedOut",
@@ -170,5 +195,8 @@ __all__ = [
     "TrainingData",
     "Unauthenticated",
     "Unreachable",
+    "Webhook",
+    "WebhookChanges",
+    "WebhookSecret",
     "__version__",
 ]

@@ -10,30 +10,33 @@ from marey.client.jobs import Jobs
 from marey.client.models import Models
 from marey.client.motions import Motions
 from marey.client.place import Server, find_server, server_at
+from marey.client.references import References
+from marey.client.schedules import Schedules
 from marey.client.streams import Streams
 from marey.client.transport import Transport
+from marey.client.webhooks import Webhooks
 
 
 class Client:
-    """A client of a Marey server; safe to use from several threads, but for `LiveStream`.
+    """A client of a Marey server; safe to use from several threads, except for `LiveStream`.
 
-    Failed requests are tried again, with back-off, where they may be repeated; a submit and all its retries have one
-    idempotency key. Every expected failure is a `MareyError`.
+    Failed requests that may be repeated are retried with back-off; a submit and all its retries share one idempotency
+    key. Every expected failure is a `MareyError`.
 
     Args:
         server: its URL; None = that of `MAREY_SERVER`, or of a `marey serve` on this machine.
         key: an API key; None = that of `MAREY_KEY` or `MAREY_KEY_FILE`, or of the `marey serve`.
-        timeout: seconds of silence after which a request counts as failed.
-        attempts: of each request.
+        timeout: seconds without data from the server after which a request counts as failed.
+        attempts: the largest number of attempts of each request; None = 5, and longer while the server is busy.
 
     Raises:
         Unreachable: no server is given and none runs here.
         Unauthenticated: there is no key.
-        InvalidInput: the URL is none.
+        InvalidInput: the URL is not one.
 
     Attributes:
-        jobs, motions, streams, evaluations, models: the nouns of the API.
-        transport: requests by path, for routes that have no method here.
+        jobs, motions, streams, evaluations, schedules, webhooks, models, references: the nouns of the API.
+        transport: requests by path, for routes without a method; not part of the public API.
     """
 
     def __init__(
@@ -53,7 +56,10 @@ class Client:
         self.motions = Motions(self.transport)
         self.streams = Streams(self.transport)
         self.evaluations = Evaluations(self.transport)
+        self.schedules = Schedules(self.transport)
+        self.webhooks = Webhooks(self.transport)
         self.models = Models(self.transport)
+        self.references = References(self.transport)
 
     def __enter__(self) -> Self:
         return self

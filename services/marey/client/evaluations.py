@@ -2,91 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Unpack, get_args
 
+from marey.client.evaluation_requests import EvaluationOptions, naming_lines, request_body
 from marey.client.fetching import Download, check_folder, download_all
 from marey.client.resources import Resource, identifier
-from marey.client.rows import located, read_evaluation_prompts
-from marey.client.text_files import where_of
-from marey.client.types import Comparison, Evaluation, EvaluationDetail
+from marey.client.types.common import File
+from marey.client.types.evaluations import Comparison, Evaluation, EvaluationDetail
 from marey.client.watching import follow_evaluation
 from marey.core.errors import InvalidInput, ItemsFailed, NotFound, Regressed
-from marey.items.evaluation_prompts import EvaluationPrompt, read_prompts
-from marey.items.item import InvalidItems
 
-Split = Literal["test", "compositional", "test+compositional"]
 ReportFormat = Literal["html", "json", "md"]
-Prompt = EvaluationPrompt | Mapping[str, object] | str
-"""A prompt, a dict with prompt, seconds and expected, or an `EvaluationPrompt`."""
 WAIT_HINT = "Wait again with a longer timeout, or cancel the evaluation."
 
 
 class Evaluations(Resource):
-    """`client.evaluations`."""
+    """`client.evaluations`. Errors of all methods: NotFound, InvalidInput, Refused, Unreachable."""
 
     def run(
         self,
         bundle: str,
         *,
-        split: Split = "test",
-        prompts: Iterable[Prompt] | str | Path | None = None,
-        evaluator: str | None = None,
-        settings: Mapping[str, float] | None = None,
-        repeats: int | None = None,
-        seed: int | None = None,
-        baseline: Evaluation | str | None = None,
         name: str | None = None,
         comment: str | None = None,
+        **options: Unpack[EvaluationOptions],
     ) -> EvaluationDetail:
-        """Measure a model in the background. A retry after a lost answer begins nothing twice.
+        """Measure a model in the background. A retry after a lost answer starts nothing twice.
 
         Args:
             bundle: model, bundle or exact bundle that generates.
-            split: the evaluator's own captions.
-            prompts: in place of a split: prompts, or the path of a CSV or JSONL file with the columns prompt, seconds
-                and expected.
-            evaluator: bundle that measures; None = the one that the server has.
-            settings: of sampling.
-            repeats: motions of each prompt; None = 1.
-            seed: of the first motion; None = 0.
-            baseline: an evaluation to compare with.
             name, comment: for people.
+            options: the prompts and settings, as `EvaluationOptions` describes them: `split` (captions of the
+                evaluator's bundle, `test` by default) or `prompts` (a list, or the path of a CSV or JSONL file),
+                `evaluator`, `settings`, `repeats`, `seed`, `baseline`.
 
         Raises:
             InvalidItems: with every problem of every prompt.
-            NotFound, InvalidInput, Refused, Unreachable: as the server says.
+            InvalidFile, NotFound, TooLarge: of the file of prompts.
+            InvalidInput: an option cannot be used.
         """
-        read, where, lines = _read(prompts)
-        wanted: dict[str, Any] = {
-            "bundle": bundle,
-            "evaluator": evaluator,
-            "settings": dict(settings) if settings else None,
-            "repeats": repeats,
-            "seed": seed,
-            "baseline": None if baseline is None else identifier(baseline),
-            "name": name,
-            "comment": comment,
-            **({"split": split} if read is None else {"prompts": read, "source": where}),
-        }
-        body = {key: value for key, value in wanted.items() if value is not None}
-        try:
+        request = request_body(bundle, options)
+        body = {**request.body, **({"name": name} if name else {}), **({"comment": comment} if comment else {})}
+        with naming_lines(request):
             return EvaluationDetail.of(self._transport.post_new("/v1/evaluations", body))
-        except InvalidItems as error:
-            raise InvalidItems(located(error.problems, lines), where=where, total=error.total) from None
 
-    def list(self, *, state: str | None = None, limit: int | None = None) -> Iterator[Evaluation]:
-        """The evaluations, newest first.
+    def list(
+        self, *, state: str | None = None, limit: int | None = None, page_size: int | None = None
+    ) -> Iterator[Evaluation]:
+        """Iterate over the evaluations, newest first.
 
         Args:
             state: only evaluations in this state.
-            limit: at most so many; None = all.
+            limit: the largest number of evaluations; None = all.
+            page_size: evaluations of each request, at most 1,000; None = as many as the limit allows.
         """
-        return self._pages(Evaluation, "/v1/evaluations", limit, state=state)
+        return self._pages(Evaluation, "/v1/evaluations", limit, page_size, state=state)
 
     def get(self, evaluation: Evaluation | str) -> EvaluationDetail:
-        """The evaluation as it stands now, with its numbers and history."""
+        """Return the current state of an evaluation, with its figures and history."""
         return EvaluationDetail.of(self._transport.get(_path(evaluation)))
 
     def wait(
@@ -95,19 +70,21 @@ class Evaluations(Resource):
         *,
         timeout: float | None = None,
         on_progress: Callable[[EvaluationDetail], None] | None = None,
+        check: bool = True,
         fail_on_regression: bool = False,
     ) -> EvaluationDetail:
-        """Wait until an evaluation is done.
+        """Wait until an evaluation has ended, and return it.
 
         Args:
             timeout: seconds; None = no limit.
             on_progress: called with the evaluation about once a second.
-            fail_on_regression: raise where it is worse than its baseline.
+            check: raise if it failed or was cancelled.
+            fail_on_regression: raise if it is worse than its baseline.
 
         Raises:
             ItemsFailed: it failed or was cancelled.
             Regressed: it is worse.
-            TimedOut: `timeout` passed; the evaluation goes on.
+            TimedOut: `timeout` passed; the evaluation continues.
             Unreachable: the server was away for three minutes.
         """
 
@@ -118,17 +95,20 @@ class Evaluations(Resource):
         ended = follow_evaluation(self._transport, identifier(evaluation), timeout=timeout, hint=WAIT_HINT, look=look)
         found = EvaluationDetail.of(ended)
         where = f"evaluation {found.id}"
-        if found.state != "done":
+        if check and found.state != "done":
             raise ItemsFailed(f"{found.state}: {found.reason}", where=where)
         if fail_on_regression and found.regressed:
             raise Regressed(found.reason, where=where, hint="`client.evaluations.report` says what is worse.")
         return found
 
     def report(self, evaluation: Evaluation | str, file_format: ReportFormat = "md") -> str:
-        """The report of an evaluation that is done, as text.
+        """Return the report of an evaluation as text.
+
+        Args:
+            file_format: html, json or md.
 
         Raises:
-            NotFound: there is none, because it is not done.
+            NotFound: the evaluation is not done.
         """
         found = self.get(evaluation)
         _report(found, file_format)
@@ -136,17 +116,21 @@ class Evaluations(Resource):
             return response.read().decode()
 
     def fetch_report(self, evaluation: Evaluation | str, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Fetch the report into a file, checked by its sha256; the ending says which: `.html`, `.json`, `.md`.
+        """Fetch the report into a file, verified by its sha256.
+
+        Args:
+            path: its ending names the format: `.html`, `.json` or `.md`.
+            overwrite: replace a file with other content.
 
         Raises:
-            InvalidInput: another ending.
-            NotFound: there is none, because it is not done.
-            Conflict: a file is there and holds something else.
+            InvalidInput: another ending, or a folder that cannot be written.
+            NotFound: the evaluation is not done.
+            Conflict: the file exists with other content.
+            InvalidFile: the data that arrived has another sha256.
         """
-        path, found = Path(path), self.get(evaluation)
-        file_format = path.suffix.lower().removeprefix(".")
-        if file_format not in ("html", "json", "md"):
-            raise InvalidInput("the file's ending is no report's", where=str(path), hint="Use html, json or md.")
+        path = Path(path)
+        file_format = report_format(path)
+        found = self.get(evaluation)
         file = _report(found, file_format)
         check_folder(path.parent)
         download = Download(f"{_path(found)}/report/{file_format}", file.sha256, file.size, path)
@@ -154,35 +138,36 @@ class Evaluations(Resource):
         return path
 
     def compare(self, before: Evaluation | str, after: Evaluation | str) -> Comparison:
-        """Compare two evaluations of the same prompts and evaluator, motion against motion, by paired bootstrap."""
+        """Compare two evaluations of the same prompts and evaluator, motion by motion, by paired bootstrap.
+
+        Raises:
+            Conflict: they are not done, or differ in prompts or evaluator.
+        """
         return Comparison.of(self._transport.get(f"{_path(after)}/comparison", before=identifier(before)))
 
     def cancel(self, evaluation: Evaluation | str) -> EvaluationDetail:
-        """Cancel an evaluation and the jobs that work for it; what was made stays."""
+        """Cancel an evaluation and its jobs; finished motions stay."""
         self._transport.delete(_path(evaluation))
         return self.get(evaluation)
 
 
-def _read(prompts: Iterable[Prompt] | str | Path | None) -> tuple[Any, str | None, list[int | None]]:
-    """The prompts of a request, their source, and the line of each."""
-    if prompts is None:
-        return None, None, []
-    if isinstance(prompts, str | Path):
-        read, lines = read_evaluation_prompts(str(prompts))
-        return [prompt.as_json() for prompt in read], Path(where_of(str(prompts))).name, lines
-    raws = [{"prompt": each} if isinstance(each, str) else _raw(each) for each in prompts]
-    read = read_prompts(((number, raw) for number, raw in enumerate(raws, 1)), where="prompts")
-    return [prompt.as_json() for prompt in read], "prompts", [*range(1, len(raws) + 1)]
+def report_format(path: Path) -> ReportFormat:
+    """Return the format of a report that a file's ending names.
+
+    Raises:
+        InvalidInput: another ending.
+    """
+    ending = path.suffix.lower().removeprefix(".")
+    for file_format in get_args(ReportFormat):
+        if ending == file_format:
+            return file_format
+    raise InvalidInput("unknown report format", where=str(path), hint=f"Use {', '.join(get_args(ReportFormat))}.")
 
 
-def _raw(prompt: EvaluationPrompt | Mapping[str, object]) -> Mapping[str, object]:
-    return prompt.as_json() if isinstance(prompt, EvaluationPrompt) else prompt
-
-
-def _report(found: EvaluationDetail, file_format: str) -> Any:
+def _report(found: EvaluationDetail, file_format: str) -> File:
     file = next((file for file in found.reports if file.format == file_format), None)
     if file is None:
-        message = f"there is no such report: the evaluation is {found.state}"
+        message = f"the report does not exist: the evaluation is {found.state}"
         raise NotFound(message, where=f"evaluation {found.id}", hint=found.reason)
     return file
 

@@ -21,10 +21,10 @@ from marey.exporters import extension_of
 
 PARALLEL = 8
 ATTEMPTS = 4
-"""Downloads of one file that may break off; each goes on where the last one stopped."""
+"""Downloads of one file that may break off; each continues where the last one stopped."""
 BLOCK = 2**18
 FORMAT = re.compile(r"[a-z0-9]{1,16}")
-"""Of a file, as a server may name it: it becomes the ending where its exporter is not installed."""
+"""File formats that a server may name; the format is the extension if its exporter is not installed."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Download:
 
     @property
     def format(self) -> str:
-        """Of the file, such as `npz`."""
+        """The format of the file, such as `npz`."""
         return self.url.rpartition("/")[2]
 
 
@@ -48,16 +48,23 @@ Planned = list[tuple[dict[str, Any], list[Download]]]
 
 
 class FetchObserver:
-    """Callbacks of `fetch_job`; each method does nothing by default."""
+    """Callbacks of a fetch; each method does nothing by default."""
 
     def planned(self, total: int) -> None:
-        """The number of files is known."""
+        """Handle the number of files, which is known before the first is fetched."""
 
-    def fetched(self, download: Download) -> None:
-        """A file is there; called by the thread that fetched it."""
+    def fetched(self, path: Path) -> None:
+        """Handle a file that is complete; called by the thread that fetched it."""
 
     def interrupted(self, done: int, total: int) -> None:
-        """The fetch broke off; `done` of `total` files are there and in the manifest."""
+        """Handle a fetch that broke off; `done` of `total` files are complete and in the manifest."""
+
+    def left_over(self, paths: Sequence[Path], *, removed: bool) -> None:
+        """Handle files of earlier fetches of the job that this fetch does not include.
+
+        Args:
+            removed: True if they were removed.
+        """
 
 
 def fetch_job(
@@ -71,25 +78,25 @@ def fetch_job(
     prune: bool = False,
     overwrite: bool = False,
     observer: FetchObserver | None = None,
-) -> tuple[Planned, list[Path]]:
-    """Fetch what a job has made so far, and write the manifest.
+) -> Planned:
+    """Fetch the files that a job has so far, and write the manifest.
 
     Args:
         formats: of files; None = all there are.
         review: fetch only motions with this verdict.
         prune: remove files that earlier manifests named for the job and this one does not.
-        overwrite: replace files that hold something else.
+        overwrite: replace files with other content.
 
     Returns:
-        The items with their files, and the files of earlier fetches of the job that are not among these.
+        The items with their files.
 
     Raises:
-        Conflict: a file is there and holds something else, or a wanted format was not made; before anything is fetched.
+        Conflict: a file exists with other content, or a format was not made; nothing is fetched then.
         InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
     """
     observer = observer or FetchObserver()
     planned = plan(transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000), folder, formats, template)
-    check_folder(folder, hint="Choose another folder with -o.")
+    check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
     make_folders(folder, (file.path for _, files in planned for file in files))
     wanted = [file for _, files in planned for file in files]
@@ -97,26 +104,28 @@ def fetch_job(
 
     def note(download: Download) -> None:
         done.add(download.path)
-        observer.fetched(download)
+        observer.fetched(download.path)
 
     observer.planned(len(wanted))
     try:
         download_all(transport, wanted, overwrite=overwrite, done=note)
     except Conflict:
-        raise  # before anything was touched
+        raise  # nothing was fetched
     except BaseException:
         _write_part(folder, job, planned, done, observer, overwrite=overwrite)
         raise
     left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
     if prune:
         remove_left(folder, left)
-    return planned, left
+    if left:
+        observer.left_over(left, removed=prune)
+    return planned
 
 
 def _write_part(
     folder: Path, job: str, planned: Planned, done: set[Path], observer: FetchObserver, *, overwrite: bool
 ) -> None:
-    """Write the manifest of a fetch that broke off. The error that ended it is raised; one of this is not."""
+    """Write the manifest of a fetch that broke off; errors are ignored, because the caller raises the first one."""
     whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
     with suppress(MareyError):
         write_manifest(folder, job, _rows(folder, whole), overwrite=overwrite, whole=False)
@@ -131,13 +140,13 @@ def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
 
 
 def check_folder(folder: Path, hint: str = "Choose another folder.") -> Path:
-    """The folder, made if need be and tried for writing.
+    """Create a folder if it is missing, check that it can be written, and return it.
 
     Args:
-        hint: what to do if it cannot be written.
+        hint: of the error.
 
     Raises:
-        InvalidInput: it cannot be made or written.
+        InvalidInput: it cannot be created or written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -149,10 +158,10 @@ def check_folder(folder: Path, hint: str = "Choose another folder.") -> Path:
 
 
 def make_folders(folder: Path, paths: Iterable[Path]) -> None:
-    """The folders in which the files of a fetch lie.
+    """Create the folders of the files of a fetch.
 
     Raises:
-        InvalidInput: one cannot be made, or a link in the folder leads out of it.
+        InvalidInput: one cannot be created, or a link in the folder leads out of it.
     """
     root = folder.resolve()
     for parent in sorted({path.parent for path in paths} - {folder}):
@@ -167,7 +176,7 @@ def make_folders(folder: Path, paths: Iterable[Path]) -> None:
 def plan(
     items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
 ) -> Planned:
-    """Which files of which items go where.
+    """Plan the files of each item and their paths.
 
     Args:
         items: items of the API, in input order.
@@ -175,7 +184,7 @@ def plan(
 
     Raises:
         InvalidInput: two motions would have one name, or a name is not a plain file name.
-        InvalidFile: the server names a format that is none.
+        InvalidFile: the server names a format that is not a plain word.
         Conflict: a wanted format was not made.
     """
     planned: Planned = []
@@ -184,7 +193,7 @@ def plan(
         downloads: list[Download] = []
         motion = item["motion"]
         for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
-            if not FORMAT.fullmatch(file["format"]):  # of the path: it must not lead out of the folder
+            if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
             name = names.of(item["id"], naming(item), extension_of(file["format"]))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
@@ -194,7 +203,7 @@ def plan(
 
 
 def naming(item: dict[str, Any]) -> Naming:
-    """What a name template may use of an item of the API."""
+    """Return the values of a name template for an item of the API."""
     return Naming(
         index=item["index"],
         name=item["name"] or slug(item["prompt"]),
@@ -211,15 +220,15 @@ def naming(item: dict[str, Any]) -> Naming:
 def download_all(
     client: Transport, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
 ) -> None:
-    """Fetch all files, or complain before the first one is touched.
+    """Fetch files, eight at a time, after a check of the existing ones.
 
     Args:
-        overwrite: replace files that hold something else.
-        done: called after each file, by the thread that fetched it; not after this function has ended.
+        overwrite: replace files with other content.
+        done: called after each file, by the thread that fetched it; never after this function has returned.
 
     Raises:
-        Conflict: a file is there and holds something else.
-        InvalidFile: what arrived is not what the server said, or cannot be written.
+        Conflict: a file exists with other content; nothing is fetched then.
+        InvalidFile: the data that arrived has another sha256, or cannot be written.
     """
     missing: list[Download] = []
     for download in downloads:
@@ -261,7 +270,8 @@ def _is_there(download: Download, overwrite: bool) -> bool:
         raise Conflict(
             "already exists and holds something else",
             where=str(download.path),
-            hint="Choose another folder, or --overwrite.",
+            hint="Choose another folder, or pass overwrite=True.",
+            argument="overwrite",
         )
     return False
 
@@ -280,9 +290,11 @@ def _download(client: Transport, download: Download) -> Download:
         if sha256_of(part) == download.sha256:
             part.replace(download.path)
             return download
-        part.unlink()  # a leftover of another file, or damaged on the way: from the start
+        part.unlink()  # a remainder of another file, or damaged in transit: start again
     raise InvalidFile(
-        "what arrived has another sha256 than the server says", where=str(download.path), hint="Fetch it again later."
+        "the data that arrived has another sha256 than the server says",
+        where=str(download.path),
+        hint="Fetch it again later.",
     )
 
 

@@ -31,7 +31,11 @@ _PAGES: dict[int, tuple[type[MareyError], str, str]] = {
         f"Try again; if it stays so, raise the read timeout of the proxy (nginx: proxy_read_timeout 300s; {GUIDE}).",
     ),
 }
-"""By status: the error, what the proxy means by it and what to do."""
+"""By status: the error, the meaning of the proxy's answer, and the hint."""
+
+
+class NoAnswer(Unreachable):
+    """A server that accepted the connection and did not answer in time."""
 
 
 def foreign_answer(status: int, header: Callable[[str], str | None], text: str, where: str) -> MareyError:

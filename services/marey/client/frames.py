@@ -1,4 +1,4 @@
-"""Frames of a live stream, read with the standard library alone; `docs/streams.md` has their bytes."""
+"""Frames of a live stream, read with the standard library alone; `docs/reference/streams.md` describes their bytes."""
 
 from __future__ import annotations
 
@@ -15,19 +15,11 @@ MOST_JOINTS = 512
 LAST = 1 << 4
 SCALE = 32767.0
 OFF_UNIT = 1e-3
-"""Of a quaternion's length: rounding changes it by 3e-5, other bytes by far more."""
+"""Tolerance of a quaternion's length: rounding changes it by 3e-5, foreign bytes by far more."""
 RELEASES = "client and server are of different releases: update the older one"
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class Head:
-    """The number of a frame, and of the prompt that was in force."""
-
-    number: int
-    prompt: int
 
 
 @dataclass(frozen=True)
@@ -36,12 +28,12 @@ class Frame:
 
     Attributes:
         number: from 0.
-        prompt: number of the prompt that was in force, from 0; each steer counts one on.
+        prompt: number of the current prompt, from 0; each steer adds one.
         root: x, y, z in metres, Y up.
         rotations: for each joint its local unit quaternion w, x, y, z, in the order of the stream's skeleton.
-        contacts: the left ankle, left toe, right ankle and right toe stand on the floor.
-        last: no frame comes after it.
-        data: the frame as it was sent.
+        contacts: whether the left ankle, left toe, right ankle and right toe touch the floor.
+        last: True for the last frame of the stream.
+        data: the bytes of the frame.
     """
 
     number: int
@@ -53,23 +45,11 @@ class Frame:
     data: bytes = field(repr=False)
 
 
-def head_of(data: bytes) -> Head:
-    """The head of a frame.
-
-    Raises:
-        InvalidInput: it is no frame of version 1.
-    """
-    if len(data) < HEADER.size - 12 or data[:3] != b"MF\x01":
-        raise InvalidInput(f"{len(data)} bytes that are no frame of version 1", where="stream", hint=RELEASES)
-    number, _, prompt = struct.unpack_from("<IHH", data, 4)
-    return Head(number, prompt)
-
-
 def read_frame(data: bytes, *, joints: int | None = None) -> Frame:
-    """The frame in these bytes.
+    """Read a frame.
 
     Args:
-        joints: of the stream's skeleton, where it is known.
+        joints: number of joints of the stream's skeleton; None = unknown.
 
     Raises:
         InvalidInput: truncated, foreign, of another version or of another skeleton.

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
-from marey.client.fetching import Download, FetchObserver, fetch_job
+from marey.client.fetching import FetchObserver, fetch_job
 from marey.client.lines import Lines
 from marey.client.names import DEFAULT_TEMPLATE, check_template
 from marey.client.resources import Resource, identifier
 from marey.client.rows import Format, PromptReader, defaults_of, read_file, read_rows
 from marey.client.tables import ExtraColumns
-from marey.client.types import CheckedJob, Counters, Erasure, Job, JobEvent, JobItem, QueuePosition
+from marey.client.types.jobs import CheckedJob, Counters, Erasure, Job, JobEvent, JobItem, QueuePosition
 from marey.client.watching import follow_job
-from marey.core.errors import InvalidInput, ItemsFailed
+from marey.core.errors import ItemsFailed
 from marey.items.item import Item
 
 Row = Item | Mapping[str, object] | str
@@ -25,7 +25,7 @@ WAIT_HINT = "Wait again with a longer timeout, or cancel the job."
 
 
 class Defaults(TypedDict, total=False):
-    """Fields of rows that do not say otherwise."""
+    """Fields of rows that do not set them."""
 
     model: str | None
     bundle: str | None
@@ -34,10 +34,21 @@ class Defaults(TypedDict, total=False):
     variants: int | None
     fps: float | None
     tags: Sequence[str] | None
+    settings: Mapping[str, float] | None
+
+
+class JobOptions(TypedDict, total=False):
+    """Options of a new job."""
+
+    name: str | None
+    comment: str | None
+    priority: int
+    fail_early: float | None
+    keep_days: int | None
 
 
 class JobChanges(TypedDict, total=False):
-    """Changes of a job; None removes the comment or the share of failures."""
+    """Changes of a job; None removes the comment or the limit of failures."""
 
     priority: int
     comment: str | None
@@ -46,14 +57,15 @@ class JobChanges(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
-    """A job under way.
+    """The progress of a job.
 
     Attributes:
         state: of the job.
-        done: items that are not open any more.
-        total: items.
-        counters: items in each state.
-        event: the event that brought it; None = the job was asked for.
+        done: number of items that have ended.
+        total: number of items.
+        counters: number of items in each state.
+        event: the event that changed it; None = the server was asked for the job.
+        job: the job as the server described it last, which may be older than the event.
     """
 
     state: str
@@ -61,6 +73,7 @@ class Progress:
     total: int
     counters: Counters
     event: JobEvent | None = None
+    job: Job
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +95,7 @@ OnFetched = Callable[[int, int], None]
 
 
 class Jobs(Resource):
-    """`client.jobs`."""
+    """`client.jobs`. Errors of all methods: NotFound, InvalidInput, Conflict, Refused, Unreachable."""
 
     def submit(
         self,
@@ -102,11 +115,12 @@ class Jobs(Resource):
             rows: prompts, dicts with the fields of an item, or items.
             name, comment: of the job.
             priority: -1000 to 1000; higher runs first.
-            fail_early: cancel the rest once this share (0 to 1) has failed.
-            keep_days: delete the job, motions and all, this long after its end.
-            idempotency_key: of all attempts; None = one is drawn. Give one of your own to submit at most once even if
-                your program is run again.
-            defaults: fields of rows that do not say otherwise: model, bundle, seconds, seed, variants, fps, tags.
+            fail_early: cancel open items once this share (0 to 1) has failed; None = never.
+            keep_days: delete the job with its motions this many days after its end; None = the server's default.
+            idempotency_key: of all attempts; None = random. Give your own key to submit at most once even if your
+                program runs again.
+            defaults: fields of rows that do not set them: model, bundle, seconds, seed, variants, fps, tags,
+                settings (of sampling, by name).
 
         Raises:
             InvalidItems: with every problem of every row; nothing was submitted.
@@ -114,7 +128,7 @@ class Jobs(Resource):
             TooLarge, Busy, QuotaUsedUp, Refused, Unreachable: as the server says.
         """
         return self._submit(
-            read_rows(_raws(rows), _defaults(defaults)),
+            read_rows(_raws(rows), defaults_of(**defaults)),
             idempotency_key,
             name=name,
             comment=comment,
@@ -142,15 +156,16 @@ class Jobs(Resource):
         Args:
             path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also
                 packed as `.gz`, or `-` for stdin.
-            file_format: csv, jsonl or txt, where the ending does not tell.
-            extra_columns: unknown columns of a CSV: `refuse`, `tag` (a tag column=value of the row) or `ignore`.
+            file_format: csv, jsonl or txt; None = by the ending.
+            extra_columns: treatment of unknown columns of a CSV: `refuse`, `tag` (a tag column=value of the row) or
+                `ignore`.
 
         Raises:
             NotFound, InvalidFile, TooLarge: of the file.
             InvalidItems: with the line of every problem; nothing was submitted.
         """
         return self._submit(
-            read_file(str(path), file_format, _defaults(defaults), extra_columns),
+            read_file(str(path), file_format, defaults_of(**defaults), extra_columns),
             idempotency_key,
             name=name,
             comment=comment,
@@ -159,9 +174,22 @@ class Jobs(Resource):
             keep_days=keep_days,
         )
 
+    def submit_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> Job:
+        """Submit items that were read and checked before; see `submit`.
+
+        Args:
+            lines: one item a line, as JSON.
+            options: name, comment, priority, fail_early, keep_days.
+        """
+        return Job.of(self._transport.submit(lines, **_given(options)))
+
+    def check_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> CheckedJob:
+        """Check what `submit_lines` would submit, and submit nothing."""
+        return CheckedJob.of(self._transport.submit(lines, validate_only=True, **_given(options)))
+
     def check(self, rows: Iterable[Row], **defaults: Unpack[Defaults]) -> CheckedJob:
-        """Check prompts as `submit` does, and submit nothing: how many motions, with which bundles, in what time."""
-        return CheckedJob.of(self._send(read_rows(_raws(rows), _defaults(defaults)), validate_only=True))
+        """Check prompts as `submit` does, and submit nothing; the result has the number of motions and an estimate."""
+        return CheckedJob.of(self._send(read_rows(_raws(rows), defaults_of(**defaults)), validate_only=True))
 
     def check_file(
         self,
@@ -172,27 +200,27 @@ class Jobs(Resource):
         **defaults: Unpack[Defaults],
     ) -> CheckedJob:
         """Check a file of prompts as `submit_file` does, and submit nothing."""
-        reader = read_file(str(path), file_format, _defaults(defaults), extra_columns)
+        reader = read_file(str(path), file_format, defaults_of(**defaults), extra_columns)
         return CheckedJob.of(self._send(reader, validate_only=True))
 
     def list(
         self, *, state: str | None = None, limit: int | None = None, page_size: int | None = None
     ) -> Iterator[Job]:
-        """The jobs, newest first, page after page.
+        """Iterate over the jobs, newest first.
 
         Args:
             state: only jobs in this state.
-            limit: at most so many; None = all.
-            page_size: of each request, at most 1,000; None = as large as the limit allows.
+            limit: the largest number of jobs; None = all.
+            page_size: jobs of each request, at most 1,000; None = as many as the limit allows.
         """
         return self._pages(Job, "/v1/jobs", limit, page_size, state=state)
 
     def get(self, job: Job | str) -> Job:
-        """The job as it stands now."""
+        """Return the current state of a job."""
         return Job.of(self._transport.get(_path(job)))
 
     def queue(self, job: Job | str) -> QueuePosition:
-        """The job's place in the queue, and an estimate of when it is done."""
+        """Return the position of a job in the queue, with an estimate of the time until its end."""
         return QueuePosition.of(self._transport.get(f"{_path(job)}/queue"))
 
     def items(
@@ -204,41 +232,60 @@ class Jobs(Resource):
         limit: int | None = None,
         page_size: int | None = None,
     ) -> Iterator[JobItem]:
-        """The items of a job in input order, each with its motion if it has one.
+        """Iterate over the items of a job in input order, each with its motion if it has one.
 
         Args:
             state: only items in this state.
-            review: only items whose motion has this verdict.
+            review: only items whose motion has this review.
+            limit: the largest number of items; None = all.
+            page_size: items of each request, at most 1,000; None = as many as the limit allows.
         """
         return self._pages(JobItem, f"{_path(job)}/items", limit, page_size, state=state, review=review)
 
     def pause(self, job: Job | str, *, reason: str | None = None) -> Job:
-        """Stop giving out items of the job; those being made are finished."""
+        """Stop starting items of a job; running items are finished.
+
+        Args:
+            reason: recorded in the job's events.
+        """
         return self._act(job, "pause", reason=reason)
 
     def resume(self, job: Job | str, *, reason: str | None = None) -> Job:
-        """Go on with a paused job."""
+        """Resume a paused job.
+
+        Args:
+            reason: recorded in the job's events.
+        """
         return self._act(job, "resume", reason=reason)
 
     def cancel(self, job: Job | str, *, reason: str | None = None) -> Job:
-        """Cancel the items that are not done yet; what is done stays."""
+        """Cancel unfinished items; finished ones stay.
+
+        Args:
+            reason: recorded in the job's events.
+        """
         return self._act(job, "cancel", reason=reason)
 
     def retry(self, job: Job | str, *, failed_only: bool = False, reason: str | None = None) -> Job:
-        """Try failed, dead and (unless `failed_only`) cancelled items again."""
+        """Retry failed, dead and cancelled items.
+
+        Args:
+            failed_only: leave cancelled items as they are.
+            reason: recorded in the job's events.
+        """
         return self._act(job, "retry", failed_only=failed_only or None, reason=reason)
 
     def update(self, job: Job | str, *, reason: str | None = None, **changes: Unpack[JobChanges]) -> Job:
         """Change a job.
 
         Args:
-            reason: stands in the job's events.
+            reason: recorded in the job's events.
             changes: priority, comment (None removes it), fail_early (None = never).
         """
         return Job.of(self._transport.patch(_path(job), changes, reason=reason))
 
     def erase(self, job: Job | str) -> Erasure:
-        """Erase the prompts of an ended job for good; its motions, names and tags stay."""
+        """Erase the prompts of an ended job permanently; its motions, names and tags stay."""
         return Erasure.of(self._transport.post(f"{_path(job)}/erase"))
 
     def delete(self, job: Job | str) -> None:
@@ -246,13 +293,13 @@ class Jobs(Resource):
         self._transport.delete(_path(job))
 
     def watch(self, job: Job | str, *, timeout: float | None = None) -> Iterator[Progress]:
-        """The progress of a job, as it comes, until the job has ended; lost connections are taken up where they broke.
+        """Iterate over the progress of a job until it has ended; a connection that breaks is opened again.
 
         Args:
             timeout: seconds; None = no limit.
 
         Raises:
-            TimedOut: `timeout` passed; the job goes on.
+            TimedOut: `timeout` passed; the job continues.
             Unreachable: the server was away for three minutes.
         """
         for view, event in follow_job(self._transport, identifier(job), timeout=timeout, hint=WAIT_HINT):
@@ -261,12 +308,12 @@ class Jobs(Resource):
     def wait(
         self, job: Job | str, *, timeout: float | None = None, on_progress: OnProgress | None = None, check: bool = True
     ) -> Job:
-        """Wait until a job has ended; the job as it ended.
+        """Wait until a job has ended, and return it.
 
         Args:
             timeout: seconds; None = no limit.
             on_progress: called with each change.
-            check: raise where items have no result.
+            check: raise if items have no result.
 
         Raises:
             ItemsFailed: some failed, died or were cancelled.
@@ -288,10 +335,11 @@ class Jobs(Resource):
         return found
 
     def events(self, job: Job | str, *, after: int = 0) -> Iterator[JobEvent]:
-        """The events of a job as they happen. Ends with the job, or with the connection: `watch` goes on by itself.
+        """Iterate over the events of a job as they happen. Ends with the job, or with the connection; `watch` opens it
+        again.
 
         Args:
-            after: the `seq` of the last event that is known.
+            after: the `seq` of the last known event.
         """
         for event in self._transport.events(identifier(job), after):
             yield JobEvent.of(event)
@@ -306,31 +354,32 @@ class Jobs(Resource):
         review: Literal["kept", "rejected", "rerolled"] | None = None,
         prune: bool = False,
         overwrite: bool = False,
-        on_progress: OnFetched | None = None,
+        on_progress: OnFetched | FetchObserver | None = None,
     ) -> Sequence[FetchedItem]:
-        """Fetch the motions that a job has made so far, eight files at a time, with a `manifest.csv` beside them.
+        """Fetch the motions that a job has so far, eight files at a time, with a `manifest.csv`.
 
-        Files that are there are not fetched again, half-fetched ones are continued, and each is checked by its sha256.
+        Complete files are not fetched again, partial ones are continued, and each is verified by its sha256.
 
         Args:
-            folder: made if it is not there.
-            formats: as bvh and npz; None = all there are.
+            folder: created if missing.
+            formats: such as bvh and npz; None = all.
             name_template: of the paths, from `{index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}`.
-            review: only motions with this verdict.
-            prune: remove files of earlier fetches of the job that are not among these.
-            overwrite: replace files that hold something else.
-            on_progress: called with the numbers of fetched files and of all; one call at a time, from any thread.
+            review: only motions with this review.
+            prune: remove files of earlier fetches of the job that this fetch does not include.
+            overwrite: replace files with other content.
+            on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
+                or an observer with a method for each event.
 
         Returns:
             The items in input order, also those without a motion.
 
         Raises:
-            Conflict: a file is there and holds something else, or a format was not made; nothing is fetched then.
-            InvalidFile: what arrived has another sha256, or cannot be written.
+            Conflict: a file exists with other content, or a format was not made; nothing is fetched then.
+            InvalidFile: the data that arrived has another sha256, or cannot be written.
             InvalidInput: the folder cannot be written, or two motions would have one name.
-            Unreachable: the connection breaks again and again; fetching once more goes on.
+            Unreachable: the connection breaks repeatedly; another fetch continues.
         """
-        planned, _ = fetch_job(
+        planned = fetch_job(
             self._transport,
             identifier(job),
             Path(folder),
@@ -339,7 +388,7 @@ class Jobs(Resource):
             review=review,
             prune=prune,
             overwrite=overwrite,
-            observer=None if on_progress is None else _Counting(on_progress),
+            observer=_Counting(on_progress) if callable(on_progress) else on_progress,
         )
         return [
             FetchedItem(item=JobItem.of(item), files={file.url.rpartition("/")[2]: file.path for file in files})
@@ -361,29 +410,26 @@ class Jobs(Resource):
 
 
 class _Counting(FetchObserver):
-    """Counts fetched files."""
+    """An observer that counts fetched files."""
 
-    def __init__(self, told: OnFetched) -> None:
-        self._told = told
+    def __init__(self, on_progress: OnFetched) -> None:
+        self._on_progress = on_progress
         self._lock = threading.Lock()
         self._done = self._total = 0
 
     def planned(self, total: int) -> None:
         self._total = total
-        self._told(0, total)
+        self._on_progress(0, total)
 
-    def fetched(self, download: Download) -> None:
+    def fetched(self, path: Path) -> None:
         with self._lock:
             self._done += 1
-            self._told(self._done, self._total)
+            self._on_progress(self._done, self._total)
 
 
-def _defaults(defaults: Defaults) -> Mapping[str, object]:
-    """The checked defaults; errors name the argument."""
-    try:
-        return defaults_of(**defaults)
-    except InvalidInput as error:
-        raise InvalidInput(error.message, where=(error.where or "").removeprefix("--"), hint=error.hint) from None
+def _given(options: JobOptions) -> dict[str, Any]:
+    """Return the parameters of a request; priority 0 is the default and is not sent."""
+    return {**options, "priority": options.get("priority") or None}
 
 
 def _raws(rows: Iterable[Row]) -> Iterator[object]:
@@ -402,5 +448,7 @@ def _progress(view: Mapping[str, Any], event: Mapping[str, Any] | None) -> Progr
     now = view if event is None else event["data"]
     counters = Counters.of(now["counters"])
     done = counters.succeeded + counters.failed + counters.dead + counters.cancelled
-    told = None if event is None else JobEvent.of(event)
-    return Progress(state=now["state"], done=done, total=view["total"], counters=counters, event=told)
+    change = None if event is None else JobEvent.of(event)
+    return Progress(
+        state=now["state"], done=done, total=view["total"], counters=counters, event=change, job=Job.of(view)
+    )

@@ -17,16 +17,16 @@ class Lines:
     """NDJSON that can be sent as often as it takes, and is never in memory as a whole."""
 
     def __init__(self, objects: Iterable[Mapping[str, Any]]) -> None:
-        """Write all of them down; what reading them raises leaves nothing behind.
+        """Write all objects to a temporary file, which is removed if reading them fails.
 
         Raises:
-            Unreachable: there is no room for them.
+            Unreachable: the disk of temporary files is full.
         """
         self._spool = Spool("the prompts", HINT)
         try:
             for each in objects:
                 self._spool.write(json.dumps(each, ensure_ascii=False).encode() + b"\n")
-            self._spool.rewound()  # what is still to be written is written before anything is sent
+            self._spool.rewound()  # write the buffer before anything is sent
         except BaseException:
             self.__exit__()
             raise

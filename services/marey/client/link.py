@@ -1,4 +1,4 @@
-"""The socket of one stream: opened, kept alive, and taken up again where it broke."""
+"""The WebSocket of one stream, which is opened again after it breaks."""
 
 from __future__ import annotations
 
@@ -28,12 +28,11 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 4.0
 OPEN_SECONDS, CLOSE_SECONDS = 10.0, 1.0
 PING_SECONDS, PONG_SECONDS = 5.0, 10.0
 STEADY_SECONDS = 5.0
-"""A socket that lived so long, or brought a frame, was a good one; attempts are counted from the last good one."""
+"""A socket that was open for so long, or brought a frame, was good; patience counts from the last good one."""
 MOST_WAITING = 1200
-"""Messages that may wait here before the socket is left alone: as many frames as a server keeps."""
+"""Messages that are buffered before reading pauses: as many frames as a server keeps."""
 _REFUSALS = {401: Unauthenticated, 403: Refused, 404: NotFound, 422: InvalidInput}
-"""What the status of an answer that is no socket is told as, and with 4000 added a close code; anything else is tried
-again."""
+"""Errors by the HTTP status of a refused handshake, and with 4000 added by the close code; others are retried."""
 
 NO_UPGRADE = frozenset({400, 405, 422, 426})
 """Statuses of an answer to a handshake that lost its Upgrade on the way; so is a success. The API answers 426, and
@@ -49,12 +48,12 @@ class Link:
     Args:
         server: the socket is at its address, `wss` for `https`.
         stream: the stream's id.
-        slow: what becomes of a client that is slow, `skip` or `pause`.
+        slow: policy for a client that cannot keep up, `skip` or `pause`.
         patience: seconds of failed attempts after which the server counts as unreachable.
 
     Attributes:
-        next: number of the frame from which a socket goes on that is opened anew.
-        sockets: how many were opened.
+        next: number of the frame from which a new socket continues.
+        sockets: number of sockets that were opened.
     """
 
     def __init__(self, server: Server, stream: str, *, slow: str = "skip", patience: float = PATIENCE) -> None:
@@ -81,11 +80,11 @@ class Link:
 
     @property
     def connected(self) -> bool:
-        """Whether there is a socket now."""
+        """True while a socket is open."""
         return self._socket is not None
 
     def send(self, message: dict[str, str]) -> bool:
-        """Send a control message; False when there is no socket to send it through."""
+        """Send a control message; return False if no socket is open."""
         if self._socket is None:
             return False
         try:
@@ -96,13 +95,14 @@ class Link:
         return True
 
     def receive(self, wait: float) -> list[Message]:
-        """All that has arrived, in order: frames as bytes, the rest as objects. Opens the socket where there is none.
+        """Return the messages that have arrived, in order: frames as bytes, others as objects. Opens the socket.
 
         Args:
-            wait: how many seconds to wait when nothing has.
+            wait: seconds to wait for the first message.
 
         Raises:
-            Unauthenticated, Refused, NotFound, InvalidInput: the server will not have us, or does not speak our tongue.
+            Unauthenticated, Refused, NotFound: the server refuses the socket.
+            InvalidInput: the server speaks another protocol.
             Unreachable: attempts failed for longer than the patience lasts.
         """
         if self._refusal is not None:
@@ -122,7 +122,7 @@ class Link:
         return messages
 
     def _open(self, wait: float) -> bool:
-        """A socket, unless it is too early for another attempt, or this one fails."""
+        """Open a socket; return False if it is too early for another attempt, or this one fails."""
         early = self._retry_at - time.monotonic()
         if early > 0:
             time.sleep(min(wait, early))
@@ -143,7 +143,7 @@ class Link:
                 )
             )
         except InvalidURI as error:
-            raise InvalidInput(f"is no address of a server: {error}", where=self._server.url) from error
+            raise InvalidInput(f"is not an address of a server: {error}", where=self._server.url) from error
         except InvalidStatus as error:
             self._answered(error)
         except InvalidUpgrade as error:
@@ -158,10 +158,10 @@ class Link:
         return self._socket is not None
 
     def _answered(self, error: InvalidStatus) -> None:
-        """Set the time of the next attempt after an answer that is no socket: of the API, or of a proxy before it.
+        """Set the time of the next attempt after a refused handshake, by the API or a proxy.
 
         Raises:
-            MareyError: there is to be none.
+            MareyError: another attempt makes no sense.
         """
         answer = error.response
         status, text = answer.status_code, (answer.body or b"").decode(errors="replace")
@@ -184,13 +184,13 @@ class Link:
         try:
             self._failed(closed, code, reason)
         except MareyError as refusal:
-            self._refusal = refusal  # told after the messages that came before it
+            self._refusal = refusal  # raised after the messages that arrived before it
 
     def _failed(self, error: Exception, code: int | None, reason: str) -> None:
         """Set the time of the next attempt.
 
         Raises:
-            MareyError: there is to be none.
+            MareyError: another attempt makes no sense.
         """
         if code is not None and (refusal := _REFUSALS.get(code % 4000)) is not None:
             raise refusal(reason or f"the server refuses the socket ({code})", where=self._address)
@@ -199,7 +199,7 @@ class Link:
             raise Unreachable(
                 f"the stream was out of reach for {self._patience:.0f} s ({reason or error})",
                 where=self._address,
-                hint="It ends by itself when nobody watches it for a minute.",
+                hint="The server ends a stream without viewers after a minute.",
             ) from error
         self._retry_at = now + self._pause * random.uniform(0.8, 1.2)  # noqa: S311
         self._pause = min(self._pause * 2, LONGEST_PAUSE)
@@ -227,5 +227,5 @@ def _read(message: str | bytes) -> Message:
     read = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
     if not isinstance(read.get("type"), str):
         hint = "client and server are of different releases: update the older one"
-        raise InvalidInput(f"the server says {message[:60]!r}, which is no message", where="stream", hint=hint)
+        raise InvalidInput(f"the server sent {message[:60]!r}, which is no message", where="stream", hint=hint)
     return read

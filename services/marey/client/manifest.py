@@ -18,7 +18,7 @@ from marey.exporters import extension_of
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"
-"""Lines that manifests of the folder once had and no longer have, while their files lie there; there is none else."""
+"""Lines of earlier manifests of the folder whose files still exist; the file exists only if there are such lines."""
 PLAIN = re.compile(r"([^/\\:.\x00-\x1f][^/\\:\x00-\x1f]*/)*[^/\\:.\x00-\x1f][^/\\:\x00-\x1f]*")
 """Paths that stay in their folder, as `names.file_name` makes them: no part begins with a dot."""
 RAW_COLUMNS = (
@@ -38,17 +38,17 @@ OTHER = re.compile(r"file:([a-z0-9]{1,16})")
 
 
 def check_manifest(folder: Path, *, overwrite: bool) -> None:
-    """Nothing, if a manifest may be written here.
+    """Check that a manifest may be written to a folder.
 
     Raises:
-        Conflict: there is a `manifest.csv` that we did not write.
+        Conflict: it has a `manifest.csv` of another program.
     """
     if not overwrite:
         _read(folder / NAME)
 
 
 def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
-    """The line of one item of the API; `files` are file names by format."""
+    """Return the line of an item of the API; `files` are file names by format."""
     motion: Mapping[str, Any] = item["motion"] or {}
     review: Mapping[str, Any] = motion.get("review") or {}
     paths = {format if format in FORMATS else f"file:{format}": name for format, name in files.items()}
@@ -72,11 +72,11 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
 def write_manifest(
     folder: Path, job: str, rows: Sequence[Row], *, overwrite: bool = False, whole: bool = True
 ) -> list[Path]:
-    """Write the lines of a job; those of other jobs, whose clips lie in the same folder, stay.
+    """Write the lines of a job; those of other jobs in the same folder stay.
 
     Args:
-        overwrite: replace a `manifest.csv` that we did not write.
-        whole: these are all the lines of the job; else those that stood there of other items stay too.
+        overwrite: replace a `manifest.csv` of another program.
+        whole: the lines are all of the job; False = keep earlier lines of other items too.
 
     Returns:
         Files in the folder that this or an earlier manifest named for the job and the new one does not.
@@ -88,16 +88,16 @@ def write_manifest(
     path = folder / NAME
     before = _known(path, overwrite=overwrite)
     if not whole:
-        told = {row["item"] for row in rows}
-        rows = [*rows, *(row for row in before if row["job"] == job and row["item"] not in told)]
+        named = {row["item"] for row in rows}
+        rows = [*rows, *(row for row in before if row["job"] == job and row["item"] not in named)]
     new = [*(row for row in before if row["job"] != job), *rows]
     left = _record(folder, [*_known(folder / RECORD, overwrite=True), *before], new)
-    _write(path, new)  # after the record: what breaks off here loses no name
+    _write(path, new)  # after the record, so that an interruption loses no name
     return [folder / name for row, name in left if row["job"] == job]
 
 
 def remove_left(folder: Path, left: Iterable[Path]) -> None:
-    """Remove what `write_manifest` gave.
+    """Remove the files that `write_manifest` returned.
 
     Raises:
         InvalidInput: a file cannot be removed.
@@ -114,7 +114,7 @@ def remove_left(folder: Path, left: Iterable[Path]) -> None:
 
 
 def _record(folder: Path, earlier: Iterable[Row], now: Iterable[Row]) -> list[tuple[Row, str]]:
-    """Write down which earlier lines have a file here that no line names now; these files, each with its line."""
+    """Record the earlier lines whose files no current line names; return these files, each with its line."""
     named = {name.casefold() for row in now for name in _files(row)}
     found = {name: row for row in earlier for name in _files(row) if name.casefold() not in named}
     left = [(row, name) for name, row in found.items() if _is_file(folder, name)]
@@ -126,7 +126,7 @@ def _record(folder: Path, earlier: Iterable[Row], now: Iterable[Row]) -> list[tu
 
 
 def _known(path: Path, *, overwrite: bool) -> list[Row]:
-    """The lines of a manifest; none of one that is not ours, if that may go."""
+    """Return the lines of a manifest; of another program's file none if it may be overwritten."""
     try:
         return _read(path)
     except Conflict:
@@ -136,7 +136,7 @@ def _known(path: Path, *, overwrite: bool) -> list[Row]:
 
 
 def _files(row: Row) -> list[str]:
-    """The names of a line's files. Anybody may have written the line: what is no plain name of a clip is left out."""
+    """Return the names of a line's files; names that are not plain are skipped, because the line may be forged."""
     columns = (*FORMATS, *_others(row))
     names = ((row[column], f".{extension_of(column.removeprefix('file:'))}") for column in columns)
     return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
@@ -171,7 +171,7 @@ def _write(path: Path, rows: Iterable[Row]) -> None:
 
 
 def _read(path: Path) -> list[Row]:
-    """The lines of a manifest of ours; none where there is no file."""
+    """Return the lines of a manifest; none if there is no file."""
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.DictReader(stream, strict=True)
@@ -187,9 +187,10 @@ def _read(path: Path) -> list[Row]:
     except OSError as error:
         raise InvalidInput(f"cannot be read: {error.strerror}", where=str(path)) from error
     raise Conflict(
-        "already exists and is no manifest of fetched motions",
+        "already exists and is not a manifest of fetched motions",
         where=str(path),
-        hint="Choose another folder, or --overwrite.",
+        hint="Choose another folder, or pass overwrite=True.",
+        argument="overwrite",
     )
 
 

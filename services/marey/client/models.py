@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from urllib.parse import quote
 
-from marey.client.resources import Resource
-from marey.client.types import Model
+from marey.client.resources import Resource, identifier
+from marey.client.types.models import Model, ModelCatalogue
 
 
 class Models(Resource):
-    """`client.models`."""
+    """`client.models`. Errors of all methods: Refused, Unreachable."""
 
     def list(self) -> Iterator[Model]:
-        """The bundles of the server."""
-        for each in self._transport.get("/v1/models").get("items", ()):
-            yield Model.of(each)
+        """Iterate over the bundles of the server."""
+        yield from self.catalogue().items
 
     def get(self, name: str) -> Model:
-        """A bundle by the name of a model, a bundle or an exact bundle."""
-        return Model.of(self._transport.get(f"/v1/models/{quote(name, safe='')}"))
+        """Return a bundle.
+
+        Args:
+            name: of a model, a bundle or an exact bundle.
+
+        Raises:
+            NotFound: there is no such bundle.
+        """
+        return Model.of(self._transport.get(f"/v1/models/{identifier(name)}"))
+
+    def catalogue(self) -> ModelCatalogue:
+        """Return the bundles of the server, and those that it leaves out because they are broken."""
+        return ModelCatalogue.of(self._transport.get("/v1/models"))

@@ -1,4 +1,4 @@
-"""Motions: find them, look at them, and say which are good."""
+"""Motions: find, review and fetch them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 from marey.client.fetching import FORMAT, Download, check_folder, download_all
 from marey.client.resources import Resource, identifier, identifiers
-from marey.client.types import Job, Motion, MotionDetail, Reroll
+from marey.client.types.jobs import Job
+from marey.client.types.motions import Motion, MotionDetail, Reroll
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.extras import needs_extra
 from marey.exporters import extension_of
@@ -25,7 +26,7 @@ Some = Motion | str | Iterable[Motion | str]
 
 
 class Motions(Resource):
-    """`client.motions`."""
+    """`client.motions`. Errors of all methods: NotFound, InvalidInput, Refused, Unreachable."""
 
     def list(
         self,
@@ -38,15 +39,16 @@ class Motions(Resource):
         limit: int | None = None,
         page_size: int | None = None,
     ) -> Iterator[Motion]:
-        """The motions that fit everything given, newest first; of a job, in the order they were made.
+        """Iterate over the motions that match all filters, newest first; those of a job in the order they were made.
 
         Args:
-            tags: as they were given, such as `shot=010`; all of them.
-            name: how the name begins.
+            job: only motions of this job.
+            tags: only motions with all of these tags, such as `shot=010`.
+            name: only motions whose name begins with this.
             text: words of the prompt in any form; `"a phrase"`, `or`, `-not`.
-            reviews: verdicts; any of them. `new` = none yet.
-            limit: at most so many; None = all.
-            page_size: of each request, at most 1,000; None = as large as the limit allows.
+            reviews: only motions with one of these reviews; `new` = not reviewed.
+            limit: the largest number of motions; None = all.
+            page_size: motions of each request, at most 1,000; None = as many as the limit allows.
         """
         wanted = None if job is None else identifier(job)
         tag, review = list_or_none(tags), list_or_none(reviews)
@@ -54,17 +56,22 @@ class Motions(Resource):
         return self._pages(Motion, "/v1/motions", limit, page_size, **params)
 
     def search(self, text: str, *, limit: int | None = None) -> Iterator[Motion]:
-        """The motions whose prompts hold the words of a text, newest first; see `list`."""
+        """Iterate over the motions whose prompts contain the words of a text, newest first; see `list`."""
         return self.list(text=text, limit=limit)
 
     def get(self, motion: Motion | str) -> MotionDetail:
-        """A motion with its metadata: the rewritten prompt, its graph, the settings, the software."""
+        """Return a motion with its metadata: the rewritten prompt, its graph, the settings, the software."""
         return MotionDetail.of(self._transport.get(f"/v1/motions/{identifier(motion)}"))
 
     def review(
         self, motions: Some, verdict: Literal["kept", "rejected"] | None, *, comment: str | None = None
     ) -> Sequence[Motion]:
-        """Set the verdict of motions; None takes it back."""
+        """Set the review of motions.
+
+        Args:
+            verdict: kept or rejected; None removes the review.
+            comment: of the review.
+        """
         return [
             Motion.of(each)
             for some in _batches(motions)
@@ -74,21 +81,21 @@ class Motions(Resource):
         ]
 
     def keep(self, motions: Some, *, comment: str | None = None) -> Sequence[Motion]:
-        """Say that motions are good: `client.jobs.fetch(…, review="kept")` fetches them."""
+        """Mark motions as kept: `client.jobs.fetch(…, review="kept")` fetches them."""
         return self.review(motions, "kept", comment=comment)
 
     def reject(self, motions: Some, *, comment: str | None = None) -> Sequence[Motion]:
-        """Say that motions are no good; nothing is deleted."""
+        """Mark motions as rejected; nothing is deleted."""
         return self.review(motions, "rejected", comment=comment)
 
     def clear(self, motions: Some) -> Sequence[Motion]:
-        """Take back what was said of motions."""
+        """Remove the reviews of motions."""
         return self.review(motions, None)
 
     def reroll(self, motions: Some, *, comment: str | None = None) -> Sequence[Reroll]:
-        """Make motions again with the next seed, everything else as it was: a new item in the same job.
+        """Generate motions again with the next seed, otherwise unchanged: a new item in the same job.
 
-        Asked twice, it is done once; to go on, re-roll the new motion.
+        A repeated call has no further effect; to continue, re-roll the new motion.
         """
         return [
             Reroll.of(each)
@@ -97,30 +104,47 @@ class Motions(Resource):
         ]
 
     def fetch(self, motion: Motion | str, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Fetch a file of a motion, resumed and checked by its sha256; the ending of the path says which, as `.bvh`.
+        """Fetch a file of a motion, resumed where an earlier fetch broke off and verified by its sha256.
+
+        Args:
+            path: its ending names the format, such as `.bvh`.
+            overwrite: replace a file with other content.
 
         Raises:
             NotFound: the motion has no such file.
-            Conflict: a file is there and holds something else.
-            InvalidFile: what arrived has another sha256, or cannot be written.
+            Conflict: the file exists with other content.
+            InvalidInput: the folder cannot be written.
+            InvalidFile: the data that arrived has another sha256, or cannot be written.
         """
         path = Path(path)
         found = motion if isinstance(motion, Motion) else self.get(motion)
-        file_format = path.suffix.removeprefix(".").lower()
-        file = next((file for file in found.files if file_format in (file.format, extension_of(file.format))), None)
-        if file is None or not FORMAT.fullmatch(file.format):
-            formats = ", ".join(file.format for file in found.files)
-            raise NotFound(
-                f"has no {file_format or 'such'} file", where=f"motion {found.id}", hint=f"It has {formats}."
-            )
+        download = _download(found, path.suffix.removeprefix(".").lower(), path)
         check_folder(path.parent)
-        url = f"/v1/motions/{identifier(found)}/files/{file.format}"
-        download = Download(url, file.sha256, file.size, path)
         download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
         return path
 
+    def fetch_all(
+        self, motions: Iterable[Motion], folder: str | Path, *, file_format: str = "npz", overwrite: bool = False
+    ) -> Sequence[Path]:
+        """Fetch a file of each motion, eight at a time; the files are named by the ids of the motions.
+
+        Args:
+            folder: created if missing.
+            file_format: such as npz or bvh.
+            overwrite: replace files with other content.
+
+        Raises:
+            NotFound, Conflict, InvalidInput, InvalidFile: as `fetch`.
+        """
+        place = check_folder(Path(folder))
+        downloads = [
+            _download(motion, file_format, place / f"{motion.id}.{extension_of(file_format)}") for motion in motions
+        ]
+        download_all(self._transport, downloads, overwrite=overwrite, done=lambda _: None)
+        return [download.path for download in downloads]
+
     def load(self, motion: Motion | str) -> MotionClip:
-        """Fetch a motion as a clip in memory. Needs the extra `motion`.
+        """Fetch a motion as a clip in memory; needs the extra `motion`.
 
         Raises:
             NotFound: the motion has no npz.
@@ -138,19 +162,37 @@ class Motions(Resource):
                 raise
 
 
+def _download(motion: Motion, wanted: str, path: Path) -> Download:
+    """Return the download of a file of a motion.
+
+    Args:
+        wanted: its format or its extension.
+
+    Raises:
+        NotFound: the motion has no such file.
+    """
+    file = next((file for file in motion.files if wanted in (file.format, extension_of(file.format))), None)
+    if file is None or not FORMAT.fullmatch(file.format):
+        formats = ", ".join(file.format for file in motion.files)
+        hint = f"It has {formats}." if formats else "If its prompt is being erased, wait a moment."
+        raise NotFound(f"has no {wanted or 'such'} file", where=f"motion {motion.id}", hint=hint)
+    url = f"/v1/motions/{identifier(motion)}/files/{file.format}"
+    return Download(url, file.sha256, file.size, path)
+
+
 def list_or_none(values: Sequence[str] | None) -> Sequence[str] | None:
-    """The values of a repeated parameter; None where there is none."""
+    """Return the values of a repeated parameter; None for an empty one."""
     return [*values] if values else None
 
 
 def _batches(motions: Some) -> Iterator[Sequence[str]]:
-    """The ids, each once, as many as one request takes at a time.
+    """Yield the ids, each once, in lists of the size of one request.
 
     Raises:
-        InvalidInput: there is none.
+        InvalidInput: there is no id.
     """
     ids = list(dict.fromkeys(identifiers(motions)))
     if not ids:
-        raise InvalidInput("there is no motion", hint="Give at least one motion or id.")
+        raise InvalidInput("no motion is given", hint="Give at least one motion or id.")
     for first in range(0, len(ids), MOST):
         yield ids[first : first + MOST]

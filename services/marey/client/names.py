@@ -32,7 +32,7 @@ _UNSAFE = re.compile(r'[<>:"/\\|?*]')
 
 @dataclass(frozen=True)
 class Naming:
-    """What a template may speak of. `index` counts prompts from 0; `name` is the item's name, else a slug."""
+    """The values of a template. `index` counts prompts from 0; `name` is the item's name, else a slug."""
 
     index: int
     name: str
@@ -60,7 +60,7 @@ _Component = tuple[str | _Field, ...]
 
 
 def slug(text: str, limit: int = MAX_SLUG) -> str:
-    """The words of a prompt as a plain file name: `A person waves!` → `a-person-waves`."""
+    """Return the words of a prompt as a plain file name: `A person waves!` → `a-person-waves`."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
     words = re.sub(r"[^a-z0-9]+", "-", plain).strip("-")
     if len(words) > limit:
@@ -69,7 +69,7 @@ def slug(text: str, limit: int = MAX_SLUG) -> str:
 
 
 def safe_component(text: str) -> str:
-    """The text as a name that every file system takes, with an ending behind it or as a folder.
+    """Return the text as a name that every file system accepts, with an extension or as a folder.
 
     Unicode is NFC; separators, control characters and what Windows does not take become `_`; a name of a device, a dot
     or a dash at the beginning gets `_` in front.
@@ -81,7 +81,7 @@ def safe_component(text: str) -> str:
 
 
 def check_template(template: str) -> str:
-    """The template, if it makes a path inside its folder from each item.
+    """Check that a template makes a path inside its folder from each item, and return it.
 
     Raises:
         InvalidInput: it names an unknown field, or could leave the folder.
@@ -91,7 +91,7 @@ def check_template(template: str) -> str:
 
 
 def file_name(template: str, naming: Naming, extension: str) -> str:
-    """The path of one motion's file from its folder, with `/` between its parts.
+    """Return the path of a motion's file relative to its folder, with `/` between its parts.
 
     Raises:
         InvalidInput: the item lacks a tag, or the template is as in `check_template`.
@@ -100,7 +100,7 @@ def file_name(template: str, naming: Naming, extension: str) -> str:
 
 
 class FileNames:
-    """Paths of the files of one run, of which no two motions have the same."""
+    """Paths of the files of one run, unique for each motion."""
 
     def __init__(self, template: str) -> None:
         self._template = template
@@ -108,28 +108,34 @@ class FileNames:
         self._owners: dict[str, Hashable] = {}
 
     def of(self, motion: Hashable, naming: Naming, extension: str) -> str:
-        """The path of a motion's file, which is told from the others by `motion`.
+        """Return the path of a motion's file.
+
+        Args:
+            motion: identifies the motion.
 
         Raises:
-            InvalidInput: as `file_name`; or another motion has it, also where systems do not tell cases apart.
+            InvalidInput: as `file_name`; or another motion has the path, also on systems that ignore case.
         """
         stem = _path(self._components, self._template, naming, values_of(naming.tags))
         name = f"{stem}.{extension}"
         if self._owners.setdefault(_as_compared(name), motion) != motion:
             raise InvalidInput(
-                f"two motions would be written to {name}", where="--name-template", hint="Put {index} and {seed} in."
+                f"two motions would be written to {name}",
+                where="name_template",
+                hint="Put {index} and {seed} in.",
+                argument="name_template",
             )
         return name
 
 
 def values_of(tags: Sequence[str]) -> dict[str, str]:
-    """What tags such as `shot=010` say, by their key; the first of a key counts."""
+    """Return the values of tags such as `shot=010` by their key; the first of a key counts."""
     pairs = (tag.partition("=") for tag in reversed(tags) if "=" in tag)
     return {key.strip(): value.strip() for key, _, value in pairs}
 
 
 def _as_compared(path: str) -> str:
-    """The path as systems compare it that tell neither cases nor spellings of one letter apart."""
+    """Return the path as systems compare it that ignore case and Unicode normalisation."""
     return unicodedata.normalize("NFC", "".join(c for c in path if c not in MARKS).casefold())
 
 
@@ -137,7 +143,7 @@ def _parse(template: str) -> list[_Component]:
     """The components of a template's path.
 
     Raises:
-        InvalidInput: it is no template, names an unknown field, or is no path inside a folder.
+        InvalidInput: it is not a template, names an unknown field, or leads out of the folder.
     """
     components: list[list[str | _Field]] = [[]]
     try:
@@ -174,8 +180,7 @@ def _path(components: Sequence[_Component], template: str, naming: Naming, tags:
     """The path without its ending.
 
     Args:
-        tags: values by key; None = the template itself is looked at: every tag has a value, and nothing but values may
-            need to be made safe.
+        tags: values by key; None = check the template itself: every tag has a value, and only values may be unsafe.
     """
     made: list[str] = []
     for component in components:
@@ -211,10 +216,10 @@ def _formatted(field: _Field, template: str, naming: Naming, tags: Mapping[str, 
 
 
 def _fitted(texts: list[str], cuttable: Sequence[int]) -> str:
-    """All texts in one, the longest of the cuttable ones shortened until they fit into `MAX_BYTES`.
+    """Join texts, and shorten the longest of the cuttable ones until the result fits into `MAX_BYTES`.
 
     Raises:
-        InvalidInput: they cannot.
+        InvalidInput: it cannot fit.
     """
     texts = [unicodedata.normalize("NFC", text) for text in texts]
     while (over := len("".join(texts).encode("utf-8", "replace")) - MAX_BYTES) > 0:
@@ -228,7 +233,7 @@ def _fitted(texts: list[str], cuttable: Sequence[int]) -> str:
 
 
 def _invalid(message: str) -> InvalidInput:
-    return InvalidInput(message, where="--name-template", hint=_HINT)
+    return InvalidInput(message, where="name_template", hint=_HINT, argument="name_template")
 
 
 _HINT = (

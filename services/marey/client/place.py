@@ -1,4 +1,4 @@
-"""Where the server is: `MAREY_SERVER` and `MAREY_KEY`, else the `server.json` of a `marey serve` on this machine."""
+"""The address of the server: `MAREY_SERVER` and `MAREY_KEY`, else `server.json` of a `marey serve` on this machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HINT = "Delete it and start `marey serve` again."
 
 @dataclass(frozen=True)
 class Server:
-    """A server to talk to. `pid` is known only for one that runs here."""
+    """A server; `pid` is known only for one that runs on this machine."""
 
     url: str
     key: str
@@ -40,24 +40,24 @@ def ca_file() -> Path | None:
 
 
 def find_server() -> Server:
-    """The server that commands talk to.
+    """Return the server that the environment names, or that runs on this machine.
 
     Raises:
-        Unreachable: none is named and none runs here.
-        Unauthenticated: one is named, but no key.
+        Unreachable: no server is named, and none runs here.
+        Unauthenticated: a server is named, but no key.
     """
     url = os.environ.get("MAREY_SERVER")
     return server_at(url) if url else _local_server()
 
 
 def server_at(url: str, key: str | None = None) -> Server:
-    """The server at a URL.
+    """Return the server at a URL.
 
     Args:
         key: None = that of `MAREY_KEY` or `MAREY_KEY_FILE`.
 
     Raises:
-        InvalidInput: that is no URL.
+        InvalidInput: it is not a URL.
         Unauthenticated: there is no key.
     """
     if not url.startswith(("http://", "https://")):
@@ -76,7 +76,7 @@ def write_server(server: Server, folder: Path) -> None:
 
 
 def read_server(folder: Path) -> Server | None:
-    """The server that `folder/server.json` names; None = no such file."""
+    """Return the server that `folder/server.json` names; None = no such file."""
     path = folder / "server.json"
     try:
         fields = read_json(path, limit=MAX_BYTES, hint=HINT)

@@ -1,12 +1,12 @@
-"""The BVH file that a live stream is recorded to while it is made. Writing needs the extra `motion`."""
+"""The BVH file that a live stream is written to while it runs. Writing needs the extra `motion`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from marey.client.frames import read_frame
+from marey.client.frames import Frame
+from marey.client.types.streams import StreamDetail
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
 
@@ -15,20 +15,24 @@ if TYPE_CHECKING:
 
 
 class Recording:
-    """The BVH file that grows with the stream; row n is frame n, also across gaps.
+    """A BVH file that grows with the stream; row n is frame n, also across missing frames.
 
     Args:
-        path: the file; it is there from the first frame on.
+        path: the file; it exists from the first frame on.
+        overwrite: replace an existing file.
 
     Raises:
         InvalidInput: not a `.bvh`, or numpy is not installed.
-        Conflict: it is there already.
+        Conflict: it exists.
     """
 
     def __init__(self, path: Path, *, overwrite: bool) -> None:
         if path.suffix.lower() != ".bvh":
-            hint = "--fetch brings the other formats when the stream is over."
-            raise InvalidInput("only a .bvh can grow while it is made", where=str(path), hint=hint)
+            raise InvalidInput(
+                "only a .bvh can grow with a stream",
+                where=str(path),
+                hint="Fetch the other formats from the stream's job after its end.",
+            )
         try:
             from marey.motion.io.bvh_live import check_place
         except ImportError as error:
@@ -40,15 +44,14 @@ class Recording:
 
     @property
     def path(self) -> Path | None:
-        """The file; None while it has no frame."""
+        """The absolute path of the file; None while it has no frame."""
         return self._path.absolute() if self._file is not None and self._file.frames else None
 
-    def add(self, data: bytes, stream: Mapping[str, Any]) -> None:
-        """Write a frame.
+    def add(self, frame: Frame, stream: StreamDetail) -> None:
+        """Write a frame, and before it the missing ones.
 
         Args:
-            data: the frame.
-            stream: the stream as the server describes it, with its skeleton.
+            stream: with its skeleton.
 
         Raises:
             MareyError: the frame, the skeleton or the file cannot be used.
@@ -57,28 +60,25 @@ class Recording:
 
         if self._file is None:
             self._file = self._open(stream)
-        frame = read_frame(data, joints=len(self._file.skeleton))
         rotations, root = np.array(frame.rotations, np.float32), np.array(frame.root, np.float32)
         self._file.add(rotations, root, missing=frame.number - self._file.frames)
 
     def close(self) -> None:
-        """Nothing more comes."""
+        """Close the file; its path stays known."""
         if self._file is not None:
             self._file.close()
 
-    def _open(self, stream: Mapping[str, Any]) -> LiveBVH:
+    def _open(self, stream: StreamDetail) -> LiveBVH:
         import numpy as np
 
         from marey.motion.io.bvh_live import LiveBVH
         from marey.motion.skeleton import skeleton_of
 
+        where, tree = f"stream {stream.id}", stream.skeleton
+        if tree is None or stream.fps is None:
+            raise InvalidInput("the server describes no skeleton", where=where)
         try:
-            tree = stream["skeleton"]
-            parents = tuple(int(parent) for parent in tree["parents"])
-            offsets = np.array(tree["offsets"], np.float32)
-            skeleton = skeleton_of(tuple(str(name) for name in tree["names"]), parents, offsets)
-            return LiveBVH.open(self._path, skeleton, float(stream["fps"]), overwrite=self._overwrite)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InvalidInput(
-                f"the server describes no skeleton: {error!r}", where=f"stream {stream['id']}"
-            ) from error
+            skeleton = skeleton_of(tree.names, tree.parents, np.array(tree.offsets, np.float32))
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(f"the server's skeleton cannot be used: {error}", where=where) from error
+        return LiveBVH.open(self._path, skeleton, stream.fps, overwrite=self._overwrite)

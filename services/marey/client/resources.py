@@ -25,7 +25,7 @@ class Resource:
     def _pages(
         self, kind: type[R], path: str, limit: int | None, page_size: int | None = None, **params: Any
     ) -> Iterator[R]:
-        """The elements of a listing, page after page, as they are asked for; at most `limit`."""
+        """Iterate over the elements of a listing, at most `limit`; pages are requested as the caller proceeds."""
         if page_size is None:
             page_size = PAGE if limit is None else max(1, min(limit, PAGE))
         found = self._transport.pages(path, **params, limit=page_size)
@@ -34,7 +34,7 @@ class Resource:
 
 
 def identifier(of: Result | str) -> str:
-    """The id of a result, or the id itself, as one part of a path.
+    """Return the id of a result, or the id itself, as one part of a path.
 
     Raises:
         InvalidInput: it is empty, or would be another path.
@@ -46,6 +46,6 @@ def identifier(of: Result | str) -> str:
 
 
 def identifiers(of: Result | str | Iterable[Result | str]) -> list[str]:
-    """The ids of one or several objects."""
+    """Return the ids of one or several objects."""
     several = [of] if isinstance(of, Result | str) else of
     return [each if isinstance(each, str) else str(getattr(each, "id", "")) for each in several]

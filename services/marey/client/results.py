@@ -46,7 +46,7 @@ class Result:
 
 @cache
 def _converters(kind: type[Result]) -> tuple[tuple[str, Convert | None], ...]:
-    """The fields of a class of results, each with the function that converts its JSON value; None = no conversion."""
+    """Return the fields of a class of results, each with the converter of its JSON value; None = no conversion."""
     hints = get_type_hints(kind)
     return tuple((each.name, _converter(hints[each.name])) for each in fields(kind) if each.name != "raw")
 

@@ -1,4 +1,4 @@
-"""Prompts from the command line and from CSV, JSONL and text files, with the line number of each problem."""
+"""Prompts from a program and from CSV, JSONL and text files, with the line number of each problem."""
 
 from __future__ import annotations
 
@@ -27,26 +27,25 @@ from marey.items.item import (
     check_count,
     names_model,
     read_json,
-    read_setting,
     read_values,
 )
 
 Format = Literal["csv", "jsonl", "txt"]
 STAND_IN = "a person walks"
-"""Prompt of an item whose own cannot be used, where its other fields are checked."""
+"""Prompt of an item whose own prompt is invalid, so that its other fields can be checked."""
 NO_DEFAULTS: Mapping[str, object] = MappingProxyType({})
 
 
 class PromptReader:
     """Items of a file or of arguments, read once, with the line of each and with all problems.
 
-    Iterating gives an item for each row, also for rows with problems where their fields can be held against the ranges
-    of a model: such an item has only those fields. Look at `total` before using the items.
+    Iterating gives an item for each row, also for rows with problems if their fields can be checked against the ranges
+    of a model: such an item has only those fields. Check `total` before using the items.
 
     Attributes:
-        where: what messages call the source.
-        lines: of each item that was given.
-        total: problems found.
+        where: the name of the source in messages.
+        lines: the line of each item.
+        total: number of problems.
     """
 
     def __init__(self, raws: Rows, where: str) -> None:
@@ -79,7 +78,7 @@ class PromptReader:
                 raise
             self.add([Problem(error.line, None, f"{error.message}; the lines below it were not read. {error.hint}")])
         if not self.lines and not self.total:
-            raise InvalidInput("there is no prompt in it", where=self.where, hint="Give at least one prompt.")
+            raise InvalidInput("it contains no prompt", where=self.where, hint="Give at least one prompt.")
 
     def add(self, problems: Iterable[Problem]) -> None:
         """Add problems of lines of the source."""
@@ -89,12 +88,12 @@ class PromptReader:
                 self._problems.append(problem)
 
     def located(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Problems of the items, which are counted from 1 as they were given, with their lines in the source."""
+        """Return problems of items, which are counted from 1, with their lines in the source."""
         return located(problems, self.lines)
 
     @contextmanager
     def in_source(self) -> Generator[None]:
-        """In here a server's `InvalidItems` about the items becomes `error`: with the source and its lines."""
+        """Let a server's `InvalidItems` in the block name the source and its lines, as `error` does."""
         try:
             yield
         except InvalidItems as error:
@@ -105,15 +104,16 @@ class PromptReader:
             raise self.error() from None
 
     def error(self, *, hint: str | None = None) -> InvalidItems:
-        """All problems, by line."""
+        """Return the error with all problems, by line."""
         found = sorted(self._problems, key=lambda problem: problem.line or 0)
         extra = any("is not a known column" in problem.message for problem in found)
         hints = [EXTRA_HINT if extra else "Correct them and try again.", *([hint] if hint else [])]
-        return InvalidItems(found, where=self.where, total=self.total, hint=" ".join(hints))
+        argument = "extra_columns" if extra else None
+        return InvalidItems(found, where=self.where, total=self.total, hint=" ".join(hints), argument=argument)
 
 
 def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Problem]:
-    """Problems whose lines count what was read from a file, with the lines of the file."""
+    """Return problems whose lines count the items of a file with the lines of the file."""
 
     def place(problem: Problem) -> Problem:
         number = problem.line
@@ -137,53 +137,45 @@ def defaults_of(
     variants: int | None = None,
     fps: float | None = None,
     tags: Sequence[str] | None = None,
-    settings: Sequence[str] | None = None,
+    settings: Mapping[str, float] | None = None,
 ) -> Mapping[str, object]:
-    """The fields of a row where it says nothing itself, from the options of the command; tags come beside its own.
+    """Return the checked fields of rows that do not set them; tags are added to a row's own.
+
+    Args:
+        bundle: names the model more exactly.
+        fps: of the files, one of the settings.
 
     Raises:
-        InvalidInput: one cannot be; by the name of its option.
+        InvalidInput: a field is out of range; the error names its argument.
     """
-    sampling = _sampling_of(settings or (), fps)
+    sampling = {**(settings or {}), **({} if fps is None else {OUTPUT_FPS: fps})}
     given = (
-        ("--model", "model", model),
-        ("--bundle", "model", bundle),  # names it more exactly
-        ("--seconds", "seconds", seconds),
-        ("--seed", "seed", seed),
-        ("--variants", "variants", variants),
-        ("--set" if settings else "--fps", "settings", sampling or None),
-        ("--tag", "tags", tags or None),
+        ("model", "model", model),
+        ("bundle", "model", bundle),
+        ("seconds", "seconds", seconds),
+        ("seed", "seed", seed),
+        ("variants", "variants", variants),
+        ("settings" if settings else "fps", "settings", sampling or None),
+        ("tags", "tags", tags or None),
     )
     found: dict[str, object] = {}
-    for option, field, value in given:
+    for argument, field, value in given:
         if value is None:
             continue
         try:
             found[field] = CHECKS[field](value)
         except InvalidInput as error:
-            raise InvalidInput(error.message, where=option, hint=error.hint) from None
+            raise InvalidInput(error.message, where=argument, hint=error.hint, argument=argument) from None
     return found
 
 
-def _sampling_of(given: Sequence[str], fps: float | None) -> dict[str, float]:
-    """Settings of `--set` and `--fps` together."""
-    found: dict[str, float] = {}
-    try:
-        for text in given:
-            name, value = read_setting(text)
-            found[name] = value
-    except InvalidInput as error:
-        raise InvalidInput(error.message, where="--set", hint=error.hint) from None
-    return found if fps is None else {**found, OUTPUT_FPS: fps}
-
-
 def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
-    """Items of prompts given as arguments; a problem names the number of the argument."""
+    """Read prompts given as arguments; a problem names the number of the argument."""
     return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT")
 
 
 def read_rows(raws: Iterable[object], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
-    """Items of the rows of a program; a problem names the number of the row, from 1."""
+    """Read the rows of a program; a problem names the number of the row, from 1."""
     return PromptReader(((number, _completed(raw, defaults)) for number, raw in enumerate(raws, 1)), "rows")
 
 
@@ -193,14 +185,14 @@ def read_file(
     defaults: Mapping[str, object] = NO_DEFAULTS,
     extra_columns: ExtraColumns = "refuse",
 ) -> PromptReader:
-    """Items of a file, or of stdin for `-`.
+    """Read the items of a file, or of stdin for `-`.
 
     Args:
         path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also packed
             as `.gz`, or `-`.
         file_format: for `-` and other endings; stdin is otherwise guessed from its first line.
-        defaults: fields of a line where it says nothing itself.
-        extra_columns: what happens to columns of a table that are not known.
+        defaults: fields of lines that do not set them.
+        extra_columns: treatment of unknown columns of a table.
     """
     lines = rows_of_file(path, file_format, extra_columns=extra_columns)
     return PromptReader(((number, _completed(raw, defaults)) for number, raw in lines), where_of(path))
@@ -246,10 +238,10 @@ def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
 def read_evaluation_prompts(
     path: str, *, extra_columns: ExtraColumns = "refuse", check: PromptCheck | None = None
 ) -> tuple[tuple[EvaluationPrompt, ...], list[int | None]]:
-    """Prompts of an evaluation, and the line of each; columns `prompt`, `seconds` and `expected`.
+    """Read the prompts of an evaluation, and the line of each; columns `prompt`, `seconds` and `expected`.
 
     Args:
-        check: gives what else is wrong with the fields of a row that can be used.
+        check: returns further problems of a row that can be used.
 
     Raises:
         InvalidItems, InvalidFile, TooLarge, NotFound, InvalidInput: as `items_from_file`.
@@ -270,14 +262,17 @@ def rows_of_file(
     columns: Sequence[str] = COLUMNS,
     extra_columns: ExtraColumns = "refuse",
 ) -> Rows:
-    """The lines of a file with their numbers, as they are read; only that a table has known columns is checked.
+    """Iterate over the lines of a file with their numbers; only the columns of a table are checked.
 
     Raises:
         InvalidItems, InvalidFile, NotFound, TooLarge, InvalidInput: as `items_from_file`.
     """
     with open_text(path, limit=MAX_BODY_BYTES) as text:
         lines = enumerate(text, 1)
-        chosen, first = (file_format or _by_ending(path), []) if file_format or path != "-" else _guess(lines)
+        if file_format is None and path == "-":
+            chosen, first = _guess(lines)
+        else:
+            chosen, first = file_format or _by_ending(path, selectable=columns is COLUMNS), []
         lines = itertools.chain(first, lines)
         if chosen == "csv":
             yield from csv_rows(lines, columns, extra_columns)
@@ -286,7 +281,7 @@ def rows_of_file(
 
 
 def _completed(raw: object, defaults: Mapping[str, object]) -> object:
-    """A row with the defaults for what it does not say; settings are told one by one, tags put together."""
+    """Return a row with the defaults for fields that it does not set; settings and tags are merged."""
     if not defaults or not isinstance(raw, Mapping):
         return raw
     row = cast("Mapping[object, object]", raw)
@@ -301,20 +296,30 @@ def _completed(raw: object, defaults: Mapping[str, object]) -> object:
     return whole
 
 
-def _by_ending(path: str) -> Format:
+def _by_ending(path: str, *, selectable: bool) -> Format:
+    """Return the format that a file's ending names.
+
+    Args:
+        selectable: the caller may choose a format for other endings.
+
+    Raises:
+        InvalidInput: another ending.
+    """
     name = path.lower().removesuffix(GZIP_ENDING)
     for ending in ("csv", "jsonl", "txt"):
         if name.endswith(f".{ending}"):
             return ending
+    hint = "Name it .csv, .jsonl or .txt (.gz too)"
     raise InvalidInput(
-        "the file's ending does not tell its format",
+        "the file's ending does not name its format",
         where=path,
-        hint="Name it .csv, .jsonl or .txt (.gz too); where the command has --input-format, that will do.",
+        hint=f"{hint}, or choose file_format." if selectable else f"{hint}.",
+        argument="file_format" if selectable else None,
     )
 
 
 def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
-    """The format, by the first line that is not blank, and what was read to see it."""
+    """Return the format that the first line suggests that is not blank, and the lines that were read."""
     read: list[tuple[int, str]] = []
     for number, line in lines:
         if not is_blank(line):

@@ -1,4 +1,4 @@
-"""Tables of prompts: their delimiter, their columns, and what each row says, with the line where it begins."""
+"""Tables of prompts: their delimiter, columns and rows, each with the line where it begins."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ ExtraColumns = Literal["refuse", "tag", "ignore"]
 DELIMITERS = (",", ";", "\t")
 BLANK = " \t\r\n\ufeff\xa0"
 """White space trimmed from cells; control characters are not, so that the check of the field refuses them."""
-EXTRA_HINT = "Rename or remove the columns, or choose --extra-columns tag or ignore."
+EXTRA_HINT = "Rename or remove the columns, or choose extra_columns tag or ignore."
 
 
 @dataclass(frozen=True)
 class Column:
-    """How one column is read.
+    """The interpretation of a column.
 
     Attributes:
         field: of the row; None = the cell is not read.
@@ -41,7 +41,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Header:
-    """How the cells of a table are read."""
+    """The interpretation of a table's cells."""
 
     columns: Sequence[Column]
     text: Callable[[str], str] = str
@@ -49,11 +49,12 @@ class Header:
 
 
 def csv_rows(lines: Lines, columns: Sequence[str], extra: ExtraColumns = "refuse") -> Rows:
-    """The rows below the header, each with the line where it begins; a row or column that is wrong is `Unreadable`.
+    """Iterate over the rows below the header, each with the line where it begins; an invalid row or column is
+    `Unreadable`.
 
     Args:
-        columns: known ones. A table that has all columns of our `manifest.csv` may have those too.
-        extra: what happens to other columns.
+        columns: known ones. A table that has all columns of `manifest.csv` may have those too.
+        extra: treatment of other columns.
     """
     at = 0
 
@@ -90,7 +91,7 @@ def csv_rows(lines: Lines, columns: Sequence[str], extra: ExtraColumns = "refuse
 
 
 def delimiter_of(header: str, columns: Sequence[str]) -> str:
-    """The delimiter with which the header line names most of the known columns; the comma where none does."""
+    """Return the delimiter that gives most of the known columns in the header line; by default the comma."""
 
     def known(delimiter: str) -> int:
         try:
@@ -103,7 +104,7 @@ def delimiter_of(header: str, columns: Sequence[str]) -> str:
 
 
 def is_blank(text: str) -> bool:
-    """Return True if there is nothing in it; control characters that Python takes for spaces are something."""
+    """Return True if the text is blank; control characters that Python treats as spaces are not blank."""
     return not text.strip() and find_forbidden(text, "\t\r\n") is None
 
 
@@ -132,7 +133,7 @@ def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) 
         elif extra == "refuse" and name not in columns and not (ours and manifest.is_column(name)):
             problems.append(Unreadable(f"{name!r} is not a known column; {known}"))
         elif earlier == 1 and (is_tag or name in columns):
-            problems.append(Unreadable("stands twice", name))
+            problems.append(Unreadable("appears twice", name))
     if "prompt" not in names:
         problems.append(Unreadable(f"is not among the columns of the first line; {known}", "prompt"))
     if ours and "seconds" in names:
@@ -159,7 +160,7 @@ def _row(header: Header, cells: list[str]) -> object:
 
 
 def _value(name: str, cell: str) -> object:
-    """A number where the column wants one and the cell holds one; else the text, for the check to complain about."""
+    """Convert a cell to the type of its column; an invalid cell stays text, which the check of the field refuses."""
     try:
         if name in ("seed", "variants"):
             return int(cell)

@@ -1,4 +1,4 @@
-"""Text files of any origin, read in pieces: unpacked, decoded and bounded before anything looks at their lines."""
+"""Text files of any origin, read in pieces: unpacked, decoded and bounded before their lines are parsed."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ RATIO_FROM = 4 * 2**20
 
 @contextmanager
 def open_text(path: str, *, limit: int) -> Generator[Iterator[str]]:
-    """The lines of a file, with their ends (of Unix, Windows or old Macs); memory is bounded by a line, however large
-    the file.
+    """Open a file and iterate over its lines, with their ends (of Unix, Windows or old Macs); memory is bounded by a
+    line.
 
     Args:
         path: a file, packed by gzip or not, or `-` for stdin.
@@ -55,7 +55,7 @@ def open_text(path: str, *, limit: int) -> Generator[Iterator[str]]:
 
 
 def where_of(path: str) -> str:
-    """What messages call the file."""
+    """Return the name of a file in messages."""
     return "stdin" if path == "-" else path
 
 
@@ -85,7 +85,7 @@ class UnreadableLine(InvalidFile):
 
 
 class _Counted(io.RawIOBase):
-    """A stream whose first bytes can be looked at, and which knows how many were taken."""
+    """A stream whose first bytes can be inspected, and that counts the bytes that were read."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -144,7 +144,7 @@ class _Bounded(io.RawIOBase):
             raise TooLarge(
                 f"unpacks to more than {MAX_RATIO} times its size, which no file of prompts does",
                 where=self._where,
-                hint="If it is what it should be, unpack it yourself and give the text.",
+                hint="If the file is correct, unpack it and submit the text.",
             )
         buffer[: len(part)] = part
         return len(part)

@@ -1,4 +1,4 @@
-"""The HTTP client: retries with back-off, problems as errors, nothing else."""
+"""The HTTP client: retries with back-off, and problems as errors."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from uuid import uuid4
 
 import httpx2
 
-from marey.client.foreign import connection_failure, foreign_answer
+from marey.client.foreign import NoAnswer, connection_failure, foreign_answer
 from marey.client.lines import Lines
-from marey.client.place import Server, ca_file, find_server
+from marey.client.place import Server, ca_file
 from marey.core import tracing
 from marey.core.errors import (
     Busy,
@@ -40,9 +40,9 @@ ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
 """Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
 BUSY_SECONDS = 180.0
-"""Waited in all, for a server that answers but has no room for the request now; at least `ATTEMPTS` are made."""
+"""Seconds to wait in all for a server that is busy; at least `ATTEMPTS` are made."""
 SUBMIT_BUSY_SECONDS = 900.0
-"""The same for a submit: large ones are read one after the other."""
+"""The same for a submit: the server reads large ones one after the other."""
 SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
 QUIET_SECONDS = 12.0
@@ -53,7 +53,7 @@ RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
 QUOTA = QuotaUsedUp.problem_type
 NOT_OURS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
-"""Raised where an answer is read that the API does not give; the last one by JSON that is nested a thousandfold."""
+"""Errors of reading an answer that is not the API's; the last one is raised by JSON that is nested too deeply."""
 
 _ERRORS: dict[str, type[MareyError]] = {
     kind.problem_type: kind
@@ -65,9 +65,9 @@ _ERRORS: dict[str, type[MareyError]] = {
 
 
 class Transport:
-    """Talks to one server; safe to use from several threads.
+    """HTTP requests to one server; safe to use from several threads.
 
-    One idempotency key goes with every attempt of one `submit`, so a retry after a lost answer enqueues nothing twice.
+    All attempts of one `submit` share an idempotency key, so a retry after a lost answer enqueues nothing twice.
     """
 
     def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int | None = None) -> None:
@@ -83,11 +83,6 @@ class Transport:
         except httpx2.InvalidURL as error:
             raise InvalidInput(f"is no address: {error}", where=server.url, hint="Correct MAREY_SERVER.") from error
 
-    @classmethod
-    def here(cls) -> Transport:
-        """A client of the server that `MAREY_SERVER` or `server.json` names."""
-        return cls(find_server())
-
     def __enter__(self) -> Transport:
         return self
 
@@ -99,28 +94,28 @@ class Transport:
         self._http.close()
 
     def get(self, path: str, **params: Any) -> Any:
-        """The JSON at `path`."""
+        """Return the JSON at `path`."""
         return _json(self._send("GET", path, params=_given(params)))
 
     def post(self, path: str, body: Any = None, **params: Any) -> Any:
-        """POST a JSON body, None = none; the answer's JSON. Retried: only for requests that may be repeated."""
+        """POST a JSON body (None = none) and return the answer's JSON; only for requests that may be repeated."""
         return _json(self._send("POST", path, params=_given(params), json=body))
 
     def post_new(self, path: str, body: Any) -> Any:
-        """POST what is made once however often it is sent: with an idempotency key, which goes with every retry."""
+        """POST with an idempotency key, which all retries share, so that the object is created once."""
         key = {"Idempotency-Key": str(uuid4())}
         return _json(self._send("POST", path, patience=SUBMIT_BUSY_SECONDS, json=body, headers=key))
 
     def post_once(self, path: str, body: Any) -> Any:
-        """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
+        """POST a request that must not be repeated; it is retried only while there is no connection."""
         return _json(self._send("POST", path, repeatable=False, json=body))
 
     def patch(self, path: str, body: Any, **params: Any) -> Any:
-        """PATCH with a JSON body; the answer's JSON."""
+        """PATCH with a JSON body and return the answer's JSON."""
         return _json(self._send("PATCH", path, json=body, params=_given(params)))
 
     def delete(self, path: str) -> None:
-        """DELETE."""
+        """DELETE a path."""
         self._send("DELETE", path)
 
     def submit(
@@ -131,10 +126,10 @@ class Transport:
         idempotency_key: str | None = None,
         **params: Any,
     ) -> Any:
-        """Submit items as NDJSON; the job, or with `validate_only` what it would be.
+        """Submit items as NDJSON; return the job, or with `validate_only` the result of the check.
 
         Args:
-            idempotency_key: of every attempt; None = one is drawn.
+            idempotency_key: of all attempts; None = random.
 
         Raises:
             InvalidItems: with the problems of every line.
@@ -153,7 +148,7 @@ class Transport:
         return _json(self._send("POST", "/v1/jobs", patience=SUBMIT_BUSY_SECONDS, **sent))
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
-        """Every element of a listing, page after page."""
+        """Iterate over the elements of a listing, page after page."""
         cursor: str | None = None
         while True:
             page = self.get(path, **params, cursor=cursor)
@@ -166,7 +161,7 @@ class Transport:
     def stream(
         self, path: str, headers: Mapping[str, str] | None = None, *, patience: float = 30.0
     ) -> Generator[httpx2.Response]:
-        """An open answer, to be read in pieces; redirects (to the object store) are followed without the key.
+        """Open an answer that is read in pieces; redirects (to the object store) are followed without the key.
 
         Args:
             patience: seconds of silence after which the server counts as unreachable.
@@ -180,8 +175,8 @@ class Transport:
             yield response
 
     def events(self, job: str, after: int = 0, *, patience: float = 30.0) -> Iterator[dict[str, Any]]:
-        """Events of a job as they happen, from `after` on; ends when the job does, when the connection breaks, or when
-        it carried nothing but pings for `QUIET_SECONDS`: then look at the job, and ask again."""
+        """Iterate over the events of a job after number `after` as they happen. Ends with the job, with the connection,
+        or after `QUIET_SECONDS` without an event; the caller then asks for the job and calls again."""
         headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
         with self.stream(f"/v1/jobs/{job}/events", headers, patience=patience) as response:
             if response.status_code == 204:
@@ -196,8 +191,8 @@ class Transport:
         """Send until there is an answer.
 
         Args:
-            repeatable: nothing goes wrong where the request is carried out twice.
-            patience: seconds to wait in all while the server says that it is busy; None = a minute.
+            repeatable: the request may be carried out twice.
+            patience: seconds to wait in all while the server is busy; None = `BUSY_SECONDS`.
         """
         pause, failures, refusals, waited = FIRST_PAUSE, 0, 0, 0.0
         if patience is None or self._attempts < ATTEMPTS:
@@ -221,7 +216,7 @@ class Transport:
                 if response.status_code < 400:
                     return _expected(response)
                 wait = max(pause, _retry_after(response))
-                if _is_busy(response):  # it answers: that is no failure
+                if _is_busy(response):  # an answer is not a failure
                     refusals, waited = refusals + 1, waited + wait
                     again = refusals < self._attempts or waited < patience
                 else:
@@ -233,7 +228,7 @@ class Transport:
             pause = min(pause * 2, LONGEST_PAUSE)
 
     def _request(self, method: str, path: str, request: Mapping[str, Any]) -> httpx2.Response:
-        """One attempt, as a span where traces are on; the server goes on from it."""
+        """Send one attempt, as a span of a trace that the server continues."""
         with tracing.span(f"{method} {path.partition('?')[0]}", kind="client") as span:
             headers: dict[str, str] = dict(request.get("headers") or {})
             if span.traceparent is not None:
@@ -255,9 +250,9 @@ class Transport:
 
 
 class _UntilQuiet:
-    """A response of server-sent events whose text ends at the first ping after `QUIET_SECONDS` without an event.
+    """A response of server-sent events that ends at the first ping after `QUIET_SECONDS` without an event.
 
-    Pings say that the server lives, not that events reach it.
+    Pings show that the server is alive, not that events reach it.
     """
 
     def __init__(self, response: httpx2.Response) -> None:
@@ -275,7 +270,7 @@ class _UntilQuiet:
 
 
 def error_of(response: httpx2.Response) -> MareyError:
-    """The error that an RFC 9457 problem tells, as the exception that was raised on the server."""
+    """Return the error of an RFC 9457 problem, as it was raised on the server."""
     try:
         return error_of_problem(response.json(), response.status_code, _retry_after(response))
     except NOT_OURS:
@@ -283,13 +278,13 @@ def error_of(response: httpx2.Response) -> MareyError:
 
 
 def error_of_problem(problem: Mapping[str, Any], status: int, retry_after: float = 0.0) -> MareyError:
-    """The error that a problem of the API tells.
+    """Return the error of a problem of the API.
 
     Args:
         retry_after: seconds.
 
     Raises:
-        ValueError, KeyError, TypeError, AttributeError: it is no problem of the API.
+        ValueError, KeyError, TypeError, AttributeError: it is not a problem of the API.
     """
     kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
     message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
@@ -308,14 +303,14 @@ def error_of_problem(problem: Mapping[str, Any], status: int, retry_after: float
     return error(message, where=where, hint=hint)
 
 
-def _problem(told: Mapping[str, Any]) -> Problem:
-    """One of the problems of items."""
-    line = told.get("line")
-    return Problem(None if line is None else int(line), told.get("field"), str(told["message"]))
+def _problem(found: Mapping[str, Any]) -> Problem:
+    """Read one of the problems of items."""
+    line = found.get("line")
+    return Problem(None if line is None else int(line), found.get("field"), str(found["message"]))
 
 
 def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
-    """The error of an object store, where a signed URL led: without the signature, which opens the object."""
+    """Return the error of an object store, without the signature of its URL, which grants access."""
     return Unreachable(
         f"the object store answered {response.status_code} to a URL that was signed for it",
         where=str(response.request.url.copy_with(query=None)),
@@ -324,14 +319,14 @@ def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
 
 
 def _is_busy(response: httpx2.Response) -> bool:
-    """The server works, and has no room for this request now: a rate, or too many large ones at once."""
+    """Return True if the server is busy: a rate limit, or too many large requests at once."""
     return response.status_code == Busy.status or (
         response.status_code == Overloaded.status and f"{TYPE_PREFIX}{Overloaded.problem_type}" in response.text
     )
 
 
 def _is_quota(response: httpx2.Response) -> bool:
-    """A quota frees up in minutes or by somebody's hand, unlike a rate: who waits is told so at once."""
+    """Return True for a quota: unlike a rate it takes minutes, or an operator, so the error is raised at once."""
     return response.status_code == Busy.status and f"{TYPE_PREFIX}{QUOTA}" in response.text
 
 
@@ -339,7 +334,7 @@ def _json(response: httpx2.Response) -> Any:
     """Return what a successful answer holds.
 
     Raises:
-        InvalidInput: it is no JSON object or array, so not the API's.
+        InvalidInput: it is not a JSON object or array, so not the API's.
     """
     try:
         found = response.json()
@@ -354,7 +349,7 @@ def _expected(response: httpx2.Response) -> httpx2.Response:
     """Return the answer if it may be the API's.
 
     Raises:
-        InvalidInput: a redirect or a page; a proxy that wants a login answers so, and nothing was done.
+        InvalidInput: a redirect or a page, such as the login page of a proxy; the request had no effect.
     """
     if response.is_redirect or response.headers.get("content-type", "").startswith("text/html"):
         raise _foreign(response)
@@ -375,7 +370,7 @@ def _as_unreachable(server: Server) -> Generator[None]:
 
 
 def _final(server: Server, error: httpx2.TransportError) -> MareyError | None:
-    """Return the error for a failure that no further attempt mends: of the server, or of the store it leads to."""
+    """Return the error for a failure that persists in further attempts, of the server or of the object store."""
     try:
         url = error.request.url.copy_with(path="/", query=None)
     except RuntimeError:  # there was no request yet
@@ -384,7 +379,8 @@ def _final(server: Server, error: httpx2.TransportError) -> MareyError | None:
 
 
 def _unreachable(server: Server, error: httpx2.TransportError) -> MareyError:
-    return _final(server, error) or Unreachable(
+    kind = NoAnswer if isinstance(error, httpx2.ReadTimeout) else Unreachable
+    return _final(server, error) or kind(
         f"the server does not answer ({type(error).__name__}: {error})",
         where=server.url,
         hint="Is it running? `marey serve` starts one here; MAREY_SERVER names another.",

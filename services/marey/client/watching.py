@@ -7,7 +7,8 @@ from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from marey.client.transport import PATIENCE, Transport
-from marey.client.types import ENDED_JOB, OPEN_EVALUATION
+from marey.client.types.evaluations import OPEN_EVALUATION
+from marey.client.types.jobs import ENDED_JOB
 from marey.core.errors import Busy, TimedOut, Unreachable
 
 View = dict[str, Any]
@@ -15,7 +16,7 @@ SILENCE = 30.0
 """Seconds an open connection may stay silent: the server pings every 15 s."""
 RETRY_SECONDS = 0.5
 POLL = 1.0
-"""Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
+"""Seconds between two requests: an evaluation takes minutes, and the scheduler checks it every two seconds."""
 WITHOUT_RESULT = ("failed", "dead", "cancelled")
 
 
@@ -26,16 +27,16 @@ def follow_job(
     timeout: float | None = None,
     hint: str | None = None,
 ) -> Generator[tuple[View, View | None], None, View]:
-    """Yield the job as the server shows it, then its events with it as they come, until it has ended; return it then.
+    """Yield the job, then its events as they happen, until it has ended; return the ended job.
 
-    A lost connection is taken up where it broke.
+    A connection that breaks is opened again.
 
     Args:
         timeout: seconds; None = no limit.
-        hint: of the error of a timeout.
+        hint: of `TimedOut`.
 
     Raises:
-        TimedOut: `timeout` passed; the job goes on.
+        TimedOut: `timeout` passed; the job continues.
         Unreachable: the server was away for longer than `PATIENCE`.
     """
     deadline = None if timeout is None else time.monotonic() + timeout
@@ -60,7 +61,7 @@ def follow_job(
                 patience()
             state = transport.get(f"/v1/jobs/{job}")
             reachable = time.monotonic()
-        except Busy as error:  # the key has all the event streams it may have: poll instead
+        except Busy as error:  # the key has no event stream left: poll instead
             time.sleep(min(error.seconds, patience()))
             state = transport.get(f"/v1/jobs/{job}")
             reachable = time.monotonic()
@@ -80,10 +81,10 @@ def follow_evaluation(
     hint: str | None = None,
     look: Callable[[View], None],
 ) -> View:
-    """Call `look` with the evaluation as it stands, again and again until it is over; return it as it ended.
+    """Call `look` with the evaluation about once a second until it has ended, and return it.
 
     Raises:
-        TimedOut: `timeout` passed; the evaluation goes on.
+        TimedOut: `timeout` passed; the evaluation continues.
         Unreachable: the server was away for longer than `PATIENCE`.
     """
     deadline = None if timeout is None else time.monotonic() + timeout

@@ -15,17 +15,22 @@ class MareyError(Exception):
         message: what is wrong, one sentence.
         where: file, line, field, row or identifier the message is about.
         hint: what to do about it.
+        argument: name of the argument of the Python API to change, such as `overwrite`; the command line names the
+            option in its place.
     """
 
     exit_code = 1
     status = 500
     problem_type = "internal"
 
-    def __init__(self, message: str, *, where: str | None = None, hint: str | None = None) -> None:
+    def __init__(
+        self, message: str, *, where: str | None = None, hint: str | None = None, argument: str | None = None
+    ) -> None:
         super().__init__(message)
         self.message = message
         self.where = where
         self.hint = hint
+        self.argument = argument
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
@@ -199,7 +204,7 @@ class ItemsFailed(MareyError):
 
 
 class TimedOut(MareyError):
-    """The caller's time limit (`--timeout`) has passed."""
+    """The caller's time limit has passed."""
 
     exit_code = 7
     status = 504

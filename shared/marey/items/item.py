@@ -123,12 +123,13 @@ class InvalidItems(InvalidInput):
         where: str | None = None,
         total: int | None = None,
         hint: str = "Correct them and try again.",
+        argument: str | None = None,
     ) -> None:
         found = list(problems)
         self.total = len(found) if total is None else total
         self.problems = tuple(found[:MAX_PROBLEMS])
         count = "1 problem" if self.total == 1 else f"{self.total} problems"
-        super().__init__(f"{count} in the input; none of it is used", where=where, hint=hint)
+        super().__init__(f"{count} in the input; none of it is used", where=where, hint=hint, argument=argument)
 
     def __str__(self) -> str:
         lines = [f"  {problem}" for problem in self.problems]

@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from marey.api import broadcaster as tailer_module
 from marey.cli.watching import watch_job
+from marey.client import Client
 from marey.db import create_engine, outages
 from marey.embedded import EmbeddedServer
 from tests.servers.stalling_proxy import StallingProxy
@@ -49,8 +50,8 @@ def test_everything_goes_on_after_all_connections_have_fallen_silent(
         return state
 
     def watch() -> str:
-        with silenced.client() as client:
-            return watch_job(client, str(job), quiet=True)["state"]
+        with Client(silenced.url, silenced.key) as client:
+            return watch_job(client, str(job), quiet=True).state
 
     with ThreadPoolExecutor(3) as pool:
         following, watching, working = pool.submit(follow), pool.submit(watch), pool.submit(loop.run)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,8 +12,8 @@ from typing import Any
 import pytest
 
 from marey.cli.commands.fetch import fetch_job
+from marey.client import Client
 from marey.client.manifest import RECORD, remove_left, write_manifest
-from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 from tests.support.command import Command
@@ -127,28 +128,29 @@ def test_names_of_a_manifest_do_not_lead_out_of_the_folder(marey: Command, job: 
     assert len(files(folder)) == 21
 
 
-class Breaking(Transport):
-    """A client whose command is interrupted, or whose server is lost, at its twelfth file."""
-
-    def __init__(self, server: Server, error: BaseException) -> None:
-        super().__init__(server)
-        self._error = error
-        self._left = 11
+@contextmanager
+def breaking(error: BaseException) -> Iterator[None]:
+    """In here a command is interrupted, or its server is lost, at its twelfth file."""
+    left = itertools.count(11, -1)
+    real = Transport.stream
 
     @contextmanager
-    def stream(self, path: str, *more: Any, **options: Any) -> Iterator[Any]:
-        self._left -= 1
-        if self._left < 0:
-            raise self._error
-        with super().stream(path, *more, **options) as response:
+    def stream(self: Transport, path: str, *more: Any, **options: Any) -> Iterator[Any]:
+        if next(left) <= 0:
+            raise error
+        with real(self, path, *more, **options) as response:
             yield response
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Transport, "stream", stream)
+        yield
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")], ids=["ctrl-c", "disk"])
 def test_a_fetch_that_breaks_off_leaves_a_manifest_of_what_is_there_and_the_next_completes_it(
     api: LiveApi, marey: Command, job: str, tmp_path: Path, error: BaseException, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with Breaking(Server(api.url, api.key), error) as client, pytest.raises((KeyboardInterrupt, InvalidFile)):
+    with breaking(error), Client(api.url, api.key) as client, pytest.raises((KeyboardInterrupt, InvalidFile)):
         fetch_job(client, job, tmp_path, template="{name}")
     there = files(tmp_path)
     rows = manifest(tmp_path)
@@ -165,7 +167,7 @@ def test_a_fetch_of_more_that_breaks_off_keeps_the_lines_of_what_was_there(
     api: LiveApi, marey: Command, job: str, tmp_path: Path
 ) -> None:
     marey("fetch", job, "-o", tmp_path, "--format", "bvh", *NAMES).ok()
-    with Breaking(Server(api.url, api.key), KeyboardInterrupt()) as client, pytest.raises(KeyboardInterrupt):
+    with breaking(KeyboardInterrupt()), Client(api.url, api.key) as client, pytest.raises(KeyboardInterrupt):
         fetch_job(client, job, tmp_path, template="{name}")
     rows = {row["name"]: row for row in manifest(tmp_path)}
     assert len(rows) == 20

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from marey.cli.evaluating import watch_evaluation
+from marey.client import Client
 from marey.client.transport import Transport
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
@@ -32,6 +33,6 @@ def test_an_interrupted_wait_for_an_evaluation_says_so_too(
     api: LiveApi, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(Transport, "get", interrupted)
-    with api.client() as client, pytest.raises(KeyboardInterrupt):
-        watch_evaluation(client, "RUN", quiet=True)
+    with Client(api.url, api.key) as client, pytest.raises(KeyboardInterrupt):
+        watch_evaluation(client, "RUN")
     assert "evaluation RUN goes on.\n  `marey eval wait RUN` waits again" in capsys.readouterr().err

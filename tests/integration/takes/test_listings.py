@@ -33,7 +33,7 @@ def test_motions_are_listed_over_all_pages_so_that_a_pipe_gets_every_one(marey: 
 def test_a_limit_shows_fewer_and_says_that_there_are_more(marey: Command, job: str, limit: int) -> None:
     ran = marey("motions", "list", "--job", job, "--limit", limit).ok()
     assert len(ran.out.splitlines()) == limit
-    assert f"There are more than these {limit}: --limit" in ran.err
+    assert f"Showing the first {limit}; use --limit to see more." in ran.err
 
 
 @pytest.mark.parametrize("limit", [MOTIONS, MOTIONS + 1])
@@ -49,4 +49,4 @@ def test_jobs_are_listed_to_the_end_too(marey: Command, api: LiveApi, job: str) 
     assert [line.split("\t")[0] for line in ran.out.splitlines()] == [*reversed(made), job]
     ran = marey("jobs", "list", "--limit", 2, "--json").ok()
     assert [line["id"] for line in ran.lines] == made[:-3:-1]
-    assert "There are more than these 2" in ran.err
+    assert "Showing the first 2; use --limit to see more." in ran.err

@@ -10,31 +10,39 @@ import typer
 from typer.testing import CliRunner
 
 from marey.cli.commands import schedules
-from marey.cli.evaluating import Asked, check_evaluation, repeats_of
+from marey.cli.evaluating import EvaluationArguments, check_evaluation, repeats_of
 from marey.cli.roles.serving import default_roles, parse_roles
+from marey.client import EvaluationDetail
+from marey.client.evaluation_requests import request_body
 from marey.core.errors import InvalidInput, ItemsFailed, NotFound, Regressed
 from marey.core.settings import Settings
 from tests.support.evaluations import write_evaluator, write_generator
 
 
-def asked(**changes: Any) -> Asked:
+def asked(**changes: Any) -> EvaluationArguments:
     values: dict[str, Any] = dict.fromkeys(("evaluator", "settings", "repeats", "seed", "baseline"))
-    return Asked(**{**values, "bundle": "hgm3", "split": "test", **changes})
+    return EvaluationArguments(**{**values, "bundle": "hgm3", "split": "test", **changes})
 
 
-def ended(**changes: Any) -> dict[str, Any]:
-    return {"id": "x", "state": "done", "reason": "FID fell", "regressed": None, **changes}
+def body(**changes: Any) -> dict[str, Any]:
+    """The request that the options of a command lead to."""
+    wanted = asked(**changes)
+    return request_body(wanted.bundle, wanted.options()).body
+
+
+def ended(**changes: Any) -> EvaluationDetail:
+    return EvaluationDetail.of({"id": "x", "state": "done", "reason": "FID fell", "regressed": None, **changes})
 
 
 def test_only_what_was_given_is_asked_for() -> None:
-    assert asked().body() == {"bundle": "hgm3", "split": "test"}
-    assert asked(settings=["guidance=4.5", "steps = 10"], repeats=3, seed=0).body() == {
+    assert body() == {"bundle": "hgm3", "split": "test"}
+    assert body(settings=["guidance=4.5", "steps = 10"], repeats=3, seed=0) == {
         "bundle": "hgm3", "split": "test", "settings": {"guidance": 4.5, "steps": 10.0}, "repeats": 3, "seed": 0,
     }  # fmt: skip
 
 
 def test_both_splits_of_the_evaluator_can_be_asked_for() -> None:
-    assert asked(split="test+compositional").body() == {"bundle": "hgm3", "split": "test+compositional"}
+    assert body(split="test+compositional") == {"bundle": "hgm3", "split": "test+compositional"}
 
 
 def test_to_regenerate_is_to_make_a_motion_for_each_repeat() -> None:
@@ -47,7 +55,7 @@ def test_to_regenerate_is_to_make_a_motion_for_each_repeat() -> None:
 
 def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:
     (tmp_path / "studio.csv").write_text("prompt,expected\na person walks,walk\na person bows,\n")
-    assert asked(split=str(tmp_path / "studio.csv")).body() == {
+    assert body(split=str(tmp_path / "studio.csv")) == {
         "bundle": "hgm3",
         "prompts": [{"prompt": "a person walks", "expected": "walk"}, {"prompt": "a person bows"}],
         "source": "studio.csv",
@@ -56,14 +64,14 @@ def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:
 
 def test_a_split_that_is_none_is_told_with_those_there_are() -> None:
     with pytest.raises(NotFound, match="neither a split") as told:
-        asked(split="validation").body()
+        body(split="validation")
     assert "test, compositional, test+compositional" in (told.value.hint or "")
 
 
 @pytest.mark.parametrize("text", ["guidance", "guidance=", "guidance=high", "guidance=nan", "guidance=inf", "=3x"])
 def test_a_setting_that_is_none_is_told(text: str) -> None:
     with pytest.raises(InvalidInput, match="not a setting"):
-        asked(settings=[text]).body()
+        body(settings=[text])
 
 
 def test_a_run_that_is_worse_exits_8_only_where_that_was_asked() -> None:

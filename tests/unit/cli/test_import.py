@@ -1,9 +1,14 @@
-"""The small client stays small."""
+"""The imports of the command line: small, and without HTTP of its own."""
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
 
 HEAVY = (
     *("torch", "numpy", "pydantic", "sqlalchemy", "fastapi", "celery", "psycopg", "redis", "structlog"),
@@ -18,6 +23,42 @@ def test_the_command_line_imports_no_server_and_no_numbers() -> None:
 
 
 def test_the_client_needs_nothing_but_its_own_packages() -> None:
-    code = "import marey.client.transport, marey.cli.watching, marey.client.fetching, sys; print(*sys.modules)"
+    code = "import marey.client.client, marey.cli.watching, marey.client.fetching, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(HEAVY[:-1]) & set(done.stdout.split())
+
+
+CLI = Path(__file__).resolve().parents[3] / "services" / "marey" / "cli"
+HTTP = (
+    *("marey.client.transport", "marey.client.link", "httpx", "httpx2", "requests", "websockets"),
+    *("http.client", "urllib.request", "urllib3"),
+)
+"""Modules that send requests."""
+
+
+def uses_of_http(source: str) -> Iterator[str]:
+    """The imports of a module that sends requests, and the attributes that lead around the nouns of the client."""
+    for node in ast.walk(ast.parse(source)):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Attribute) and node.attr in ("transport", "_transport"):
+            yield node.attr
+        yield from (name for name in names if name.startswith(HTTP))
+
+
+@pytest.mark.parametrize("path", sorted(CLI.rglob("*.py")), ids=lambda path: str(path.relative_to(CLI)))
+def test_commands_reach_a_server_through_the_nouns_of_the_client_alone(path: Path) -> None:
+    assert list(uses_of_http(path.read_text(encoding="utf-8"))) == []
+
+
+def test_each_way_around_the_client_is_noticed() -> None:
+    for line in (
+        "from marey.client.transport import Transport", "from marey.client import transport", "import httpx2",
+        "import urllib.request", "from urllib import request", "from websockets.sync.client import connect",
+        "client.transport.get('/v1/jobs')",
+    ):  # fmt: skip
+        assert len(list(uses_of_http(line))) == 1, line
+    assert list(uses_of_http("from urllib.parse import quote\nfrom marey.client import Client")) == []

@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from marey.cli.live.pace import Pace
-from marey.cli.live.steering import message_of
+from marey.cli.live.steering import Command, command_of
 from marey.client import link as link_module
-from marey.client.frames import Head, head_of
 from marey.client.link import Link
 from marey.client.place import Server
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
-from marey.streams.frames import Frame, encode_frame
 from tests.support.stream_server import KEY, STREAM, Plan, StreamServer
 
 IDENTITY = np.tile([1.0, 0, 0, 0], (22, 1))
@@ -66,19 +64,19 @@ def test_a_pause_is_no_latency() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("line", "command"),
     [
-        ("a person runs\r", {"kind": "steer", "prompt": "a person runs"}),
-        ("  a   person\truns ", {"kind": "steer", "prompt": "a person runs"}),
-        ("/pause", {"kind": "pause"}),
-        (" /Resume ", {"kind": "resume"}),
-        ("/stop", {"kind": "stop"}),
+        ("a person runs\r", Command("steer", "a person runs")),
+        ("  a   person\truns ", Command("steer", "a person runs")),
+        ("/pause", Command("pause")),
+        (" /Resume ", Command("resume")),
+        ("/stop", Command("stop")),
         ("", None),
         (" \t\r", None),
     ],
 )
-def test_a_line_is_a_steer_a_word_or_nothing(line: str, message: object) -> None:
-    assert message_of(line) == message
+def test_a_line_is_a_steer_a_word_or_nothing(line: str, command: Command | None) -> None:
+    assert command_of(line) == command
 
 
 @pytest.mark.parametrize(
@@ -86,22 +84,8 @@ def test_a_line_is_a_steer_a_word_or_nothing(line: str, message: object) -> None
 )
 def test_a_line_that_cannot_be_meant_is_not_sent(line: str, said: str) -> None:
     with pytest.raises(InvalidInput) as caught:
-        message_of(line)
+        command_of(line)
     assert said in str(caught.value)
-
-
-# --- frames ---
-
-
-def test_the_head_of_a_frame_is_read_without_numpy_as_it_is_with_it() -> None:
-    frame = Frame(2**31 + 5, np.zeros(3, np.float32), IDENTITY.astype(np.float32), prompt=517, last=True)
-    assert head_of(encode_frame(frame)) == Head(2**31 + 5, 517)
-
-
-@pytest.mark.parametrize("data", [b"", b"MF\x01", b"MF\x02" + bytes(197), b"GIF89a" + bytes(194)])
-def test_bytes_that_are_no_frame_are_refused(data: bytes) -> None:
-    with pytest.raises(InvalidInput, match="no frame of version 1"):
-        head_of(data)
 
 
 # --- the socket ---

@@ -33,7 +33,7 @@ def test_the_default_name_sorts_and_tells_the_seed() -> None:
 def test_no_two_motions_get_one_name_on_any_system() -> None:
     names = FileNames("{name}")
     assert [names.of(1, naming(), kind) for kind in ("npz", "bvh", "npz")] == ["wave.npz", "wave.bvh", "wave.npz"]
-    with pytest.raises(InvalidInput, match=r"--name-template: two motions would be written to Wave\.npz"):
+    with pytest.raises(InvalidInput, match=r"name_template: two motions would be written to Wave\.npz"):
         names.of(2, naming("Wave"), "npz")
 
 
@@ -50,7 +50,7 @@ def test_any_prompt_makes_a_plain_slug(prompt: str) -> None:
                  "a/./{name}", "a\n{name}", "\u202e{name}", "{name}/" * 9 + "{seed}", "x" * 300],
 )  # fmt: skip
 def test_a_template_that_could_leave_the_folder_is_refused(template: str) -> None:
-    with pytest.raises(InvalidInput, match="--name-template"):
+    with pytest.raises(InvalidInput, match="name_template"):
         check_template(template)
 
 

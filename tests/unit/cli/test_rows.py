@@ -51,7 +51,7 @@ def test_a_jsonl_line_may_hold_settings(tmp_path: Path) -> None:
 def test_a_csv_has_a_column_of_settings_which_come_before_those_of_the_command(tmp_path: Path) -> None:
     path = write(tmp_path, "p.csv", "prompt,settings\na person waves,temperature=1.2; guidance=4\na person bows,\n")
     assert [item.settings for item in items_from_file(path)] == [{"temperature": 1.2, "guidance": 4.0}, {}]
-    defaults = defaults_of(settings=["guidance=2", "steps = 8"], fps=30.0)
+    defaults = defaults_of(settings={"guidance": 2.0, "steps": 8.0}, fps=30.0)
     assert [item.settings for item in items_from_file(path, defaults=defaults)] == [
         {"temperature": 1.2, "guidance": 4.0, "steps": 8.0, "fps": 30.0},
         {"guidance": 2.0, "steps": 8.0, "fps": 30.0},
@@ -164,23 +164,23 @@ def test_tags_of_the_command_come_beside_those_of_a_line(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("option", "given", "said"),
+    ("argument", "given", "said"),
     [
-        ("--tag", {"tags": ["take\n2"]}, "is not a tag"),
-        ("--variants", {"variants": 0}, "0 is outside 1 to 100"),
-        ("--variants", {"variants": 101}, "101 is outside 1 to 100"),
-        ("--seconds", {"seconds": 1000.0}, r"1000 is outside 0\.5 to 60"),
-        ("--seed", {"seed": -1}, "-1 is outside 0"),
-        ("--fps", {"fps": 0.0}, "0 is outside 1 to 240"),
-        ("--bundle", {"model": "hgm3", "bundle": "no such"}, "'no such' is not the name"),
+        ("tags", {"tags": ["take\n2"]}, "is not a tag"),
+        ("variants", {"variants": 0}, "0 is outside 1 to 100"),
+        ("variants", {"variants": 101}, "101 is outside 1 to 100"),
+        ("seconds", {"seconds": 1000.0}, r"1000 is outside 0\.5 to 60"),
+        ("seed", {"seed": -1}, "-1 is outside 0"),
+        ("fps", {"fps": 0.0}, "0 is outside 1 to 240"),
+        ("bundle", {"model": "hgm3", "bundle": "no such"}, "'no such' is not the name"),
     ],
 )
-def test_an_option_that_no_row_could_have_is_refused_by_its_own_name(
-    option: str, given: dict[str, Any], said: str
+def test_a_default_that_no_row_could_have_is_refused_by_the_name_of_its_argument(
+    argument: str, given: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(InvalidInput, match=said) as caught:
         defaults_of(**given)
-    assert caught.value.where == option
+    assert (caught.value.where, caught.value.argument) == (argument, argument)
 
 
 @given(st.binary(max_size=300), st.sampled_from(["csv", "jsonl", "txt"]))

@@ -68,7 +68,7 @@ def test_extra_columns_are_refused_become_tags_or_are_ignored(table: Path) -> No
     ]
     assert [item.tags for item in items(table, "tag")] == [("day", "Szene=3/4", "who=Zoe\u0308"), ()]
     assert [item.tags for item in items(table, "ignore")] == [("day",), ()]
-    with pytest.raises(InvalidItems, match="--extra-columns tag or ignore"):
+    with pytest.raises(InvalidItems, match="extra_columns tag or ignore"):
         items(table)
 
 

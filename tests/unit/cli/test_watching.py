@@ -12,9 +12,8 @@ import pytest
 
 from marey.api.jobs.events import PING_SECONDS
 from marey.cli.watching import watch_job
-from marey.client import transport
-from marey.client.place import Server
-from marey.client.transport import QUIET_SECONDS, Transport
+from marey.client import Client, transport
+from marey.client.transport import QUIET_SECONDS
 
 COUNTERS = {"succeeded": 1, "failed": 0, "dead": 0, "cancelled": 0}
 
@@ -75,9 +74,9 @@ def deaf(monkeypatch: pytest.MonkeyPatch) -> Iterator[Deaf]:
 
 
 def test_a_watcher_whose_stream_carries_pings_alone_looks_at_the_job_itself(deaf: Deaf) -> None:
-    with Transport(Server(f"http://127.0.0.1:{deaf.server.server_port}", "key")) as client:
+    with Client(f"http://127.0.0.1:{deaf.server.server_port}", "key") as client:
         began = time.monotonic()
-        assert watch_job(client, "j", quiet=True)["state"] == "succeeded"
+        assert watch_job(client, "j", quiet=True).state == "succeeded"
     assert time.monotonic() - began < 15
     assert deaf.looks == deaf.ends_after
 

@@ -10,27 +10,60 @@ from typing import Any
 
 import pytest
 
-from marey.client import types
 from marey.client.results import Result
-from marey.client.types import Comparison, Job, JobItem, Motion, MotionDetail
+from marey.client.types import evaluations, jobs, models, motions, references, schedules, streams, webhooks
+from marey.client.types.common import ErrorDetail, File
+from marey.client.types.evaluations import Comparison
+from marey.client.types.jobs import Job, JobItem
+from marey.client.types.motions import Motion, MotionDetail
 from marey.core.errors import InvalidInput
 
 SCHEMAS = json.loads((Path(__file__).resolve().parents[3] / "docs" / "openapi.json").read_text())["components"][
     "schemas"
 ]
+MODULES = (evaluations, jobs, models, motions, references, schedules, streams, webhooks)
 NAMES = {
-    types.File: "FileView", types.ErrorDetail: "ErrorView", types.Review: "ReviewView", types.Motion: "MotionView",
-    types.MotionDetail: "MotionDetailView", types.Counters: "CountersView", types.Job: "JobView",
-    types.JobItem: "ItemView", types.JobEvent: "EventView", types.Speed: "SpeedView",
-    types.Estimate: "EstimateView", types.Quota: "QuotaBody", types.CheckedJob: "CheckedView",
-    types.QueuePosition: "QueueView", types.Erasure: "ErasureView", types.Reroll: "RerollView",
-    types.StreamPrompt: "PromptView", types.StreamSkeleton: "SkeletonView", types.Stream: "StreamView",
-    types.StreamDetail: "StreamDetailView", types.TrainingData: "DataView", types.Model: "ModelView",
-    types.SamplingSetting: "SettingView",
-    types.EvaluationRequest: "RequestView", types.EvaluationJob: "EvaluationJobView",
-    types.EvaluationEvent: "EvaluationEventView", types.Evaluation: "EvaluationView",
-    types.EvaluationDetail: "EvaluationDetailView", types.ComparedRun: "ComparedView",
-    types.MetricChange: "MetricChangeView", types.MetricPair: "MetricPairView", types.Comparison: "ComparisonView",
+    File: "FileView", ErrorDetail: "ErrorView",
+    jobs.Counters: "CountersView",
+    jobs.Job: "JobView",
+    jobs.JobItem: "ItemView",
+    jobs.JobEvent: "EventView",
+    jobs.Speed: "SpeedView",
+    jobs.Estimate: "EstimateView",
+    jobs.Quota: "QuotaBody",
+    jobs.CheckedJob: "CheckedView",
+    jobs.QueuePosition: "QueueView",
+    jobs.Erasure: "ErasureView",
+    motions.Review: "ReviewView",
+    motions.Motion: "MotionView",
+    motions.MotionDetail: "MotionDetailView",
+    motions.Reroll: "RerollView",
+    streams.StreamPrompt: "PromptView",
+    streams.StreamSkeleton: "SkeletonView",
+    streams.Stream: "StreamView",
+    streams.StreamDetail: "StreamDetailView",
+    models.TrainingData: "DataView",
+    models.Model: "ModelView",
+    models.SamplingSetting: "SettingView",
+    models.BrokenModel: "BrokenView",
+    models.ModelCatalogue: "ModelsView",
+    evaluations.EvaluationRequest: "RequestView",
+    evaluations.EvaluationJob: "EvaluationJobView",
+    evaluations.EvaluationEvent: "EvaluationEventView",
+    evaluations.Evaluation: "EvaluationView",
+    evaluations.EvaluationDetail: "EvaluationDetailView",
+    evaluations.ComparedRun: "ComparedView",
+    evaluations.MetricChange: "MetricChangeView",
+    evaluations.MetricPair: "MetricPairView",
+    evaluations.Comparison: "ComparisonView",
+    schedules.Schedule: "ScheduleView",
+    webhooks.Webhook: "WebhookView",
+    webhooks.WebhookSecret: "MadeWebhookView",
+    webhooks.Delivery: "DeliveryView",
+    webhooks.DeliveryDetail: "DeliveryDetailView",
+    webhooks.DeliveryAttempt: "AttemptView",
+    references.ReferenceMatch: "MatchView",
+    references.Resolution: "ResolutionView",
 }  # fmt: skip
 KINDS = {"string": str, "integer": int, "number": float, "boolean": bool}
 
@@ -57,7 +90,8 @@ def sample(schema: dict[str, Any]) -> Any:
 
 
 def test_every_class_of_results_is_compared() -> None:
-    known = {each for each in vars(types).values() if isinstance(each, type) and issubclass(each, Result)}
+    named = [each for module in MODULES for each in vars(module).values()]
+    known = {each for each in named if isinstance(each, type) and issubclass(each, Result)}
     assert known - {Result} == set(NAMES)
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.client import Client, InvalidInput, ItemsFailed
-from marey.client.frames import head_of, read_frame
+from marey.client import Client, Conflict, FramesMissing, InvalidInput, ItemsFailed, StreamChanged, StreamProblem
+from marey.client import frames as frames_module
+from marey.client.frames import read_frame
 from marey.client.streams import LiveStream
 from marey.motion import read_bvh
 from marey.streams.frames import Frame, decode_frame, encode_frame
@@ -91,6 +92,58 @@ def test_the_recording_has_a_row_for_each_frame(serve: Serve, tmp_path: Path) ->
     assert np.abs(clip.root[numbers] - server.root[numbers]).max() < 1e-4
 
 
+def test_updates_are_received_one_by_one_without_iterating(serve: Serve) -> None:
+    refused = {"type": "urn:marey:problem:invalid-input", "title": "x", "status": 422, "detail": "no such word"}
+    _, live = serve(frames=12, gaps={5: 3}, drops={9}, told=[json.dumps({"type": "error", "problem": refused})])
+    frames: list[int] = []
+    missing: list[FramesMissing] = []
+    problems: list[StreamProblem] = []
+    states: list[str] = []
+    while not live.has_ended:
+        update = live.receive(0.05)
+        if isinstance(update, frames_module.Frame):
+            frames.append(update.number)
+        elif isinstance(update, FramesMissing):
+            missing.append(update)
+        elif isinstance(update, StreamProblem):
+            problems.append(update)
+        elif isinstance(update, StreamChanged):
+            states.append(update.stream.state)
+    assert frames == [0, 1, 2, 3, 4, 8, 9, 10, 11]
+    assert missing == [FramesMissing(first=5, count=3)]
+    assert [(type(each.error), each.raw) for each in problems] == [(InvalidInput, refused)] * 2  # of each connection
+    assert states[-1] == live.stream.state == "ended"
+    assert (live.missing, live.buffered, live.connections, live.failure()) == (3, 0, 2, None)
+
+
+def test_a_command_is_sent_without_waiting_where_there_is_a_connection(serve: Serve) -> None:
+    server, live = serve(frames=10_000, speed=100.0)
+    assert not live.connected
+    assert not live.try_send("stop")
+    while not live.connected:
+        live.receive(0.05)
+    assert live.try_send("steer", "a person waves")
+    server.until(lambda: [message["kind"] for message in server.messages] == ["steer"])
+    live.stop()
+    list(live)
+    assert live.stream.state == "ended"
+
+
+def test_a_recording_is_checked_before_the_stream_begins(tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_text("old")
+    with StreamServer(Plan(frames=4)) as server, Client(server.url, KEY) as client:
+        with pytest.raises(Conflict) as told:
+            client.streams.open("a person walks", record=tmp_path / "walk.bvh")
+        assert (told.value.argument, server.begun) == ("overwrite", [])
+        with pytest.raises(InvalidInput, match=r"only a \.bvh"):
+            client.streams.open("a person walks", record=tmp_path / "walk.npz")
+        with client.streams.open("a person walks", record=tmp_path / "walk.bvh", overwrite=True) as live:
+            assert live.recorded is None
+            assert len(list(live)) == 4
+        assert live.recorded == tmp_path / "walk.bvh"
+    assert len(read_bvh(tmp_path / "walk.bvh", rest_frame="keep").root) == 4
+
+
 def test_a_frame_is_read_as_the_server_reads_it() -> None:
     rotations, root = dancer(frames=8)
     for number in range(8):
@@ -98,7 +151,6 @@ def test_a_frame_is_read_as_the_server_reads_it() -> None:
         data = encode_frame(Frame(number, root[number], rotations[number], contacts, 2, number == 7))
         ours, theirs = read_frame(data, joints=len(rotations[0])), decode_frame(data)
         assert (ours.number, ours.prompt, ours.contacts, ours.last) == (number, 2, contacts, number == 7)
-        assert (head_of(data).number, head_of(data).prompt) == (number, 2)
         np.testing.assert_array_equal(np.array(ours.root, np.float32), theirs.root)
         np.testing.assert_array_equal(np.array(ours.rotations, np.float32), theirs.rotations)
         assert ours.data == data

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Unit(StrEnum):
-    """Units of files, such as BVH, that do not say theirs."""
+    """Units of files, such as BVH, that do not name theirs."""
 
     METRE = "m"
     CENTIMETRE = "cm"
@@ -26,7 +26,7 @@ class Unit(StrEnum):
 
 
 class Up(StrEnum):
-    """Axes that may point up in files that do not say which."""
+    """Axes that may point up in files that do not name it."""
 
     Y = "y"
     Z = "z"

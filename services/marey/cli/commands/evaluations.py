@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from marey.cli import console, evaluating, options
+from marey.cli import bulk, console, evaluating, options
 from marey.cli.commands import schedules
-from marey.cli.evaluating import Asked
-from marey.cli.references import FORMS, find, find_all, of_view
-from marey.core.errors import InvalidInput, NotFound
+from marey.cli.evaluating import EvaluationArguments
+from marey.cli.references import FORMS, find, of_view
+
+if TYPE_CHECKING:
+    from marey.client import Client, Evaluation
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
 app.add_typer(schedules.app, name="schedule")
 
 Run = Annotated[str, typer.Argument(metavar="RUN", help=f"The evaluation: {FORMS}.")]
 Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help=f"Evaluations: of each {FORMS}.")]
-FORMATS = ("html", "json", "md")
 
 
 class State(StrEnum):
@@ -56,22 +57,20 @@ def run(
     A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
     """
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
-    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
-    body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
-    from marey.client.transport import Transport
+    asked = EvaluationArguments(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
+    wanted = asked.options()
+    from marey.client import Client
 
     waits = wait or fail_on_regression
-    with Transport.here() as client:
-        if baseline is not None:
-            body["baseline"] = find(client, "evaluation", baseline).id
-        with asked.in_source():
-            made = client.post_new("/v1/evaluations", body)
+    with Client() as client:
+        wanted["baseline"] = asked.baseline_of(client)
+        made = client.evaluations.run(bundle, name=name, comment=comment, **wanted)
         if not as_json:
-            console.result(made["id"])
+            console.result(made.id)
         elif not waits:
-            console.result_json(made)
+            console.result_json(made.raw)
         if waits:
-            _follow(client, made["id"], timeout, fail_on_regression=fail_on_regression, as_json=as_json)
+            _follow(client, made.id, timeout, fail_on_regression=fail_on_regression, as_json=as_json)
 
 
 @app.command("wait")
@@ -82,9 +81,9 @@ def wait_for(
     as_json: console.Json = False,
 ) -> None:
     """Wait until a run ends; exit 6 if it failed or was cancelled."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         _follow(
             client, find(client, "evaluation", run).id, timeout, fail_on_regression=fail_on_regression, as_json=as_json
         )
@@ -98,17 +97,21 @@ def list_runs(
     as_json: console.Json = False,
 ) -> None:
     """List runs, newest first, with state and regressions."""
-    evaluating.show_runs("/v1/evaluations", limit, as_json, full_ids=full_ids, state=state.value if state else None)
+    from marey.client import Client
+
+    with Client() as client:
+        wanted = state.value if state else None
+        found = client.evaluations.list(state=wanted, page_size=console.page_size(limit))
+        evaluating.show_runs(found, limit, as_json, full_ids=full_ids)
 
 
 @app.command()
 def show(run: Run, as_json: console.Json = False) -> None:
     """Show a run: its data, state, reason and numbers."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        run = find(client, "evaluation", run).id
-        found = client.get(f"/v1/evaluations/{run}")
+    with Client() as client:
+        found = client.evaluations.get(find(client, "evaluation", run).id).raw
     if as_json:
         console.result_json(found)
         return
@@ -138,32 +141,18 @@ def report(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Fetch the report of a finished run."""
-    from marey.client.transport import Transport
+    from marey.client import Client
+    from marey.client.evaluations import report_format
 
-    kind = "md" if output is None else output.suffix.lower().removeprefix(".")
-    if kind not in FORMATS:
-        raise InvalidInput("unknown report format", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
-    with Transport.here() as client:
+    if output is not None:
+        report_format(output)  # before the server is asked
+    with Client() as client:
         run = find(client, "evaluation", run).id
-        found = client.get(f"/v1/evaluations/{run}")
-        file = next((file for file in found["reports"] if file["format"] == kind), None)
-        if file is None:
-            raise NotFound(
-                f"the report does not exist: the evaluation is {found['state']}",
-                where=f"evaluation {run}",
-                hint=found["reason"],
-            )
-        url = f"/v1/evaluations/{run}/report/{kind}"
         if output is None:
-            with client.stream(url) as response:
-                console.result(response.read().decode().rstrip("\n"))
-            return
-        from marey.client.fetching import Download, check_folder, download_all
-
-        check_folder(output.parent)
-        download = Download(url, file["sha256"], file["size"], output)
-        download_all(client, [download], overwrite=overwrite, done=lambda _: None)
-    console.result(console.home_relative(output))
+            console.result(client.evaluations.report(run).rstrip("\n"))
+        else:
+            path = client.evaluations.fetch_report(run, output, overwrite=overwrite)
+            console.result(console.home_relative(path))
 
 
 @app.command()
@@ -176,13 +165,13 @@ def compare(
     as_json: console.Json = False,
 ) -> None:
     """Compare two runs of the same prompts and evaluator, motion by motion, by paired bootstrap."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         earlier, later = (find(client, "evaluation", each).id for each in (before, after))
-        found = client.get(f"/v1/evaluations/{later}/comparison", before=earlier)
+        found = client.evaluations.compare(earlier, later)
     if as_json:
-        console.result_json(found)
+        console.result_json(found.raw)
     else:
         console.table(evaluating.COMPARISON, evaluating.comparison_rows(found))
     evaluating.check_comparison(found, fail_on_regression=fail_on_regression)
@@ -191,16 +180,11 @@ def compare(
 @app.command()
 def cancel(runs: Runs, as_json: console.Json = False) -> None:
     """Cancel runs and their jobs; finished motions stay."""
-    from marey.client.transport import Transport
+    bulk.change_all("evaluation", runs, lambda client, each: client.evaluations.cancel(each), _ended, as_json=as_json)
 
-    with Transport.here() as client:
-        for each in find_all(client, "evaluation", runs):
-            client.delete(f"/v1/evaluations/{each.id}")
-            found = client.get(f"/v1/evaluations/{each.id}")
-            if as_json:
-                console.result_json(found)
-            else:
-                console.say(f"cancelled {of_view('evaluation', found)}: {found['state']}")
+
+def _ended(run: Evaluation) -> str:
+    return f"cancelled {of_view('evaluation', run.raw)}: {run.state}"
 
 
 def _line(field: str, value: object) -> None:
@@ -208,12 +192,12 @@ def _line(field: str, value: object) -> None:
         console.result(f"{field:<11} {value}")
 
 
-def _follow(client: Any, run: str, timeout: float | None, *, fail_on_regression: bool, as_json: bool) -> None:
+def _follow(client: Client, run: str, timeout: float | None, *, fail_on_regression: bool, as_json: bool) -> None:
     found = evaluating.watch_evaluation(client, run, timeout=timeout)
     if as_json:
-        console.result_json(found)
-    elif found["state"] == "done":
-        console.say(f"done: {found['reason']}")
+        console.result_json(found.raw)
+    elif found.state == "done":
+        console.say(f"done: {found.reason}")
     evaluating.check_evaluation(found, fail_on_regression=fail_on_regression)
 
 
@@ -244,7 +228,7 @@ def adherence(
     with console.bar() as bar:
         task = bar.add_task("judging", total=None)
         judged = judge_adherence(
-            bundle, seeds=seeds, seconds=seconds, settings=evaluating.settings_of(settings or ()), captions=captions,
+            bundle, seeds=seeds, seconds=seconds, settings=options.settings_of(settings or ()), captions=captions,
             prompts=prompts, every=every, steers=steers, walks=walks, threads=threads, output=output,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )  # fmt: skip

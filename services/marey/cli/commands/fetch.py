@@ -16,8 +16,7 @@ from marey.client.names import check_template
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from marey.client.fetching import Download
-    from marey.client.transport import Transport
+    from marey.client import Client, FetchedItem
 
 
 class Review(StrEnum):
@@ -45,10 +44,10 @@ def fetch(
 
     Of several jobs, each has its folder.
     """
-    from marey.client.transport import Transport
+    from marey.client import Client
 
     check_template(name_template)
-    with Transport.here() as client:
+    with Client() as client:
         found = find_all(client, "job", jobs)
         for job in found:
             folder = output if len(found) == 1 else output / job.id
@@ -59,7 +58,7 @@ def fetch(
 
 
 def write_job(
-    client: Transport,
+    client: Client,
     job: str,
     folder: Path,
     formats: Sequence[str] | None,
@@ -70,7 +69,7 @@ def write_job(
     overwrite: bool = False,
     as_json: bool = False,
 ) -> None:
-    """Fetch what a job has made so far and print a line for each of its items, in input order."""
+    """Fetch the files that a job has so far and print a line for each of its items, in input order."""
     lines = fetch_job(client, job, folder, formats, template=template, only=only, prune=prune, overwrite=overwrite)
     for line in lines:
         if as_json:
@@ -82,11 +81,11 @@ def write_job(
     if waiting:
         console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
     if only is not None and not lines:
-        console.say(f"no motion of job {job} is {only.value}: `marey motions keep ID…` says so of some.")
+        console.say(f"no motion of job {job} is {only.value}: `marey motions keep ID…` marks motions as kept.")
 
 
 def fetch_job(
-    client: Transport,
+    client: Client,
     job: str,
     folder: Path,
     formats: Sequence[str] | None = None,
@@ -96,14 +95,13 @@ def fetch_job(
     prune: bool = False,
     overwrite: bool = False,
 ) -> list[dict[str, Any]]:
-    """Fetch what a job has made so far, and write the manifest; the output line of each of its items, in input order.
+    """Fetch the files that a job has so far, with a progress bar, and return the output lines of its items.
 
     Args:
-        only: items with a motion of which this was said.
+        only: items whose motion has this review.
         prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from marey.client.fetching import FetchObserver
-    from marey.client.fetching import fetch_job as fetch
+    from marey.client import FetchObserver
 
     shown = console.home_relative(folder)
     with ExitStack() as stack:
@@ -113,7 +111,7 @@ def fetch_job(
                 self.bar = stack.enter_context(console.bar())
                 self.task = self.bar.add_task("fetching", total=total)
 
-            def fetched(self, download: Download) -> None:
+            def fetched(self, path: Path) -> None:
                 self.bar.advance(self.task)
 
             def interrupted(self, done: int, total: int) -> None:
@@ -122,19 +120,24 @@ def fetch_job(
                     f"{shown}: {done} of {total} files are there, and in manifest.csv; the same command goes on."
                 )
 
-        planned, left = fetch(
-            client, job, folder, formats or None,
-            template=template, review=None if only is None else only.value, prune=prune, overwrite=overwrite,
-            observer=Observer(),
+            def left_over(self, paths: Sequence[Path], *, removed: bool) -> None:
+                state = "were removed." if removed else "are no longer part of the selection: --prune removes them."
+                left.append(f"{shown}: {len(paths)} files of earlier fetches of job {job} {state}")
+
+        left: list[str] = []
+        fetched = client.jobs.fetch(
+            job, folder,
+            formats=formats or None, name_template=template, review=None if only is None else only.value, prune=prune,
+            overwrite=overwrite, on_progress=Observer(),
         )  # fmt: skip
-    if left:
-        told = "were removed." if prune else "lie there, of takes that are not among these: --prune removes them."
-        console.say(f"{shown}: {len(left)} files of earlier fetches of job {job} {told}")
-    return [output_line(item, files) for item, files in planned]
+    for message in left:
+        console.say(message)
+    return [output_line(each) for each in fetched]
 
 
-def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:
-    """The line of one item, as architecture.md gives it."""
+def output_line(fetched: FetchedItem) -> dict[str, Any]:
+    """Return the output line of an item."""
+    item = fetched.item.raw
     motion = item["motion"] or {}
     return {
         "job": item["job"],
@@ -152,5 +155,5 @@ def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, An
         "frames": motion.get("frames"),
         "fps": motion.get("fps"),
         "elapsed": motion.get("elapsed"),
-        "files": {d.format: str(d.path.absolute()) for d in files},
+        "files": {file_format: str(path.absolute()) for file_format, path in fetched.files.items()},
     }

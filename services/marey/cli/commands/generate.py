@@ -33,7 +33,7 @@ class Planned:
     variant: int
     wanted: Wanted
     paths: dict[str, Path]
-    """Where it goes, by format."""
+    """The path of each format."""
 
 
 def generate(
@@ -62,7 +62,13 @@ def generate(
     check_template(name_template)
     kinds = _exporters(formats)
     defaults = rows.defaults_of(
-        model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags, settings=sampling
+        model=model,
+        seconds=seconds,
+        seed=seed,
+        variants=variants,
+        fps=fps,
+        tags=tags,
+        settings=options.settings_of(sampling or ()),
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
@@ -79,7 +85,7 @@ def generate(
         for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
             line = _write(plan, clip, elapsed, chosen, overwrite=overwrite)
             bar.advance(task)
-            _tell_rewrite(clip)
+            _report_rewrite(clip)
             if as_json:
                 console.result_json(line)
             else:
@@ -87,7 +93,7 @@ def generate(
                     console.result(console.home_relative(path))
 
 
-def _tell_rewrite(clip: MotionClip) -> None:
+def _report_rewrite(clip: MotionClip) -> None:
     about = clip.manifest
     if about["rewritten"] != about["prompt"]:
         console.say(f"{about['prompt']!r} was read as {about['rewritten']!r}.")
@@ -96,7 +102,7 @@ def _tell_rewrite(clip: MotionClip) -> None:
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:
-    """The bundle that makes the items, and the settings of this process.
+    """Return the bundle that makes the items, and the settings of this process.
 
     Raises:
         InvalidItems: with all problems of the rows, lengths and settings of the bundle among them.
@@ -123,7 +129,7 @@ def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None
 
 
 def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) -> list[Problem]:
-    """Lengths that the bundle cannot make and settings that it has not, told before seconds of loading.
+    """Return the problems of lengths and settings that the bundle does not support, before it is loaded.
 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
@@ -165,7 +171,7 @@ def _one_model(items: Iterable[Item], default: str) -> str:
 
 
 def _exporters(formats: list[str] | None) -> list[Exporter[Any]]:
-    """The exporters of the formats, each once; by default all that are installed.
+    """Return the exporters of the formats, each once; by default all installed ones.
 
     Raises:
         InvalidInput: there is none for a format.

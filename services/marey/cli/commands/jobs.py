@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marey.cli import console
-from marey.cli.references import FORMS, find, find_all, listed, named, of_view
+from marey.cli import bulk, console
+from marey.cli.references import FORMS, find, of_view
 from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from marey.cli.references import Reference
     from marey.client import Client, JobChanges
+    from marey.client import Job as JobResult
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
@@ -29,7 +31,6 @@ FIELDS = (
     *("created", "started", "finished", "expires", "erased"),
 )
 COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
-DONE = {"pause": "paused", "resume": "resumed", "cancel": "cancelled", "retry": "retried"}
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
@@ -66,7 +67,7 @@ def show(job: Job, as_json: console.Json = False) -> None:
     from marey.client import Client
 
     with Client() as client:
-        job = find(client.transport, "job", job).id
+        job = find(client, "job", job).id
         found = client.jobs.get(job).raw
         place = client.jobs.queue(job).raw
         if as_json:
@@ -99,19 +100,19 @@ def wait(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> No
 @app.command()
 def pause(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Stop starting items of jobs; running items are finished."""
-    _act(jobs, "pause", as_json, reason=reason)
+    _act(jobs, lambda client, each: client.jobs.pause(each, reason=reason), "paused", as_json=as_json)
 
 
 @app.command()
 def resume(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Resume paused jobs."""
-    _act(jobs, "resume", as_json, reason=reason)
+    _act(jobs, lambda client, each: client.jobs.resume(each, reason=reason), "resumed", as_json=as_json)
 
 
 @app.command()
 def cancel(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Cancel unfinished items; finished ones stay."""
-    _act(jobs, "cancel", as_json, reason=reason)
+    _act(jobs, lambda client, each: client.jobs.cancel(each, reason=reason), "cancelled", as_json=as_json)
 
 
 @app.command()
@@ -122,7 +123,12 @@ def retry(
     as_json: console.Json = False,
 ) -> None:
     """Retry failed, dead and cancelled items."""
-    _act(jobs, "retry", as_json, failed_only=failed_only, reason=reason)
+    _act(
+        jobs,
+        lambda client, each: client.jobs.retry(each, failed_only=failed_only, reason=reason),
+        "retried",
+        as_json=as_json,
+    )
 
 
 @app.command()
@@ -160,14 +166,10 @@ def comment(
 @app.command()
 def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
-    from marey.client import Client
-
-    with Client() as client:
-        found = find_all(client.transport, "job", jobs)
-        console.confirm(f"Delete {listed(found)} with all motions?", yes=yes)
-        for job in named(client.transport, "/v1/jobs", found):
-            client.jobs.delete(job.id)
-            console.say(f"deleted {job}")
+    bulk.delete_all(
+        "job", jobs, lambda client, each: client.jobs.delete(each.id),
+        question="Delete {} with all motions?", done="deleted {}", yes=yes,
+    )  # fmt: skip
 
 
 @app.command()
@@ -177,19 +179,17 @@ def erase(
     as_json: console.Json = False,
 ) -> None:
     """Erase the prompts of ended jobs permanently; motions, names and tags stay."""
-    from marey.client import Client
 
-    with Client() as client:
-        wanted = find_all(client.transport, "job", jobs)
-        console.confirm(f"Forget the prompts of {listed(wanted)} for good?", yes=yes)
-        for job in named(client.transport, "/v1/jobs", wanted):
-            found = client.jobs.erase(job.id).raw
-            if as_json:
-                console.result_json(found)
-                continue
-            left = found["files_left"]
-            more = f"; {left} files are written anew and cannot be fetched before" if left else ""
-            console.say(f"erased the prompts of {job}{more}")
+    def erase_one(client: Client, job: Reference) -> None:
+        found = client.jobs.erase(job.id)
+        if as_json:
+            console.result_json(found.raw)
+            return
+        left = found.files_left
+        more = f"; {left} files are written anew and cannot be fetched before" if left else ""
+        console.say(f"erased the prompts of {job}{more}")
+
+    bulk.delete_all("job", jobs, erase_one, question="Erase the prompts of {} permanently?", done=None, yes=yes)
 
 
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
@@ -197,43 +197,31 @@ def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> Non
     from marey.client import Client
 
     with Client() as client:
-        found = find(client.transport, "job", job)
-        ended = watch_job(client.transport, found.id, timeout=timeout, quiet=quiet)
+        ended = watch_job(client, find(client, "job", job).id, timeout=timeout, quiet=quiet)
     if as_json:
-        console.result_json(ended)
+        console.result_json(ended.raw)
     check_ended(ended)
 
 
-def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
-    from marey.client import Client
+def _act(jobs: list[str], act: Callable[[Client, str], JobResult], done: str, *, as_json: bool) -> None:
+    def describe(job: JobResult) -> str:
+        return f"{done} {of_view('job', job.raw)}: {job.state}"
 
-    with Client() as client:
-        act = {
-            "pause": client.jobs.pause,
-            "resume": client.jobs.resume,
-            "cancel": client.jobs.cancel,
-            "retry": client.jobs.retry,
-        }[verb]
-        for job in find_all(client.transport, "job", jobs):
-            found = act(job.id, **params).raw
-            if as_json:
-                console.result_json(found)
-            else:
-                console.say(f"{DONE[verb]} {of_view('job', found)}: {found['state']}")
+    bulk.change_all("job", jobs, act, describe, as_json=as_json)
 
 
 def _change(job: str, patch: JobChanges, as_json: bool, reason: str | None = None) -> None:
     from marey.client import Client
 
     with Client() as client:
-        found = client.jobs.update(find(client.transport, "job", job).id, reason=reason, **patch).raw
+        found = client.jobs.update(find(client, "job", job).id, reason=reason, **patch).raw
     if as_json:
         console.result_json(found)
         return
-    told = [f"{found['state']}, priority {found['priority']}"]
+    parts = [f"{found['state']}, priority {found['priority']}"]
     if found["fail_early"] is not None:
-        told.append(f"fails early above {found['fail_early']:g}")
-    console.say(f"{of_view('job', found)}: {', '.join([*told, *filter(None, [found['comment']])])}")
+        parts.append(f"fails early above {found['fail_early']:g}")
+    console.say(f"{of_view('job', found)}: {', '.join([*parts, *filter(None, [found['comment']])])}")
 
 
 def _share(text: str) -> float | None:

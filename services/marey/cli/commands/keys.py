@@ -111,7 +111,7 @@ def revoke(key: Key, tenant: Tenant = "default") -> None:
 
 
 def find_key(conn: sa.Connection, tenant: str | None, key: str) -> UUID:
-    """The key that is meant, of a tenant or, with None, of any; raises as `marey.cli.references.find`."""
+    """Resolve a reference to a key of a tenant, or for None of any tenant; raises as `marey.cli.references.find`."""
     from marey.takes import ReferenceKind, resolve_reference
     from marey.tenants import list_tenants
 
@@ -135,13 +135,13 @@ def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:
 
         taken = keys_named(conn, tenant, name)
     if taken:
-        told = f"a valid key of tenant {tenant} is already named {name!r} (id {taken[0].id})"
+        taken_name = f"a valid key of tenant {tenant} is already named {name!r} (id {taken[0].id})"
         if not console.can_ask():
             raise InvalidInput(
-                told,
+                taken_name,
                 hint="--allow-duplicate makes another one of that name; `marey admin keys rotate ID` replaces it.",
             )
-        console.confirm(f"{told[0].upper()}{told[1:]}. Make another one?", yes=False)
+        console.confirm(f"{taken_name[0].upper()}{taken_name[1:]}. Create another one?", yes=False)
 
 
 def _show_secret(made: NewApiKey, as_json: bool) -> None:

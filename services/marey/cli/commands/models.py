@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
@@ -17,9 +18,9 @@ Local = Annotated[bool, typer.Option("--local", help="Show the bundles of this m
 @app.command("list")
 def list_models(local: Local = False, as_json: console.Json = False) -> None:
     """List the bundles of the server, or of this machine if none runs."""
-    answer = _local_models() if local or not _server_named() else _ask("/v1/models")
+    answer = _local_models() if local or not _server_named() else _server_models()
     found = answer["items"]
-    for broken in answer.get("broken", []):  # an older server does not tell
+    for broken in answer.get("broken", []):  # an older server does not send them
         console.say(f"left out: {broken['name']}: {broken['reason']}")
     if as_json:
         for model in found:
@@ -39,7 +40,7 @@ def show(
     as_json: console.Json = False,
 ) -> None:
     """Show one bundle: what its model can do, terms, data and settings; figures with --metrics."""
-    found = _local_model(name) if local or not _server_named() else _ask(f"/v1/models/{name}")
+    found = _local_model(name) if local or not _server_named() else _server_model(name)
     if as_json:
         console.result_json(found)
         return
@@ -49,7 +50,7 @@ def show(
     console.result(f"{'weights':<12} {_weights(found)}")
     for source in found["data"]:
         console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
-    for line in found.get("about", "").splitlines():  # an older server does not tell
+    for line in found.get("about", "").splitlines():  # an older server does not send it
         console.result(f"{'about':<12} {line}")
     for setting in found.get("settings", []):
         kind = "whole, " if setting["whole"] else ""
@@ -91,11 +92,18 @@ def _server_named() -> bool:
     return bool(os.environ.get("MAREY_SERVER")) or (home() / "server.json").exists()
 
 
-def _ask(path: str) -> Any:
-    from marey.client.transport import Transport
+def _server_models() -> Mapping[str, Any]:
+    from marey.client import Client
 
-    with Transport.here() as client:
-        return client.get(path)
+    with Client() as client:
+        return client.models.catalogue().raw
+
+
+def _server_model(name: str) -> Mapping[str, Any]:
+    from marey.client import Client
+
+    with Client() as client:
+        return client.models.get(name).raw
 
 
 def _local_models() -> dict[str, Any]:
@@ -122,9 +130,9 @@ def _local_model(name: str) -> dict[str, Any]:
     return ModelView.of(Catalogue(settings()).capabilities(name)).model_dump(mode="json")
 
 
-def _length(model: dict[str, Any]) -> str:
+def _length(model: Mapping[str, Any]) -> str:
     return f"{model['min_seconds']:g} to {model['max_seconds']:g} s"
 
 
-def _weights(model: dict[str, Any]) -> str:
+def _weights(model: Mapping[str, Any]) -> str:
     return "random: never trained" if model["random"] else "trained"

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from marey.cli import console
-from marey.cli.commands.takes import Review, review_of
+from marey.cli.commands.takes import Review
 from marey.cli.references import FORMS, find
 from marey.core.errors import Conflict, InvalidInput, NotFound
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
     from marey.cli.drawing import Drawers
-    from marey.client.transport import Transport
+    from marey.client import Client, Motion
 
 ENDINGS = (".html", ".htm", ".png")
 PER_PAGE = 400
@@ -56,7 +56,7 @@ def review(
     A .png of up to 24 motions shows a row of each; one of more shows tiles.
     """
     from marey.cli.drawing import Drawers
-    from marey.client.transport import Transport
+    from marey.client import Client
     from marey.core.extras import needs_extra
 
     try:
@@ -65,10 +65,10 @@ def review(
         raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .html or .png.")
-    with Transport.here() as client:
+    with Client() as client:
         job = find(client, "job", job).id
         found, more = _motions(client, job, reviews, tags, skip, limit)
-        name = client.get(f"/v1/jobs/{job}")["name"] or f"Job {job}"
+        name = client.jobs.get(job).name or f"Job {job}"
         pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]
         paths = _paths(output, len(pages))
         _check_free(paths, overwrite=overwrite)
@@ -78,7 +78,7 @@ def review(
                 first = skip + number * per_page
                 count = f"{first + 1} to {first + len(page)} of {skip + len(found)}{' and more' if more else ''}"
                 with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
-                    files = _fetch(client, page, Path(folder))
+                    files = client.motions.fetch_all(page, folder)
                     if output.suffix.lower() == ".png":
                         _sheet(page, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task))
                     else:
@@ -138,21 +138,16 @@ def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
 
 
 def _motions(
-    client: Transport, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
-) -> tuple[list[dict[str, Any]], bool]:
-    """The motions to show, in the order of the job's items, and True if there are more.
+    client: Client, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
+) -> tuple[list[Motion], bool]:
+    """Return the motions to show, in the order of the job's items, and True if there are more.
 
     Raises:
         NotFound: none.
     """
-    wanted, of_each = set(reviews or Review), set(tags or ())
-    items = client.pages(f"/v1/jobs/{job}/items", state="succeeded", limit=1000)
-    motions = (item["motion"] for item in items if item["motion"])
-    chosen = (
-        motion
-        for motion in motions
-        if of_each <= set(motion["tags"]) and (review_of(motion) or Review.NEW.value) in wanted
-    )
+    wanted, of_each = {review.value for review in reviews or Review}, set(tags or ())
+    motions = (item.motion for item in client.jobs.items(job, state="succeeded") if item.motion)
+    chosen = (motion for motion in motions if of_each <= set(motion.tags) and _verdict(motion) in wanted)
     found = list(islice(chosen, skip, skip + limit + 1))
     if not found:
         raise NotFound(
@@ -164,7 +159,7 @@ def _motions(
 
 
 def _sheet(
-    motions: Sequence[dict[str, Any]],
+    motions: Sequence[Motion],
     files: Sequence[Path],
     path: Path,
     title: str,
@@ -177,7 +172,7 @@ def _sheet(
     from marey.viz.render import COLUMNS, save_png, stack_rows
 
     columns = COLUMNS if len(motions) <= ROWS else None
-    captions = [f"{_facts(motion)}  ·  {motion['prompt']}" for motion in motions]
+    captions = [f"{_facts(motion)}  ·  {motion.prompt}" for motion in motions]
     drawings = [Drawing(file, caption, columns) for file, caption in zip(files, captions, strict=True)]
 
     def images() -> Iterator[Image]:
@@ -193,7 +188,7 @@ def _sheet(
 
 
 def _page(
-    motions: Sequence[dict[str, Any]],
+    motions: Sequence[Motion],
     files: Sequence[Path],
     path: Path,
     title: str,
@@ -205,41 +200,24 @@ def _page(
     from marey.viz.gallery import Card, html_gallery
 
     cards = [
-        Card(motion["id"], load_npz(file), motion["prompt"], _facts(motion), motion["tags"], _said(motion))
+        Card(motion.id, load_npz(file), motion.prompt, _facts(motion), motion.tags, _review_text(motion))
         for motion, file in zip(motions, files, strict=True)
     ]
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later)
 
 
-def _fetch(client: Transport, motions: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
-    """The motions' npz, fetched eight at a time into a folder."""
-    from marey.client.fetching import Download, download_all
-
-    downloads = [_download(motion, folder, Download) for motion in motions]
-    download_all(client, downloads, overwrite=False, done=lambda _: None)
-    return [download.path for download in downloads]
+def _facts(motion: Motion) -> str:
+    take = ["take of another"] if motion.replaces else []
+    name = [motion.name] if motion.name else []
+    return "  ·  ".join([f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s", *take])
 
 
-def _download(motion: dict[str, Any], folder: Path, kind: Any) -> Any:
-    file = next((file for file in motion["files"] if file["format"] == "npz"), None)
-    if file is None:
-        raise NotFound(
-            "has no npz to draw", where=f"motion {motion['id']}", hint="If it is being erased, wait a moment."
-        )
-    url = f"/v1/motions/{motion['id']}/files/npz"
-    return kind(url, file["sha256"], file["size"], folder / f"{motion['id']}.npz")
+def _verdict(motion: Motion) -> str:
+    return motion.review.verdict if motion.review else Review.NEW.value
 
 
-def _facts(motion: dict[str, Any]) -> str:
-    take = ["take of another"] if motion["replaces"] else []
-    name = [motion["name"]] if motion["name"] else []
-    length = f"{motion['frames'] / motion['fps']:.1f} s"
-    return "  ·  ".join([f"{motion['index']:05}", *name, f"seed {motion['seed']}", length, *take])
-
-
-def _said(motion: dict[str, Any]) -> str:
-    verdict = review_of(motion)
-    if verdict is None:
+def _review_text(motion: Motion) -> str:
+    review = motion.review
+    if review is None:
         return ""
-    comment = motion["review"]["comment"]
-    return f"{verdict} by {motion['review']['by']}" + (f": {comment}" if comment else "")
+    return f"{review.verdict} by {review.by}" + (f": {review.comment}" if review.comment else "")

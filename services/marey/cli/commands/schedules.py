@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from marey.cli import console, evaluating
-from marey.cli.evaluating import Asked
+from marey.cli import bulk, console, evaluating
+from marey.cli.evaluating import EvaluationArguments
 from marey.cli.options import ExtraColumns
-from marey.cli.references import FORMS, find, find_all, listed, named, of_view
+from marey.cli.references import FORMS, find, of_view
+
+if TYPE_CHECKING:
+    from marey.client import Schedule
 
 COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
 
 
 class Schedules(TyperGroup):
-    """A first word that is a cron line is an `add`: no command's name holds a blank, and every such line does."""
+    """Commands, and cron expressions in the place of one: these hold a blank, and mean `add`."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that the arguments name."""
+        """Return the command that the arguments name."""
         return super().resolve_command(ctx, ["add", *args] if " " in args[0] else args)
 
 
@@ -57,54 +61,54 @@ def add(
     """Evaluate a model on a schedule; prints the schedule's id. Each run looks up the bundles by the names given
     here."""
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
-    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
-    body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
-    from marey.client.transport import Transport
+    asked = EvaluationArguments(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
+    wanted = asked.options()
+    from marey.client import Client
 
-    with Transport.here() as client, asked.in_source():
-        if baseline is not None:
-            body["baseline"] = find(client, "evaluation", baseline).id
-        made = client.post_once("/v1/schedules", body)
+    with Client() as client:
+        wanted["baseline"] = asked.baseline_of(client)
+        made = client.schedules.create(cron, bundle, time_zone=time_zone, name=name, **wanted)
     if as_json:
-        console.result_json(made)
+        console.result_json(made.raw)
     else:
-        console.result(made["id"])
-        console.say(f"first at {made['next']}")
+        console.result(made.id)
+        console.say(f"first at {made.raw['next']}")
 
 
 @app.command("list")
 def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List schedules, newest first, with their next times and the results of their last runs."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = client.pages("/v1/schedules", limit=console.PAGE)
-        console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
+    with Client() as client:
+        console.listing(
+            (each.raw for each in client.schedules.list()), COLUMNS, _cell, as_json=as_json, full_ids=full_ids
+        )
 
 
 @app.command()
 def pause(schedules: Ids, as_json: console.Json = False) -> None:
     """Pause schedules; current runs go on."""
-    _change(schedules, as_json, paused=True)
+    bulk.change_all("schedule", schedules, lambda client, each: client.schedules.pause(each), _state, as_json=as_json)
 
 
 @app.command()
 def resume(schedules: Ids, as_json: console.Json = False) -> None:
     """Resume schedules from their next time on; missed times are not made up for."""
-    _change(schedules, as_json, paused=False)
+    bulk.change_all("schedule", schedules, lambda client, each: client.schedules.resume(each), _state, as_json=as_json)
 
 
 @app.command()
 def run(schedule: Id, as_json: console.Json = False) -> None:
     """Run a schedule's evaluation now, in addition to its times; prints the run's id."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        made = client.post_once(f"/v1/schedules/{find(client, 'schedule', schedule).id}/run", None)
+    with Client() as client:
+        made = client.schedules.run(find(client, "schedule", schedule).id)
     if as_json:
-        console.result_json(made)
+        console.result_json(made.raw)
     else:
-        console.result(made["id"])
+        console.result(made.id)
 
 
 @app.command()
@@ -115,42 +119,30 @@ def history(
     as_json: console.Json = False,
 ) -> None:
     """List the runs of a schedule, newest first."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        wanted = find(client, "schedule", schedule).id
-    evaluating.show_runs(f"/v1/schedules/{wanted}/evaluations", limit, as_json, full_ids=full_ids)
+    with Client() as client:
+        found = client.schedules.runs(find(client, "schedule", schedule).id, page_size=console.page_size(limit))
+        evaluating.show_runs(found, limit, as_json, full_ids=full_ids)
 
 
 @app.command()
 def delete(schedules: Ids, yes: console.Yes = False) -> None:
     """Delete schedules; their runs stay."""
-    from marey.client.transport import Transport
-
-    with Transport.here() as client:
-        found = find_all(client, "schedule", schedules)
-        console.confirm(f"Delete {listed(found)}?", yes=yes)
-        for each in named(client, "/v1/schedules", found):
-            client.delete(f"/v1/schedules/{each.id}")
-            console.say(f"deleted {each}")
+    bulk.delete_all(
+        "schedule", schedules, lambda client, each: client.schedules.delete(each.id),
+        question="Delete {}?", done="deleted {}", yes=yes,
+    )  # fmt: skip
 
 
-def _change(schedules: list[str], as_json: bool, **changes: object) -> None:
-    from marey.client.transport import Transport
-
-    with Transport.here() as client:
-        for each in find_all(client, "schedule", schedules):
-            found = client.patch(f"/v1/schedules/{each.id}", changes)
-            if as_json:
-                console.result_json(found)
-            else:
-                what = of_view("schedule", found)
-                console.say(f"{what} is paused" if found["paused"] else f"{what} is next due at {found['next']}")
+def _state(schedule: Schedule) -> str:
+    due = "is paused" if schedule.paused else f"is next due at {schedule.raw['next']}"
+    return f"{of_view('schedule', schedule.raw)} {due}"
 
 
-def _cell(schedule: dict[str, Any], column: str) -> object:
+def _cell(schedule: Mapping[str, Any], column: str) -> object:
     if column == "next" and schedule["paused"]:
         return "paused"
     if column == "last_regressed":
-        return {True: "regressed", False: "no", None: None}[schedule[column]]
+        return evaluating.regressed_cell(schedule[column])
     return schedule["request"][column] if column in ("bundle", "source") else schedule[column]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console, options
-from marey.core.errors import InvalidInput, MareyError, NotFound
+from marey.core.errors import MareyError, NotFound
 
 if TYPE_CHECKING:
     from marey.cli.live.steering import Interrupts
-    from marey.client.recording import Recording
-    from marey.client.transport import Transport
+    from marey.client import Client, LiveStream
 
 COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
 
@@ -50,8 +48,8 @@ def stream(
 ) -> None:
     """Watch motion while it is generated, and steer it.
 
-    A line on stdin is what the person does next; /pause, /resume and /stop do what they say. The end of stdin ends
-    nothing. Ctrl-C stops the stream, waits for its end and exits with 130; a second one leaves at once.
+    A line on stdin is the next action of the person; /pause, /resume and /stop control the stream. The end of stdin
+    has no effect. Ctrl-C stops the stream, waits for its end and exits with 130; a second one exits at once.
 
     The line that counts shows frames a second over the last two seconds, and the latency: the age of the newest frame
     on an even clock of 20 frames a second, set by the frame that came earliest. It is below 50 ms as long as no time is
@@ -62,17 +60,19 @@ def stream(
     """
     from marey.cli.live.steering import Interrupts
 
-    body = _body(prompt, seconds=seconds, seed=seed, model=model, name=name)
-    recording = _recording(output, overwrite=overwrite)
     if fetch is not None:
         from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything begins
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         with Interrupts() as interrupts:
-            result, error = _follow(client, body, recording, interrupts, slow=slow, as_json=as_json)
+            live = client.streams.open(
+                prompt, model=model, seed=seed, seconds=seconds, name=name, slow=slow.value, record=output,
+                overwrite=overwrite,
+            )  # fmt: skip
+            result, error = _follow(live, interrupts, as_json=as_json)
         _write_result(result, as_json=as_json)
         if error is not None:
             raise error
@@ -84,42 +84,16 @@ def stream(
             _fetch(client, result, fetch, overwrite=overwrite, as_json=as_json)
 
 
-def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]:
-    """The request, checked as far as one can without the server."""
-    from marey.items.item import read_items
-
-    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-        raise InvalidInput(f"{seconds:g} seconds is out of range", where="--seconds")
-    (item,) = read_items([(None, {"prompt": prompt, **given})])
-    body = item.as_json()
-    del body["variants"]
-    return body if seconds is None else {**body, "seconds": seconds}
-
-
-def _recording(path: Path | None, *, overwrite: bool) -> Recording | None:
-    if path is None:
-        return None
-    from marey.client.recording import Recording
-
-    return Recording(path, overwrite=overwrite)
-
-
-def _follow(
-    client: Transport, body: dict[str, Any], recording: Recording | None, interrupts: Interrupts, *, slow: Slow,
-    as_json: bool,
-) -> tuple[dict[str, Any], MareyError | None]:  # fmt: skip
-    """The line of the stream, and what went wrong; what came until then stays."""
+def _follow(live: LiveStream, interrupts: Interrupts, *, as_json: bool) -> tuple[dict[str, Any], MareyError | None]:
+    """Follow a stream to its end; return its output line, and its error, which does not undo what arrived before."""
     from marey.cli.live.follow import Follower
-    from marey.client.link import Link
 
-    begun = client.post_once("/v1/streams", body)
-    with Link(client.server, begun["id"], slow=slow.value) as link:
-        follower = Follower(begun, link, recording, interrupts, as_json=as_json)
-        try:
-            follower.run()
-        except MareyError as error:
-            return follower.result(), error
-        return follower.result(), follower.failure()
+    follower = Follower(live, interrupts, as_json=as_json)
+    try:
+        follower.run()
+    except MareyError as error:
+        return follower.result(), error
+    return follower.result(), live.failure()
 
 
 def _write_result(result: dict[str, Any], *, as_json: bool) -> None:
@@ -136,7 +110,7 @@ def _filled(result: dict[str, Any]) -> str:
     return "; in the file they are interpolated." if result["file"] else "."
 
 
-def _fetch(client: Transport, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
+def _fetch(client: Client, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
     from marey.cli.commands.fetch import write_job
     from marey.cli.watching import check_ended, watch_job
 

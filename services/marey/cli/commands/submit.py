@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,8 @@ from marey.items.item import InvalidItems
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from marey.client import CheckedJob, Client
+    from marey.client.jobs import JobOptions
     from marey.client.lines import Lines
 
 
@@ -55,8 +57,8 @@ def submit(
     as_json: console.Json = False,
 ) -> None:
     """Put prompts into the queue of a server; prints the job's id."""
+    from marey.client import Client
     from marey.client.lines import Lines
-    from marey.client.transport import Transport
 
     check_template(name_template)
     if fetch is not None:
@@ -64,43 +66,48 @@ def submit(
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = rows.defaults_of(
-        model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags, settings=sampling
+        model=model,
+        bundle=bundle,
+        seconds=seconds,
+        seed=seed,
+        variants=variants,
+        fps=fps,
+        tags=tags,
+        settings=options.settings_of(sampling or ()),
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     with Lines(item.as_json() for item in reader) as lines:
         if reader.total:
             raise _all_problems(reader, lines)
-        with Transport.here() as client:
-            with reader.in_source():
-                job = client.submit(
-                    lines,
-                    validate_only=dry_run,
-                    name=name,
-                    priority=priority or None,
-                    fail_early=fail_early,
-                    keep_days=keep_days,
-                )
+        with Client() as client:
+            wanted: JobOptions = {
+                "name": name, "priority": priority, "fail_early": fail_early, "keep_days": keep_days,
+            }  # fmt: skip
             if dry_run:
-                _tell_dry_run(job)
+                with reader.in_source():
+                    checked = client.jobs.check_lines(lines, **wanted)
+                _show_check(checked)
                 if as_json:
-                    console.result_json(job)
+                    console.result_json(checked.raw)
                 return
+            with reader.in_source():
+                job = client.jobs.submit_lines(lines, **wanted)
             if as_json and fetch is None:
-                console.result_json(job)
+                console.result_json(job.raw)
             elif not as_json:
-                console.result(job["id"])
+                console.result(job.id)
             if watch or fetch is not None:
-                _follow(client, job["id"], fetch, formats, name_template, timeout, as_json)
+                _follow(client, job.id, fetch, formats, name_template, timeout, as_json)
 
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
     """List the problems of the rows, with those that only the server can find; submit nothing."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
     try:
         if len(lines):
-            with Transport.here() as client:
-                client.submit(lines, validate_only=True)
+            with Client() as client:
+                client.jobs.check_lines(lines)
     except InvalidItems as error:
         reader.add(reader.located(error.problems))
         reader.total += error.total - len(error.problems)
@@ -109,22 +116,20 @@ def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
     return reader.error()
 
 
-def _tell_dry_run(checked: dict[str, Any]) -> None:
-    console.say(
-        f"{checked['items']} motions would be made, with {', '.join(checked['bundles'])}; nothing was submitted."
-    )
-    for quota in checked["quotas"]:
-        size = console.size if quota["name"] == "bytes" else str
-        of_what = "queued items" if quota["name"] == "queued" else "stored bytes"
+def _show_check(checked: CheckedJob) -> None:
+    console.say(f"{checked.items} motions would be made, with {', '.join(checked.bundles)}; nothing was submitted.")
+    for quota in checked.quotas:
+        size = console.size if quota.name == "bytes" else str
+        of_what = "queued items" if quota.name == "queued" else "stored bytes"
         console.say(
-            f"It takes {size(quota['asked'])} of the quota of {of_what}: "
-            f"{size(quota['used'])} of {size(quota['limit'])} are used, {size(quota['left'])} left."
+            f"It takes {size(quota.asked)} of the quota of {of_what}: "
+            f"{size(quota.used)} of {size(quota.limit)} are used, {size(quota.left)} left."
         )
-    estimate = checked["estimate"]
-    if estimate["seconds"] is not None:
-        behind = f", behind {checked['waiting']} that wait now" if checked["waiting"] else ""
-        console.say(f"That takes about {console.length_of_time(estimate['seconds'])}{behind}.")
-    console.say(estimate["basis"])
+    estimate = checked.estimate
+    if estimate.seconds is not None:
+        behind = f", behind {checked.waiting} that wait now" if checked.waiting else ""
+        console.say(f"That takes about {console.length_of_time(estimate.seconds)}{behind}.")
+    console.say(estimate.basis)
 
 
 def read_prompts(
@@ -157,7 +162,13 @@ def read_prompts(
 
 
 def _follow(
-    client, job: str, folder: Path | None, formats, template: str, timeout: float | None, as_json: bool
+    client: Client,
+    job: str,
+    folder: Path | None,
+    formats: list[str] | None,
+    template: str,
+    timeout: float | None,
+    as_json: bool,
 ) -> None:
     from marey.cli.commands.fetch import write_job
     from marey.cli.watching import check_ended, watch_job

@@ -58,7 +58,7 @@ def list_motions(
 
     with Client() as client:
         found = client.motions.list(
-            job=None if job is None else find(client.transport, "job", job).id,
+            job=None if job is None else find(client, "job", job).id,
             tags=tags,
             name=name,
             text=text,
@@ -71,26 +71,26 @@ def list_motions(
 @app.command()
 def keep(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
     """Mark motions as kept: `marey fetch --only kept` fetches them."""
-    _say(motions, "kept", comment, as_json)
+    _review(motions, "kept", comment, as_json)
 
 
 @app.command()
 def reject(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
     """Mark motions as rejected; nothing is deleted."""
-    _say(motions, "rejected", comment, as_json)
+    _review(motions, "rejected", comment, as_json)
 
 
 @app.command()
 def clear(motions: Motions, as_json: console.Json = False) -> None:
     """Remove the reviews of motions."""
-    _say(motions, None, None, as_json)
+    _review(motions, None, None, as_json)
 
 
 @app.command()
 def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
     """Generate motions again with the next seed, otherwise unchanged: a new item in the same job, linked to the old.
 
-    Said twice, it is done once; to go on, re-roll the new motion.
+    A repeated command has no further effect; to continue, re-roll the new motion.
     """
     from marey.client import Client
 
@@ -104,7 +104,9 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
                     console.result(f"{take.motion} item {take.item} seed {take.seed} job {take.job}{when}")
 
 
-def _say(motions: list[str], verdict: Literal["kept", "rejected"] | None, comment: str | None, as_json: bool) -> None:
+def _review(
+    motions: list[str], verdict: Literal["kept", "rejected"] | None, comment: str | None, as_json: bool
+) -> None:
     from marey.client import Client
 
     with Client() as client:
@@ -117,14 +119,14 @@ def _say(motions: list[str], verdict: Literal["kept", "rejected"] | None, commen
 
 
 def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:
-    """The ids, each once, so many as one request takes at a time.
+    """Yield the ids, each once, in lists of the size of one request.
 
     Raises:
-        InvalidInput: there is none, or one is ambiguous.
+        InvalidInput: there is no id, or one is ambiguous.
         NotFound: there is no such motion.
     """
     given = _lines(sys.stdin.read()) if motions == ["-"] else motions
-    ids = [each.id for each in find_all(client.transport, "motion", dict.fromkeys(given))]
+    ids = [each.id for each in find_all(client, "motion", dict.fromkeys(given))]
     if not ids:
         raise InvalidInput("no motion id is given", hint="`marey motions list` shows them.")
     for first in range(0, len(ids), MOST):
@@ -132,7 +134,7 @@ def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:
 
 
 def _lines(text: str) -> list[str]:
-    """References of a text: a line each where names hold blanks, else the words."""
+    """Return the references in a text: whole lines where names contain blanks, else words."""
     return [word for line in text.splitlines() for word in ([line.strip()] if ":" in line else line.split()) if word]
 
 
@@ -145,5 +147,5 @@ def _cell(motion: Mapping[str, Any], column: str) -> object:
 
 
 def review_of(motion: Mapping[str, Any]) -> str | None:
-    """The review of a motion of the API."""
+    """Return the review of a motion of the API; None if it has none."""
     return motion["review"] and motion["review"]["verdict"]

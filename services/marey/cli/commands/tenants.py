@@ -50,7 +50,7 @@ def create(
         row = create_tenant(conn, tenant, Quotas(**chosen))
         audit(conn, tenant, operator(), "tenant.create", tenant, **chosen)
         shown = _view(conn, row)
-    _tell(shown, f"{tenant} was created. A key: `marey admin keys create NAME --tenant {tenant}`.", as_json)
+    _report(shown, f"{tenant} was created. A key: `marey admin keys create NAME --tenant {tenant}`.", as_json)
 
 
 @app.command("list")
@@ -104,7 +104,7 @@ def change(
         row = set_quotas(conn, tenant, chosen)
         audit(conn, tenant, operator(), "tenant.set", tenant, **{name: value or NONE for name, value in chosen.items()})
         shown = _view(conn, row)
-    _tell(shown, f"{tenant}: {_in_words(shown)}", as_json)
+    _report(shown, f"{tenant}: {_in_words(shown)}", as_json)
 
 
 @app.command("suspend")
@@ -129,7 +129,7 @@ def reinstate(tenant: Name) -> None:
 
         reinstate_tenant(conn, tenant)
         audit(conn, tenant, operator(), "tenant.reinstate", tenant)
-    console.say(f"{tenant} may go on")
+    console.say(f"{tenant} is active again")
 
 
 def _chosen(queued: str | None, running: str | None, size: str | None, streams: str | None) -> dict[str, int | None]:
@@ -138,7 +138,7 @@ def _chosen(queued: str | None, running: str | None, size: str | None, streams: 
 
 
 def _quota(name: str, text: str) -> int | None:
-    """A number, or none; bytes may have a unit.
+    """Read a quota: a number, which may have a unit for bytes, or `none`.
 
     Raises:
         InvalidInput: it is neither.
@@ -167,7 +167,7 @@ def _view(conn: sa.Connection, row: TenantRow) -> dict[str, Any]:
 
 
 def _used(view: dict[str, Any]) -> dict[str, str]:
-    """Usage of each quota, for people."""
+    """Describe the usage of each quota."""
     used, quotas = view["used"], view["quotas"]
     words = {
         "queued": f"{used['queued']}",
@@ -190,7 +190,7 @@ def _of_a_key(limit: int | None) -> str | None:
     return None if limit is None else f"{limit} a key"
 
 
-def _tell(view: dict[str, Any], words: str, as_json: bool) -> None:
+def _report(view: dict[str, Any], words: str, as_json: bool) -> None:
     if as_json:
         console.result_json(view)
     else:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Mapping
 from enum import StrEnum
+from operator import getitem
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marey.cli import console
-from marey.cli.references import FORMS, find, find_all, listed, named, of_view
-from marey.core.errors import ItemsFailed, TimedOut
+from marey.cli import bulk, console
+from marey.cli.hints import hint_of_timeout
+from marey.cli.references import FORMS, find, find_all, of_view
+from marey.core.errors import ItemsFailed
 
 if TYPE_CHECKING:
-    from marey.client.transport import Transport
+    from marey.client import DeliveryDetail, Webhook
 
 app = typer.Typer(
     help="Signed messages to your own server when jobs, streams and evaluations end.", no_args_is_help=True
@@ -21,7 +23,7 @@ app = typer.Typer(
 
 COLUMNS = ("id", "name", "url", "events", "paused", "pending", "failed")
 DELIVERY_COLUMNS = ("event", "kind", "state", "attempts", "status", "created", "next", "error")
-LOOK_SECONDS = 0.25
+ATTEMPT_COLUMNS = ("number", "at", "status", "seconds", "error")
 DELIVERIES = "Deliveries: the id of the event, its last 8 digits, or last."
 
 Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help=f"The webhook: {FORMS}.")]
@@ -47,35 +49,35 @@ def add(
     as_json: console.Json = False,
 ) -> None:
     """Subscribe to events from now on; prints the webhook's id and, once, its signing secret."""
-    body = {"url": url, **({"events": events} if events else {}), **({"name": name} if name else {})}
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        made = client.post_once("/v1/webhooks", body)
+    with Client() as client:
+        made = client.webhooks.create(url, events=events, name=name)
     if as_json:
-        console.result_json(made)
+        console.result_json(made.raw)
     else:
-        console.result(f"{made['id']}\t{made['secret']}")
+        console.result(f"{made.id}\t{made.secret}")
         console.say("The secret is shown only now; the receiver checks signatures with it.")
 
 
 @app.command("list")
 def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List webhooks, newest first."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = client.pages("/v1/webhooks", limit=console.PAGE)
-        console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
+    with Client() as client:
+        console.listing(
+            (each.raw for each in client.webhooks.list()), COLUMNS, _cell, as_json=as_json, full_ids=full_ids
+        )
 
 
 @app.command()
 def show(webhook: Id, as_json: console.Json = False) -> None:
     """Show a webhook."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = client.get(f"/v1/webhooks/{find(client, 'webhook', webhook).id}")
+    with Client() as client:
+        found = client.webhooks.get(find(client, "webhook", webhook).id).raw
     if as_json:
         console.result_json(found)
         return
@@ -86,13 +88,13 @@ def show(webhook: Id, as_json: console.Json = False) -> None:
 @app.command()
 def pause(webhooks: Ids, as_json: console.Json = False) -> None:
     """Pause deliveries; messages wait meanwhile."""
-    _change(webhooks, as_json, paused=True)
+    bulk.change_all("webhook", webhooks, lambda client, each: client.webhooks.pause(each), _state, as_json=as_json)
 
 
 @app.command()
 def resume(webhooks: Ids, as_json: console.Json = False) -> None:
     """Resume deliveries, waiting messages first."""
-    _change(webhooks, as_json, paused=False)
+    bulk.change_all("webhook", webhooks, lambda client, each: client.webhooks.resume(each), _state, as_json=as_json)
 
 
 @app.command()
@@ -104,29 +106,24 @@ def rotate(
     as_json: console.Json = False,
 ) -> None:
     """Replace the signing secret and print the new one once. Until the overlap ends messages carry both signatures."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        webhook = find(client, "webhook", webhook).id
-        made = client.post_once(f"/v1/webhooks/{webhook}/rotate?overlap_hours={overlap_hours:g}", None)
+    with Client() as client:
+        made = client.webhooks.rotate(find(client, "webhook", webhook).id, overlap_hours=overlap_hours)
     if as_json:
-        console.result_json(made)
+        console.result_json(made.raw)
     else:
-        console.result(made["secret"])
+        console.result(made.secret)
         console.say(f"Give it to the receiver; the one before it works for {overlap_hours:g} hours more.")
 
 
 @app.command()
 def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     """Remove webhooks with their deliveries and log."""
-    from marey.client.transport import Transport
-
-    with Transport.here() as client:
-        found = find_all(client, "webhook", webhooks)
-        console.confirm(f"Remove {listed(found)}?", yes=yes)
-        for each in named(client, "/v1/webhooks", found):
-            client.delete(f"/v1/webhooks/{each.id}")
-            console.say(f"removed {each}")
+    bulk.delete_all(
+        "webhook", webhooks, lambda client, each: client.webhooks.delete(each.id),
+        question="Remove {}?", done="removed {}", yes=yes,
+    )  # fmt: skip
 
 
 @app.command()
@@ -141,17 +138,19 @@ def deliveries(
     as_json: console.Json = False,
 ) -> None:
     """List a webhook's deliveries of the last 30 days, newest first; or the attempts of one delivery."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         webhook = find(client, "webhook", webhook).id
         if event is not None:
-            event = find(client, "delivery", event, webhook=webhook).id
-            _show_tries(client.get(f"/v1/webhooks/{webhook}/deliveries/{event}"), as_json)
+            found = client.webhooks.delivery(webhook, find(client, "delivery", event, webhook=webhook).id)
+            _show_attempts(found, as_json)
             return
-        wanted = {"state": state.value} if state else {}
-        pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=console.page_size(limit), **wanted)
-        console.listing(pages, DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json, limit=limit, full_ids=full_ids)
+        wanted = state.value if state else None
+        pages = client.webhooks.deliveries(webhook, state=wanted, page_size=console.page_size(limit))
+        console.listing(
+            (each.raw for each in pages), DELIVERY_COLUMNS, getitem, as_json=as_json, limit=limit, full_ids=full_ids
+        )
 
 
 @app.command()
@@ -167,17 +166,16 @@ def replay(
     """Deliver events again, under the same ids and with all attempts."""
     if bool(events) == failed:
         raise typer.BadParameter("give ids of events, or --failed")
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         webhook = find(client, "webhook", webhook).id
-        path = f"/v1/webhooks/{webhook}/deliveries"
         given = [each.id for each in find_all(client, "delivery", events or (), webhook=webhook)]
-        wanted = given or [each["event"] for each in client.pages(path, limit=1000, state="failed")]
+        wanted = given or [each.event for each in client.webhooks.deliveries(webhook, state=State.FAILED.value)]
         for event in wanted:
-            found = client.post(f"{path}/{event}/replay")
+            found = client.webhooks.replay(webhook, event)
             if as_json:
-                console.result_json(found)
+                console.result_json(found.raw)
     if not as_json:
         console.say(f"{len(wanted)} deliveries are made again")
 
@@ -192,66 +190,38 @@ def send_test(
     as_json: console.Json = False,
 ) -> None:
     """Send a message of type `webhook.test` once; prints its id."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         webhook = find(client, "webhook", webhook).id
-        found = client.post_once(f"/v1/webhooks/{webhook}/test", None)
+        found = client.webhooks.test(webhook)
         if wait:
-            found = _tried(client, found, timeout)
+            with hint_of_timeout(f"Check that a scheduler runs. Later: `marey webhooks deliveries {webhook}`."):
+                found = client.webhooks.wait(found, timeout=timeout)
     if as_json:
-        console.result_json(found)
+        console.result_json(found.raw)
     else:
-        console.result(found["event"])
-    if found["state"] == State.FAILED:
-        raise ItemsFailed(f"it did not arrive: {found['error']}", where=f"webhook {webhook}")
-    if found["state"] == State.DELIVERED:
-        console.say(f"it arrived: {found['status']}")
+        console.result(found.event)
+    if found.state == State.FAILED:
+        raise ItemsFailed(f"it did not arrive: {found.error}", where=f"webhook {webhook}")
+    if found.state == State.DELIVERED:
+        console.say(f"it arrived: {found.status}")
 
 
-def _tried(client: Transport, found: dict[str, Any], timeout: float) -> dict[str, Any]:
-    """A delivery once it has ended.
-
-    Raises:
-        TimedOut: it has not.
-    """
-    ends = time.monotonic() + timeout
-    while found["state"] == State.PENDING:
-        if time.monotonic() > ends:
-            raise TimedOut(
-                "no attempt was made in time",
-                where=f"webhook {found['webhook']}",
-                hint=f"Does a scheduler run? Later: `marey webhooks deliveries {found['webhook']}`.",
-            )
-        time.sleep(LOOK_SECONDS)
-        found = client.get(f"/v1/webhooks/{found['webhook']}/deliveries/{found['event']}")
-    return found
-
-
-def _show_tries(found: dict[str, Any], as_json: bool) -> None:
+def _show_attempts(found: DeliveryDetail, as_json: bool) -> None:
     if as_json:
-        console.result_json(found)
+        console.result_json(found.raw)
         return
-    columns = ("number", "at", "status", "seconds", "error")
-    console.table(columns, ([each[column] for column in columns] for each in found["log"]))
-    following = f", next try at {found['next']}" if found["next"] else ""
-    console.say(f"{found['kind']} is {found['state']}{following}")
+    console.table(ATTEMPT_COLUMNS, ([each.raw[column] for column in ATTEMPT_COLUMNS] for each in found.log))
+    following = f", next attempt at {found.raw['next']}" if found.next else ""
+    console.say(f"{found.kind} is {found.state}{following}")
 
 
-def _change(webhooks: list[str], as_json: bool, *, paused: bool) -> None:
-    from marey.client.transport import Transport
-
-    with Transport.here() as client:
-        for each in find_all(client, "webhook", webhooks):
-            found = client.patch(f"/v1/webhooks/{each.id}", {"paused": paused})
-            if as_json:
-                console.result_json(found)
-            else:
-                what = of_view("webhook", found)
-                console.say(f"{what} is paused" if found["paused"] else f"{what} goes on")
+def _state(webhook: Webhook) -> str:
+    return f"{of_view('webhook', webhook.raw)} {'is paused' if webhook.paused else 'goes on'}"
 
 
-def _cell(webhook: dict[str, Any], column: str) -> object:
+def _cell(webhook: Mapping[str, Any], column: str) -> object:
     if column == "events":
         return ", ".join(webhook[column])
     return {True: "paused", False: None}[webhook[column]] if column == "paused" else webhook[column]

@@ -1,1 +1,1 @@
-"""What `marey stream` is made of: the socket, the lines somebody types, the counter, the file that grows."""
+"""Parts of `marey stream`: following, typed lines, the status line, rate and latency."""

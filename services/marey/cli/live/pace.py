@@ -1,4 +1,4 @@
-"""How fast frames come, and how late the newest one is."""
+"""Frame rate and latency of a stream."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ WINDOW = 2.0
 
 
 class Pace:
-    """The rate and the latency of a stream, by the clock of whoever watches.
+    """The frame rate and latency of a stream, by the clock of the viewer.
 
-    The latency is the age of the newest frame on an even clock: frame n is due n / fps seconds after frame 0, and the
-    clock is set by the frame that came earliest. Between two frames it grows from 0 to one frame; what is above that is
-    what the server, the network and this program have lost since. It knows nothing of what lies before the clock: the
-    time that even the earliest frame was under way.
+    The latency is the age of the newest frame relative to an even schedule: frame n is due n / fps seconds after frame
+    0, and the frame that arrived earliest sets the schedule. Between two frames the latency grows from 0 to the length
+    of a frame; the rest is delay of the server, the network and this program. The travel time of the earliest frame is
+    not included.
 
     Args:
-        fps: frames a second of the stream.
+        fps: frame rate of the stream.
     """
 
     def __init__(self, fps: float) -> None:
@@ -27,7 +27,11 @@ class Pace:
         self._times: deque[float] = deque()
 
     def arrived(self, number: int, now: float) -> None:
-        """A frame is here; `now` in seconds of a clock that does not jump."""
+        """Record the arrival of a frame.
+
+        Args:
+            now: seconds of a monotonic clock.
+        """
         zero = now - number / self._fps
         self._zero = zero if self._zero is None else min(self._zero, zero)
         self._newest = number
@@ -35,12 +39,12 @@ class Pace:
         self._forget(now)
 
     def rest(self) -> None:
-        """The stream is paused, or does not run yet: the clock stands, and the next frame sets it anew."""
+        """Reset the schedule, because the stream is paused or has not started; the next frame sets it again."""
         self._zero = None
         self._times.clear()
 
     def fps(self, now: float) -> float:
-        """Frames a second over the last two."""
+        """Return the frames a second over the last two seconds."""
         self._forget(now)
         if len(self._times) < 2:
             return 0.0
@@ -48,7 +52,7 @@ class Pace:
         return (len(self._times) - 1) / span if span > 0 else 0.0
 
     def latency(self, now: float) -> float | None:
-        """Seconds; None while the clock stands."""
+        """Return the latency in seconds; None without a schedule."""
         return None if self._zero is None else max(0.0, now - self._zero - self._newest / self._fps)
 
     def _forget(self, now: float) -> None:

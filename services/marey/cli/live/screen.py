@@ -1,7 +1,6 @@
-"""Words for people while a stream runs, and the line that counts, on stderr.
+"""Messages and the status line of a running stream, on stderr.
 
-On a terminal the line that counts stands above the one that is typed in, which it leaves as it is. Anywhere else there
-are only words, a line each.
+On a terminal the status line is above the input line, which stays untouched. Elsewhere there are only messages.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 EVERY = 0.2
-"""Seconds between two pictures of the line."""
+"""Seconds between two updates of the status line."""
 UP, CLEAR_LINE, CLEAR_DOWN, SAVE, RESTORE = "\x1b[1A", "\x1b[2K", "\x1b[J", "\x1b7", "\x1b8"
 
 
@@ -24,7 +23,7 @@ class Screen:
     """stderr of `marey stream`.
 
     Attributes:
-        live: it is a terminal, with a line that counts.
+        live: True for a terminal, which has a status line.
     """
 
     def __init__(self) -> None:
@@ -35,10 +34,10 @@ class Screen:
         self._drawn = 0.0
 
     def say(self, text: str, *, typed: str | None = None) -> None:
-        """A line for people.
+        """Print a message.
 
         Args:
-            typed: it answers this line, which the terminal has just shown below the one that counts.
+            typed: the input line that it answers, which the terminal shows below the status line.
         """
         if not self.live:
             console.say(text)
@@ -50,11 +49,11 @@ class Screen:
             self._write(f"{self._line}\n")
 
     def due(self) -> bool:
-        """Whether there is a line that counts, and it is time for a new picture of it."""
+        """Return True if the status line exists and has to be updated."""
         return self.live and time.monotonic() - self._drawn >= EVERY
 
     def count(self, line: Text) -> None:
-        """Draw the line that counts."""
+        """Draw the status line."""
         line.truncate(max(1, self._console.width - 1), overflow="ellipsis")
         with self._console.capture() as captured:
             self._console.print(line, end="")
@@ -65,13 +64,13 @@ class Screen:
         self._line, self._drawn = captured.get(), time.monotonic()
 
     def close(self) -> None:
-        """Take the line away."""
+        """Remove the status line."""
         if self.live:
             self._erase(0)
         self._line = None
 
     def _erase(self, rows: int) -> None:
-        """The line that counts, `rows` more, and all below."""
+        """Erase the status line, `rows` more, and everything below."""
         if self._line is not None:
             self._write(f"{UP * (rows + 1)}\r{CLEAR_DOWN}")
 

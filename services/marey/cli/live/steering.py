@@ -1,4 +1,4 @@
-"""What somebody types while a stream runs, or pipes in, and Ctrl-C."""
+"""Input of `marey stream`: lines that are typed or piped in, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,36 +7,45 @@ import queue
 import signal
 import sys
 import threading
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from marey.core.errors import InvalidInput
 from marey.items.prompts import check_prompt
 
-WORDS = {"/pause": "pause", "/resume": "resume", "/stop": "stop"}
+COMMANDS: dict[str, Literal["pause", "resume", "stop"]] = {"/pause": "pause", "/resume": "resume", "/stop": "stop"}
 HELP = "Type what the person does next and press Enter; /pause, /resume, /stop; Ctrl-C stops, too."
 BLOCK = 65536
 
 
-def message_of(line: str) -> dict[str, str] | None:
-    """The control message that a line asks for; None = an empty line.
+@dataclass(frozen=True)
+class Command:
+    """A command to a stream; the prompt is that of `steer`."""
+
+    kind: Literal["steer", "pause", "resume", "stop"]
+    prompt: str | None = None
+
+
+def command_of(line: str) -> Command | None:
+    """Return the command that a line stands for; None = an empty line.
 
     Raises:
-        InvalidInput: a word that there is not, or no prompt.
+        InvalidInput: an unknown command, or text that cannot be a prompt.
     """
     text = line.strip()
     if not text:
         return None
     if text.startswith("/"):
-        if text.lower() not in WORDS:
-            raise InvalidInput(f"{text[:20]!r} is no word of a stream", hint=f"There are {', '.join(WORDS)}.")
-        return {"kind": WORDS[text.lower()]}
-    return {"kind": "steer", "prompt": check_prompt(text)}
+        if text.lower() not in COMMANDS:
+            raise InvalidInput(f"{text[:20]!r} is not a command", hint=f"Known: {', '.join(COMMANDS)}.")
+        return Command(COMMANDS[text.lower()])
+    return Command("steer", check_prompt(text))
 
 
 class Lines:
-    """The lines of stdin, as they come; its end is no line, and ends nothing.
+    """The lines of stdin as they arrive; the end of stdin has no effect.
 
-    They are read from the descriptor: a thread that waits in Python's own `stdin` when the program ends brings it down.
+    They are read from the descriptor: a thread that waits in Python's own `stdin` at exit crashes the program.
     """
 
     def __init__(self) -> None:
@@ -47,7 +56,7 @@ class Lines:
             threading.Thread(target=self._read, args=(self._descriptor,), daemon=True).start()
 
     def take(self) -> list[str]:
-        """The lines that came since the last call."""
+        """Return the lines that arrived since the last call."""
         taken: list[str] = []
         while True:
             try:
@@ -70,14 +79,14 @@ class Lines:
 
 
 class Interrupts:
-    """Counts Ctrl-C within the block. The first is for the stream, which is stopped; the second leaves at once."""
+    """Counts Ctrl-C within the block. The first stops the stream; the second raises `KeyboardInterrupt`."""
 
     def __init__(self) -> None:
         self.count = 0
         self._before: Any = None
 
     def __enter__(self) -> Interrupts:
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell that runs us in the background wants that
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # set by a shell that runs this in the background
             self._before = signal.signal(signal.SIGINT, self._interrupted)
         return self
 
@@ -92,7 +101,7 @@ class Interrupts:
 
 
 def _stdin() -> int | None:
-    """The descriptor to read; None where there is none, or where it is a terminal that is not ours to read."""
+    """Return the descriptor to read; None without stdin, or for a terminal that another process group controls."""
     try:
         descriptor = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):  # closed, or something else in its place
@@ -102,5 +111,5 @@ def _stdin() -> int | None:
             if os.tcgetpgrp(descriptor) != os.getpgrp():
                 return None  # a read from the background would stop the whole program
         except OSError:
-            pass  # a terminal that does not control us
+            pass  # not the controlling terminal
     return descriptor

@@ -1,1 +1,1 @@
-"""What workers do for the command line: the only package of `services` that imports `workers`, and only when asked."""
+"""Work of workers in the process of a command: the only package of `services` that imports `workers`, lazily."""

@@ -1,4 +1,4 @@
-"""Prompt adherence of a bundle, in this process: what `marey eval adherence` measures."""
+"""Prompt adherence of a bundle, measured in this process, for `marey eval adherence`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Judged:
     Attributes:
         markdown: its tables.
         document: all of it, as JSON values.
-        failures: prompts that were not adhered to, by group.
+        failures: prompts whose motions do something else, by group.
     """
 
     markdown: str
@@ -46,7 +46,7 @@ def judge_adherence(
 
     Args:
         captions: a prepared folder, whose validation captions are asked for in place of the set `prompts`.
-        every: only each so manieth prompt.
+        every: use only every n-th prompt.
         steers: live sessions that are steered.
         walks: live sessions of 2,000 frames.
 

@@ -1,4 +1,4 @@
-"""Captures to training data: what `marey data` does."""
+"""Training data from captures, for `marey data`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OWN, PACK = "own", "pack"
 
 @dataclass(frozen=True)
 class CaptureSources:
-    """What `marey data pack` and `prepare` read.
+    """The sources of `marey data pack` and `prepare`.
 
     Attributes:
         named: source and its archive, folder or file: a known set, `own` (a folder that describes itself) or `pack`.
@@ -33,7 +33,7 @@ class CaptureSources:
 
 
 def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | None], None]) -> list[JointsPack]:
-    """The clips of each source on the 22-joint skeleton, at 20 fps.
+    """Read the clips of each source on the 22-joint skeleton, at 20 fps.
 
     Raises:
         InvalidInput: an unknown source.
@@ -61,7 +61,7 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
 
 
 def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> list[Path]:
-    """Write one joints pack a source into a folder: small enough to carry to the machine that trains.
+    """Write a joints pack of each source into a folder: small enough to carry to the machine that trains.
 
     Raises:
         InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
@@ -75,7 +75,7 @@ def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, in
 
 
 def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> str:
-    """Prepare training data; a line that says what was made.
+    """Prepare training data, and return a line that describes it.
 
     Raises:
         InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
@@ -89,7 +89,7 @@ def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str,
 
 
 def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
-    """What a prepared folder holds, its hashes checked; or one clip of it.
+    """Summarise a prepared folder, or one clip of it, after a check of its hashes.
 
     Raises:
         NotFound, InvalidFile: no such folder or clip, or a changed file.
@@ -109,7 +109,7 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
 
 
 def encode_captions(folder: Path, model: str | None, progress: Callable[[int, int], None]) -> int:
-    """Write `texts.npz` of a prepared folder; how many captions it holds."""
+    """Write `texts.npz` of a prepared folder, and return the number of its captions."""
     try:
         from marey.bundles import TextSpec, choose_bundle
         from marey.data.prepared import PreparedData

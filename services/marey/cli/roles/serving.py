@@ -1,4 +1,4 @@
-"""Which workers `marey serve` and `marey worker` start."""
+"""The workers that `marey serve` and `marey worker` start."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ PLATFORM = {
 
 
 def known_queues() -> tuple[str, ...]:
-    """The queues that a worker can serve: of every registered model, and of the platform."""
+    """Return the queues that a worker can serve: of every registered model, and of the platform."""
     return (*model_names(), *PLATFORM)
 
 
 def live_models(queues: Iterable[str]) -> dict[str, str]:
-    """The models among these queues that stream, each with the factory of its live loop."""
+    """Return the models among these queues that stream, each with the factory of its live loop."""
     specs = (get_model(queue) for queue in dict.fromkeys(queues) if queue not in PLATFORM)
     return {spec.name: spec.live for spec in specs if spec.live is not None}
 
 
 def default_roles(config: Settings) -> str:
-    """One child for every model that has a bundle here, for prompts, and for evaluations where there is an evaluator:
-    two would fight for the cores."""
+    """Return the roles of one child: every model with a bundle here, prompts, and evaluations if there is an evaluator.
+    Two children would compete for the cores."""
     from marey.bundles import list_bundles
 
     here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
@@ -68,7 +68,7 @@ def parse_roles(text: str, where: str = "--with") -> list[tuple[str, ...]]:
 
 
 def role_of(queues: Sequence[str], config: Settings) -> Role:
-    """The role of a worker that serves these queues, its model loaded before it is ready.
+    """Return the role of a worker that serves these queues and loads its model before it is ready.
 
     Raises:
         NotFound, InvalidBundle: there is no bundle for its model, or a broken one.
@@ -81,10 +81,10 @@ def role_of(queues: Sequence[str], config: Settings) -> Role:
 
 
 def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
-    """Nothing, if the workers of these roles can compute on the device. Asks a process of its own: ours has no torch.
+    """Check that the workers of these roles can compute on the device, in a child process: this one has no torch.
 
     Raises:
-        InvalidInput: it is not there.
+        InvalidInput: there is no such device.
     """
     if not device.startswith("cuda") or all(queue == TEXT for role in roles for queue in role):
         return
@@ -97,5 +97,5 @@ def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
 
 
 def threads_of(config: Settings, torch_children: int) -> int:
-    """Torch threads of one child: the cores, divided by the children that compute."""
+    """Return the torch threads of one child: the cores, divided by the children that compute."""
     return config.threads or max(1, len(os.sched_getaffinity(0)) // max(1, torch_children))

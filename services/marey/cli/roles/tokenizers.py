@@ -1,4 +1,4 @@
-"""What a tokenizer loses of real motion: `marey train evaluator reconstruct`."""
+"""Reconstruction errors of a tokenizer, for `marey train evaluator reconstruct`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stages, and bundles of what they made: what `marey train` does."""
+"""Training stages and bundles, for `marey train`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def train_stage(
     choices: Mapping[str, str] | None = None,
     **options: Any,
 ) -> dict[str, float]:
-    """Train one stage; its metrics.
+    """Train one stage, and return its metrics.
 
     Args:
         choices: of the model's own options.
@@ -59,7 +59,7 @@ def assemble_bundle(
     overwrite: bool,
     choices: Mapping[str, str] | None = None,
 ) -> str:
-    """Write the bundle of a run; its exact reference."""
+    """Write the bundle of a run, and return its exact reference."""
     try:
         named_config, assemble = resolve(training.config), resolve(training.assemble)
     except ImportError as error:
@@ -70,7 +70,7 @@ def assemble_bundle(
 
 
 def unpack_bundle(training: Training, bundle: str, run: Path) -> str:
-    """Write the parts of a bundle into a run folder; the name of its configuration."""
+    """Write the parts of a bundle into a run folder, and return the name of its configuration."""
     assert training.unpack is not None  # else there is no such command
     try:
         from marey.bundles import find_bundle

@@ -204,7 +204,8 @@ def check_place(path: Path | str, *, overwrite: bool = False) -> None:
     if path.is_dir():
         raise InvalidInput("is a folder", where=str(path), hint="Name a file.")
     if path.exists() and not overwrite:
-        raise Conflict("already exists", where=str(path), hint="Use --overwrite, or choose another name.")
+        hint = "Choose another name, or pass overwrite=True."
+        raise Conflict("already exists", where=str(path), hint=hint, argument="overwrite")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass

@@ -51,7 +51,10 @@ def test_a_message_that_cannot_be_used_is_told_and_the_stream_goes_on(serve: Any
 
 @pytest.mark.parametrize(
     ("told", "said"),
-    [(b"GIF89a" + bytes(300), "no frame of version 1"), ({"type": "gap", "first": 1}, "lacks something: KeyError")],
+    [
+        (b"GIF89a" + bytes(300), "not a frame of a Marey"),
+        ({"type": "gap", "first": 1}, "lacks something: KeyError"),
+    ],
 )
 def test_a_server_that_speaks_otherwise_is_2_and_the_stream_is_stopped(told: Any, said: str, serve: Any) -> None:
     server = serve(**SLOW, told=[told])

@@ -1,0 +1,52 @@
+"""Hints of the command line for errors of the client, which name arguments of the Python API."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from marey.core.errors import MareyError, TimedOut
+
+OPTIONS = {
+    "bundle": "--bundle",
+    "extra_columns": "--extra-columns",
+    "file_format": "--input-format",
+    "fps": "--fps",
+    "model": "--model",
+    "name_template": "--name-template",
+    "overwrite": "--overwrite",
+    "seconds": "--seconds",
+    "seed": "--seed",
+    "settings": "--set",
+    "tags": "--tag",
+    "variants": "--variants",
+}
+"""The option of each argument that an error may name."""
+
+
+def name_options(error: MareyError) -> MareyError:
+    """Let an error name the option of the command line in place of the argument of the Python API."""
+    argument = error.argument
+    if argument is None or argument not in OPTIONS:
+        return error
+    option = OPTIONS[argument]
+    if error.where == argument:
+        error.where = option
+    if error.hint is not None:
+        error.hint = re.sub(rf"pass {argument}=True|\b{argument}\b", lambda found: _named(found, option), error.hint)
+    return error
+
+
+@contextmanager
+def hint_of_timeout(hint: str) -> Generator[None]:
+    """Give the error of a time limit that passes in the block this hint."""
+    try:
+        yield
+    except TimedOut as error:
+        error.hint = hint
+        raise
+
+
+def _named(found: re.Match[str], option: str) -> str:
+    return f"use {option}" if found.group().startswith("pass ") else option

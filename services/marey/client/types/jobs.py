@@ -1,0 +1,180 @@
+"""Results of `client.jobs`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+from marey.client.results import Result
+from marey.client.types.common import ErrorDetail
+from marey.client.types.motions import Motion
+
+ENDED_JOB = frozenset({"succeeded", "partial", "failed", "cancelled"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counters(Result):
+    """Number of items in each state."""
+
+    ready: int = 0
+    leased: int = 0
+    succeeded: int = 0
+    failed: int = 0
+    dead: int = 0
+    cancelled: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job(Result):
+    """A job.
+
+    `state` is one of queued, running, paused, succeeded, partial, failed, cancelled.
+    """
+
+    id: str
+    name: str | None = None
+    comment: str | None = None
+    priority: int = 0
+    control: str = ""
+    state: str = ""
+    total: int = 0
+    counters: Counters = field(default_factory=Counters)
+    fail_early: float | None = None
+    event_seq: int = 0
+    created: datetime | None = None
+    started: datetime | None = None
+    finished: datetime | None = None
+    keep_days: int | None = None
+    expires: datetime | None = None
+    """When it is deleted; None = never, or not before it ends."""
+    erased: datetime | None = None
+    """When its prompts were erased."""
+
+    @property
+    def has_ended(self) -> bool:
+        """True once no item is open any more."""
+        return self.state in ENDED_JOB
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobItem(Result):
+    """An item of a job, with its motion if it has one."""
+
+    id: str
+    job: str = ""
+    position: int = 0
+    index: int = 0
+    variant: int = 0
+    name: str | None = None
+    prompt: str = ""
+    model: str = ""
+    bundle: str = ""
+    seed: int = 0
+    seconds: float | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    tags: tuple[str, ...] = ()
+    stage: str = ""
+    state: str = ""
+    attempts: int = 0
+    reason: str | None = None
+    error: ErrorDetail | None = None
+    created: datetime | None = None
+    finished: datetime | None = None
+    replaces: str | None = None
+    """The motion that it is another take of."""
+    motion: Motion | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobEvent(Result):
+    """One event of a job."""
+
+    job: str = ""
+    seq: int = 0
+    kind: str = ""
+    item: str | None = None
+    reason: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    at: datetime | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Speed(Result):
+    """The measured speed of a bundle on this platform."""
+
+    bundle: str = ""
+    motions: int = 0
+    """Motions that it was measured on, of the last 2,000 that were made."""
+    seconds: float = 0.0
+    """Of a worker for one motion, without reading the prompt and writing the files."""
+    since: datetime | None = None
+    until: datetime | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate(Result):
+    """Time that motions take once it is their turn."""
+
+    items: int = 0
+    seconds: float | None = None
+    """None = there is no measure of some bundle."""
+    workers: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Live workers by model; where there is none, the estimate is for one."""
+    speeds: tuple[Speed, ...] = ()
+    unmeasured: tuple[str, ...] = ()
+    """Bundles with which none of the last motions was made."""
+    basis: str = ""
+    """Where the number comes from, or why there is none, for a person."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quota(Result):
+    """A quota and what was asked of it; items or bytes."""
+
+    name: str = ""
+    limit: int = 0
+    used: int = 0
+    left: int = 0
+    asked: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedJob(Result):
+    """The answer to `validate_only`."""
+
+    valid: bool = False
+    items: int = 0
+    bundles: tuple[str, ...] = ()
+    estimate: Estimate = field(default_factory=Estimate)
+    quotas: tuple[Quota, ...] = ()
+    """Those the tenant has, of queued items and of bytes; with room for it."""
+    waiting: int = 0
+    """Items of all tenants that wait for the same models now, or to be read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class QueuePosition(Result):
+    """The place of a job in the queue."""
+
+    state: str = ""
+    jobs_ahead: int = 0
+    """Of the same tenant, with items that wait: of higher priority, or older."""
+    items_ahead: int = 0
+    tenants: int = 0
+    """Tenants that wait for the same workers, this one too: they take turns."""
+    seconds: float | None = None
+    """Until it is done; None = ended, paused or not measured."""
+    estimate: Estimate = field(default_factory=Estimate)
+    """Of its own open items."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Erasure(Result):
+    """A job whose prompts were erased."""
+
+    job: str = ""
+    erased: datetime | None = None
+    files_left: int = 0
+    """Files that are still to be rewritten; they cannot be fetched before."""
