@@ -91,7 +91,7 @@ class EvaluationDetail(Evaluation):
 
     events: tuple[EvaluationEvent, ...] = ()
     waits_for: str | None = None
-    """What it cannot go on without: a queue that no living worker serves."""
+    """The queue that has no live worker, where the evaluation waits for one; None = it does not."""
 
 
 @dataclass(frozen=True, kw_only=True)
