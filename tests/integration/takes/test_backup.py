@@ -180,7 +180,7 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
         "sha256",
     ),
     "an unknown field": (lambda b: edit_job(b, lambda d: d.replace(b'"seed":', b'"sead":', 1)), InvalidFile, "seed"),
-    "no JSON": (lambda b: edit_job(b, lambda d: d + b"\x80\x04pickle\n"), InvalidFile, "no record of a backup"),
+    "no JSON": (lambda b: edit_job(b, lambda d: d + b"\x80\x04pickle\n"), InvalidFile, "not a record of a backup"),
     "another job": (
         lambda b: edit_job(b, lambda d: d.replace(b'{"job":{"id":"0', b'{"job":{"id":"1', 1)),
         InvalidFile,

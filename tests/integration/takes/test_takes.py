@@ -106,7 +106,7 @@ def test_clips_of_two_jobs_share_a_folder_and_its_manifest(marey: Command, job: 
         marey("fetch", each, "-o", tmp_path / "clips").ok()
     assert [row["job"] for row in manifest(tmp_path / "clips")] == [other, job, job, job]
     (tmp_path / "clips" / "manifest.csv").write_text("mine,own\n")
-    marey("fetch", job, "-o", tmp_path / "clips").refused(2, "manifest.csv", "no manifest of fetched motions")
+    marey("fetch", job, "-o", tmp_path / "clips").refused(2, "manifest.csv", "not a manifest of fetched motions")
     assert (tmp_path / "clips" / "manifest.csv").read_text() == "mine,own\n"
     marey("fetch", job, "-o", tmp_path / "clips", "--overwrite").ok()
     assert len(manifest(tmp_path / "clips")) == 3
