@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +19,7 @@ from marey.data import manifest as names
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COUNTS, compose
 from marey.data.describe import ACTS, Facts, describe, describe_text
+from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
 from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
@@ -85,9 +87,10 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
     """Windows of each captured clip and its mirror image, with their facts; rejected clips are counted in
     `left_out`."""
     held_out = held_out_pairs(packs)
+    idles = _idles(packs)
     for pack in packs:
-        for clip in pack.clips:
-            whole = pack.joints(clip)
+        for captured in pack.clips:
+            clip, whole = _lengthened(captured, pack.joints(captured), idles)
             pieces = windows(len(whole))
             for mirrored in (False, True):
                 content = swap_sides(clip.content) if mirrored else clip.content
@@ -108,6 +111,40 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
                         left_out[name] = "label and motion contradict each other"
                     else:
                         yield Part(name, clip, content, mirrored, joints, facts)
+
+
+IDLE = "idle"
+
+
+def _idles(packs: Sequence[JointsPack]) -> dict[tuple[str, str], list[NDArray[np.float32]]]:
+    """Joints of the idles of each set and split: what a short clip is put between is of its own terms and split."""
+    found: dict[tuple[str, str], list[NDArray[np.float32]]] = {}
+    for pack in packs:
+        for clip in pack.clips:
+            if clip.content == IDLE:
+                found.setdefault((clip.dataset, clip.split), []).append(pack.joints(clip))
+    return found
+
+
+def _lengthened(
+    clip: PackClip, joints: NDArray[np.float32], idles: dict[tuple[str, str], list[NDArray[np.float32]]]
+) -> tuple[PackClip, NDArray[np.float32]]:
+    """The clip with travel where it is a gait on the spot, and no shorter than it can be made; see `lengthen`. Sets
+    with fixed splits are left as they are."""
+    cyclic = clip.in_place
+    if clip.in_place and (moved := travelling(joints)) is not None:
+        joints = moved.astype(np.float32)
+        clip = replace(clip, in_place=False, facts=_said_to_travel(clip.facts))
+    if not clip.source or len(joints) > SHORT:
+        return clip, joints
+    if (cyclic or clip.content == IDLE) and closes(joints):
+        return clip, repeated(joints).astype(np.float32)
+    made = between_idles(joints, idles.get((clip.dataset, clip.split), ()), clip.id)
+    return clip, joints if made is None else made.astype(np.float32)
+
+
+def _said_to_travel(facts: str) -> str:
+    return re.sub(r",? ?\b(in place|on the spot)\b", "", facts).strip(" ,")
 
 
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:

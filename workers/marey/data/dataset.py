@@ -1,7 +1,7 @@
 """`dataset.toml`: a set of captures in words that the reader understands. There is no code for any one set.
 
 It names the set with its terms, maps the columns of its `index.csv`, and describes its rigs. Those of the known sets
-are in `sets/`; a studio writes its own, or has it proposed by `marey data inspect`.
+are in `sets/`; a studio writes its own.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Dataset(BaseModel):
         raise InvalidFile(
             f"no joint {missing!r}: this is not the {self.rigs[0].name} rig",
             where=where,
-            hint="Describe this rig in dataset.toml; `marey data inspect FOLDER` proposes how.",
+            hint="Describe this rig under [[rig]] of dataset.toml.",
         )
 
 

@@ -59,7 +59,7 @@ class CaptureSet:
             raise NotFound(
                 f"there is no {DATASET} in this folder",
                 where=str(folder),
-                hint=f"`marey data inspect {folder}` proposes one.",
+                hint="Write one: docs/tutorials/train-your-own.md has an example.",
             )
         dataset = read_dataset(folder / DATASET)
         return cls(folder, dataset, read_index(folder / INDEX, dataset))

@@ -1,0 +1,92 @@
+"""Clips that cannot be trained on as they are: gaits on the spot, and clips of less than a second and a half.
+
+A gait on the spot gets the travel that its standing feet imply. A short cycle that closes is repeated. Any other short
+clip is never looped: it gets a piece of a real idle before and after it, by inertialized transitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.data.captions import seeded
+from marey.data.part import FPS
+from marey.data.splice import join_clips, seam_costs, seam_features
+from marey.motion.support import RADII
+
+Array = NDArray[np.floating]
+
+SHORT = 30
+"""Frames: a clip of up to a second and a half is lengthened."""
+LEAST_STANCE = 0.3
+CYCLE_FRAMES = 50  # that repeated cycles reach at least
+_CLOSES = 0.03  # metres, mean over joints, between the last pose and the first
+_STANDS = 0.03  # metres over the floor
+_CARRIERS = (10, 11, 7, 8, 4, 5, 20, 21)  # toes, ankles, knees, wrists
+_IDLE_FRAMES = (10, 24)
+_HELD_FRAMES = 8  # of the first pose, in which the idle goes over into it: the action itself stays as it was captured
+_WORST_SEAM = 0.25  # see `splice.seam_costs`
+
+
+def travelling(joints: Array) -> Array | None:
+    """A gait on the spot (T, 22, 3) with the steady travel that keeps its standing joints where they stand; None where
+    none stands for `LEAST_STANCE` of the frames, as in a treadmill run drawn in the air."""
+    joints = np.asarray(joints, np.float64)
+    height = joints[:, _CARRIERS, 1] - RADII[list(_CARRIERS)]
+    lowest = height.argmin(axis=1)
+    stands = (height.min(axis=1) < _STANDS)[:-1] & (lowest[1:] == lowest[:-1])
+    if stands.mean() < LEAST_STANCE:
+        return None
+    rows = np.flatnonzero(stands)
+    carriers = np.array(_CARRIERS)[lowest[rows]]
+    steps = (joints[rows + 1, carriers] - joints[rows, carriers])[:, [0, 2]]
+    step = np.median(steps, axis=0)
+    out = joints.copy()
+    out[..., [0, 2]] -= step * np.arange(len(joints))[:, None, None]
+    return out
+
+
+def closes(joints: Array) -> bool:
+    """Return True if the last pose of a clip goes over into its first, travel apart."""
+    local = joints - joints[:, :1] * np.array([1.0, 0.0, 1.0])
+    return bool(np.linalg.norm(local[-1] - local[0], axis=-1).mean() < _CLOSES)
+
+
+def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
+    """A cycle that closes, gone through until it has so many frames at least; each round goes on where the last one
+    ended."""
+    advance = (joints[-1, 0] - joints[0, 0]) * np.array([1.0, 0.0, 1.0])
+    rounds = max(1, -(-(frames - 1) // (len(joints) - 1)))
+    pieces = [joints[:-1] + k * advance for k in range(rounds)]
+    return np.concatenate([*pieces, joints[-1:] + (rounds - 1) * advance])
+
+
+def between_idles(joints: Array, idles: Sequence[Array], seed: str) -> Array | None:
+    """A short clip with real idle before and after it, wherever some idle's pose is near enough; None where neither
+    end has one."""
+    rng = seeded("idle", seed)
+    out = np.asarray(joints, np.float64)
+    before = _piece(out[:2], idles, rng.randint(*_IDLE_FRAMES), at_end=True)
+    if before is not None:
+        out = join_clips(before, np.concatenate([np.repeat(out[:1], _HELD_FRAMES, axis=0), out]), FPS)
+    after = _piece(out[-2:], idles, rng.randint(*_IDLE_FRAMES), at_end=False)
+    if after is not None:
+        out = join_clips(out, after, FPS)
+    return None if before is None and after is None else out
+
+
+def _piece(pose: Array, idles: Sequence[Array], frames: int, *, at_end: bool) -> Array | None:
+    """So many frames of the idle that fits a pose (2, 22, 3) best, ending (`at_end`) or beginning with it."""
+    best, least = None, _WORST_SEAM
+    here = seam_features(pose, FPS)[:1]
+    for idle in idles:
+        room = range(frames, len(idle)) if at_end else range(len(idle) - frames)
+        if len(room) == 0:
+            continue
+        costs = seam_costs(here, seam_features(np.asarray(idle, np.float64), FPS))[0, list(room)]
+        if costs.min() < least:
+            least, at = float(costs.min()), room[int(costs.argmin())]
+            best = idle[at - frames : at + 1] if at_end else idle[at : at + frames + 1]
+    return None if best is None else np.asarray(best, np.float64)
