@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from marey.exporters import exporters
+from marey.exporters.registry import EXPORTERS
+from marey.registry.models import MODELS
+from marey.registry.training import TRAININGS
 
 
 def write_distribution(folder: Path, name: str, modules: Mapping[str, str], entries: str) -> Path:
@@ -33,9 +36,16 @@ def installed(folder: Path) -> Iterator[None]:
     """Have the distributions of a folder installed in this process until the end of the block."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
-        exporters.cache_clear()
+        forget()
         try:
             yield
         finally:
-            exporters.cache_clear()
+            forget()
+    forget()
+
+
+def forget() -> None:
+    """Have every registry read its entry points again."""
+    for registry in (MODELS, TRAININGS, EXPORTERS):
+        registry.clear()
     exporters.cache_clear()

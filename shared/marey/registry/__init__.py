@@ -2,21 +2,22 @@
 
 from marey.registry.models import (
     Ablation,
-    Choice,
     ModelSpec,
     Setting,
-    Stage,
-    Training,
     find_model,
     get_model,
     model_names,
     resolve,
+    trainings,
 )
+from marey.registry.plugins import PlugIns
+from marey.registry.training import Choice, Stage, Training
 
 __all__ = [
     "Ablation",
     "Choice",
     "ModelSpec",
+    "PlugIns",
     "Setting",
     "Stage",
     "Training",
@@ -24,4 +25,5 @@ __all__ = [
     "get_model",
     "model_names",
     "resolve",
+    "trainings",
 ]

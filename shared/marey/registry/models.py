@@ -12,16 +12,13 @@ torch is imported where a reference is resolved. docs/extending.md builds a mode
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from marey.core.errors import InvalidInput, NotFound
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+from marey.core.errors import InvalidInput, NotFound, PluginError
+from marey.registry.plugins import PlugIns
+from marey.registry.training import TRAININGS, Training
 
 GROUP = "marey.models"
 NAME = re.compile(r"[a-z][a-z0-9_-]{0,39}")
@@ -60,49 +57,6 @@ class Setting:
         if not self.low <= value <= self.high:
             raise InvalidInput(f"{self.name}: {value:g} is outside {self.low:g} to {self.high:g}")
         return int(value) if self.whole else float(value)
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One step of training: `marey train MODEL NAME`."""
-
-    name: str
-    help: str
-
-
-@dataclass(frozen=True)
-class Choice:
-    """An option of a model's training that takes one of several words; by default the configuration decides."""
-
-    name: str
-    values: tuple[str, ...]
-    help: str
-
-
-@dataclass(frozen=True)
-class Training:
-    """Training of bundles. All functions are references, `module:attribute`.
-
-    Attributes:
-        help: of the group of commands.
-        stages: in training order; one named `all` runs every other.
-        config: `(name, **choices) -> configuration`, a `marey.core.configs.ModelConfig` with one
-            `train_<stage>: StageConfig` per stage.
-        train: `(stage, TrainOptions) -> {metric: value}`.
-        assemble: `(prepared, run, output, configuration, *, card, overwrite) -> Bundle`.
-        unpack: `(bundle, run) -> configuration`; None = bundles cannot be trained further.
-        choices: passed on to `config` by name.
-        bundle_help: of the command `bundle`.
-    """
-
-    help: str
-    stages: tuple[Stage, ...]
-    config: str
-    train: str
-    assemble: str
-    unpack: str | None = None
-    choices: tuple[Choice, ...] = ()
-    bundle_help: str = "Write the bundle from the parts of a run."
 
 
 @dataclass(frozen=True)
@@ -155,61 +109,35 @@ class ModelSpec:
     self_train: str | None = None
     ablations: tuple[Ablation, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Check the name.
 
-@cache
-def _registered() -> Mapping[str, EntryPoint]:
-    from importlib.metadata import entry_points  # 15 ms, which most commands need not spend
-
-    found: dict[str, EntryPoint] = {}
-    for entry in sorted(entry_points(group=GROUP), key=lambda each: each.name):
-        other = found.setdefault(entry.name, entry)
-        if other.value != entry.value:
-            raise InvalidInput(
-                f"two installed packages register the model {entry.name!r}: {_owner(other)} and {_owner(entry)}",
-                where=GROUP,
-                hint="Uninstall one of them.",
-            )
-    return found
+        Raises:
+            ValueError: it cannot be that of a queue, or is one of the platform's own.
+        """
+        if not NAME.fullmatch(self.name) or self.name in RESERVED:
+            raise ValueError(f"a model cannot be named {self.name!r}")
 
 
-def _owner(entry: EntryPoint) -> str:
-    return entry.value if entry.dist is None else entry.dist.name
+MODELS = PlugIns(GROUP, ModelSpec, lambda spec: spec.name)
 
 
 def model_names() -> tuple[str, ...]:
     """Return the names of all registered models, sorted; imports none of them.
 
     Raises:
-        InvalidInput: two packages register one name.
+        PluginError: two packages register one name.
     """
-    return tuple(_registered())
+    return MODELS.names()
 
 
-@cache
 def find_model(name: str) -> ModelSpec | None:
     """Return the spec of a registered model; None if it is not installed here.
 
     Raises:
-        InvalidInput: its package cannot be imported, or registers something else.
+        PluginError: its package cannot be imported, or registers something else.
     """
-    entry = _registered().get(name)
-    if entry is None:
-        return None
-    try:
-        spec = entry.load()
-    except (ImportError, AttributeError) as error:
-        raise InvalidInput(
-            f"the model {name!r} of the package {_owner(entry)} cannot be imported: {error}",
-            where=entry.value,
-            hint=f"Reinstall or uninstall {_owner(entry)}.",
-        ) from error
-    if not isinstance(spec, ModelSpec) or spec.name != name or not NAME.fullmatch(name) or name in RESERVED:
-        raise InvalidInput(
-            f"the entry point {name!r} of the package {_owner(entry)} is not the ModelSpec of a model of that name",
-            where=entry.value,
-            hint="See docs/extending.md.",
-        )
-    return spec
+    return MODELS.find(name)
 
 
 def get_model(name: str, where: str | None = None) -> ModelSpec:
@@ -217,7 +145,7 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
 
     Raises:
         NotFound: it is not installed here.
-        InvalidInput: see `find_model`.
+        PluginError: see `find_model`.
     """
     spec = find_model(name)
     if spec is None:
@@ -227,6 +155,24 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
             hint=f"Installed here: {', '.join(model_names()) or 'none'}. A package that registers it adds it.",
         )
     return spec
+
+
+def trainings() -> dict[str, Training]:
+    """All that can be trained here, by name: models, in the order of their names, then what else is registered.
+
+    Raises:
+        PluginError: a plug-in cannot be loaded, or has the name of a model.
+    """
+    found = {name: spec.training for name, spec in MODELS.all().items() if spec.training is not None}
+    for name, training in TRAININGS.all().items():
+        if name in MODELS.names():
+            raise PluginError(
+                f"a model and another training have the name {name!r}",
+                where=f"entry points {TRAININGS.group}",
+                hint=f"Uninstall one of {MODELS.owner(name)} and {TRAININGS.owner(name)}.",
+            )
+        found[name] = training
+    return found
 
 
 def resolve(reference: str) -> Any:

@@ -70,10 +70,10 @@ def test_a_plugin_is_one_module_and_one_line(tmp_path: Path) -> None:
     ("exporter", "entry", "message"),
     [
         ("EXPORTER = 1 / 0", "toy", "ZeroDivisionError"),
-        ("EXPORTER = 'toy'", "toy", "not an Exporter"),
-        ('EXPORTER = Exporter("toy", "text/x-toy", "ty", False, encode)', "other", "not an Exporter of the format"),
-        ('EXPORTER = Exporter("npz", "text/x-toy", "ty", False, encode)', "npz", "two exporters have"),
-        ('EXPORTER = Exporter("toy", "text/x-toy", "bvh", False, encode)', "toy", "two exporters have"),
+        ("EXPORTER = 'toy'", "toy", "not the Exporter of the name"),
+        ('EXPORTER = Exporter("toy", "text/x-toy", "ty", False, encode)', "other", "not the Exporter of the name"),
+        ('EXPORTER = Exporter("npz", "text/x-toy", "ty", False, encode)', "npz", "two packages register"),
+        ('EXPORTER = Exporter("toy", "text/x-toy", "bvh", False, encode)', "toy", "two exporters write"),
     ],
 )
 def test_a_plugin_that_cannot_be_used_is_named(tmp_path: Path, exporter: str, entry: str, message: str) -> None:

@@ -4,35 +4,23 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import count
 from pathlib import Path
 
 import pytest
 
-from marey.core.errors import InvalidInput, NotFound
-from marey.registry import ModelSpec, Setting, find_model, get_model, model_names, models, resolve
+from marey.core.errors import InvalidInput, NotFound, PluginError
+from marey.registry import ModelSpec, Setting, find_model, get_model, model_names, resolve
+from tests.support.plugins import installed, write_distribution
 
+NUMBERS = count()
 SPEC = "from marey.registry import ModelSpec\nSPEC = ModelSpec('{name}', '', '', handler='a:b', load='a:b')\n"
 
 
-@pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Install a package that registers models, each `name = value`."""
-
-    def install(package: str, source: str, *lines: str) -> None:
-        (tmp_path / f"{package}.py").write_text(source)
-        info = tmp_path / f"{package}-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text("[marey.models]\n" + "\n".join(lines) + "\n")
-        clear()
-
-    def clear() -> None:
-        models._registered.cache_clear()
-        find_model.cache_clear()
-
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield install
-    clear()
+def dancer(folder: Path, source: str, entry: str = "dancer = {module}:SPEC") -> Path:
+    """Write a plug-in of one module that registers a model."""
+    module = f"dancer_{next(NUMBERS)}"  # a module of one name is imported once a process
+    return write_distribution(folder, module, {module: source}, f"[marey.models]\n{entry.format(module=module)}\n")
 
 
 def test_reading_every_spec_needs_the_standard_library_alone() -> None:
@@ -59,10 +47,11 @@ def test_every_reference_of_every_model_is_there(name: str) -> None:
     assert len(spec.about.splitlines()) <= 12
 
 
-def test_a_package_adds_a_model(installed) -> None:
-    installed("dancer", SPEC.format(name="dancer"), "dancer = dancer:SPEC")
-    assert "dancer" in model_names()
-    assert isinstance(get_model("dancer"), ModelSpec)
+def test_a_package_adds_a_model(tmp_path: Path) -> None:
+    with installed(dancer(tmp_path, SPEC.format(name="dancer"))):
+        assert "dancer" in model_names()
+        assert isinstance(get_model("dancer"), ModelSpec)
+    assert "dancer" not in model_names()
 
 
 def test_a_model_that_is_not_there_is_told_with_those_that_are() -> None:
@@ -75,29 +64,24 @@ def test_a_model_that_is_not_there_is_told_with_those_that_are() -> None:
 @pytest.mark.parametrize(
     ("source", "entry", "message"),
     [
-        ("import nowhere_at_all", "dancer = dancer:SPEC", "of the package dancer cannot be imported"),
-        ("", "dancer = dancer:SPEC", "of the package dancer cannot be imported"),
-        ("SPEC = 1", "dancer = dancer:SPEC", "not the ModelSpec"),
-        (SPEC.format(name="walker"), "dancer = dancer:SPEC", "not the ModelSpec of a model of that name"),
-        (SPEC.format(name="text"), "text = dancer:SPEC", "not the ModelSpec"),
-        (SPEC.format(name="Dancer"), "Dancer = dancer:SPEC", "not the ModelSpec"),
+        ("import nowhere_at_all", "dancer", "cannot be loaded: ModuleNotFoundError"),
+        ("", "dancer", "cannot be loaded: AttributeError"),
+        ("SPEC = 1", "dancer", "is not the ModelSpec of the name 'dancer'"),
+        (SPEC.format(name="walker"), "dancer", "is not the ModelSpec of the name 'dancer'"),
+        (SPEC.format(name="text"), "text", "cannot be loaded: ValueError: a model cannot be named 'text'"),
+        (SPEC.format(name="Dancer"), "Dancer", "cannot be loaded: ValueError: a model cannot be named 'Dancer'"),
     ],
 )
-def test_a_package_that_is_wrong_is_named_and_hides_no_other(installed, source: str, entry: str, message: str) -> None:
+def test_a_package_that_is_wrong_is_named_and_hides_no_other(
+    tmp_path: Path, source: str, entry: str, message: str
+) -> None:
     others = model_names()
-    installed("dancer", source, entry)
-    sys.modules.pop("dancer", None)
-    assert set(others) < set(model_names())
-    with pytest.raises(InvalidInput, match=message):
-        find_model(entry.partition(" ")[0])
-    assert all(find_model(name) for name in others)
-
-
-def test_two_packages_cannot_register_one_name(installed) -> None:
-    installed("dancer", SPEC.format(name="dancer"), "dancer = dancer:SPEC")
-    installed("ballet", SPEC.format(name="dancer"), "dancer = ballet:SPEC")
-    with pytest.raises(InvalidInput, match="two installed packages register the model 'dancer'"):
-        model_names()
+    with installed(dancer(tmp_path, source, entry + " = {module}:SPEC")):
+        assert set(others) < set(model_names())
+        with pytest.raises(PluginError, match=message) as raised:
+            find_model(entry)
+        assert "(dancer_" in str(raised.value.where)
+        assert all(find_model(name) for name in others)
 
 
 def test_a_setting_has_a_range_and_a_kind() -> None:

@@ -12,34 +12,24 @@ import typer
 from typer.core import TyperGroup
 
 from marey.cli import console
-from marey.registry import Stage, Training
-
-EVALUATOR = Training(
-    help="Evaluator of generated motions: stage `tmr`, then `bundle`.",
-    stages=(Stage("tmr", "Train the motion and the text encoder of the evaluator."),),
-    config="marey.evaluator.config:named_config",
-    train="marey.evaluator.train:train_stage",
-    assemble="marey.evaluator.assembly:assemble",
-    bundle_help="Write the bundle from the part of a run, with captions and embeddings of the real test clips.",
-)
+from marey.registry import Training, trainings
 
 
 class TrainGroup(TyperGroup):
-    """The registered models beside the commands for all models; reads the registry at the first look-up."""
+    """The registered trainings beside the commands for all of them; reads the registry at the first look-up."""
 
     _own: MutableMapping[str, Any]
-    _models: dict[str, Any] | None = None
+    _registered: dict[str, Any] | None = None
 
     @property
     def commands(self) -> MutableMapping[str, Any]:
-        """Commands by name: a group for each model, then the others."""
-        if self._models is None:
-            from marey.cli.roles.training import trained_models
-
-            self._models = {
-                name: typer.main.get_group(_group_of(name, each)) for name, each in trained_models().items()
-            }
-        return {**self._models, **self._own}
+        """Commands by name: a group for each training, with the commands of the same group here, then the others."""
+        if self._registered is None:
+            self._registered = {name: typer.main.get_group(_group_of(name, each)) for name, each in trainings().items()}
+            for name, group in self._registered.items():
+                if name in self._own:
+                    group.commands.update(self._own[name].commands)
+        return {**self._own, **self._registered}
 
     @commands.setter
     def commands(self, own: MutableMapping[str, Any]) -> None:
@@ -164,7 +154,8 @@ def _with_choices(command: Callable[..., None], training: Training) -> Callable[
     return command
 
 
-evaluator = _group_of("evaluator", EVALUATOR)
+evaluator = typer.Typer(name="evaluator")
+"""What the evaluator has beside its training, which is registered."""
 app.add_typer(evaluator)
 
 

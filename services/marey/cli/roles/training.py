@@ -11,12 +11,6 @@ from marey.core.extras import needs_extra
 from marey.registry import Training, find_model, model_names, resolve
 
 
-def trained_models() -> dict[str, Training]:
-    """The models that can be trained here, by name."""
-    specs = (find_model(name) for name in model_names())
-    return {spec.name: spec.training for spec in specs if spec is not None and spec.training is not None}
-
-
 def train_stage(
     training: Training,
     name: str,
