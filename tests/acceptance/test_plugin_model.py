@@ -72,10 +72,26 @@ def test_what_is_submitted_to_it_is_fetched(served: Marey, tmp_path: Path) -> No
     assert sideways[0] < 0.02 < 0.3 < sideways[1]
 
 
-def test_a_setting_out_of_its_range_is_refused_by_the_server_with_the_line(served: Marey) -> None:
-    table = "prompt,settings\na person stands,width=0.2\na person stands,beats=2.5\na person stands,steps=3\n"
-    served("submit", "-f", "-", "--model", "sway", stdin=table).refused(
+TABLE = "prompt,settings\na person stands,width=0.2\na person stands,beats=2.5\na person stands,steps=3\n"
+
+
+def test_a_setting_out_of_its_range_is_refused_with_the_line(served: Marey) -> None:
+    served("submit", "-f", "-", "--model", "sway", stdin=TABLE).refused(
         2, "line 3: settings: beats: is 2.5, not a whole number", "line 4: settings: unknown setting 'steps' of sway-"
+    )
+
+
+def test_a_client_without_the_plugin_leaves_its_settings_to_the_server(served: Marey) -> None:
+    client = Marey(served.home, served.models)
+    client("submit", "-f", "-", "--model", "sway", stdin=TABLE).refused(
+        2, "line 3: settings: beats: is 2.5, not a whole number", "line 4: settings: unknown setting 'steps' of sway-"
+    )
+
+
+def test_a_client_with_the_plugin_asks_no_server_for_ranges(trained: Marey, tmp_path: Path) -> None:
+    alone = Marey(tmp_path, trained.models, trained.environment)
+    alone("submit", "a person stands", "--model", "sway", "--set", "beats=2.5", "--seconds", 20).refused(
+        2, "seconds: 20 is outside 0.8 to 9.8 seconds, the range of sway", "beats: is 2.5, not a whole number"
     )
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
+from marey.client.ranges import check_ranges
 from marey.client.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
 from marey.client.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
 from marey.core.errors import InvalidInput
@@ -66,6 +67,8 @@ class PromptReader:
         try:
             for line, raw in self._raws:
                 values, problems = read_values(raw, line)
+                values, beyond = check_ranges(values, line)
+                problems += beyond
                 self.add(problems)
                 count += 1 if problems else values.get("variants", 1)
                 check_count(count, line, self.where)

@@ -17,24 +17,34 @@ MAX_FRAMES = 2**53
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
-    """Return the shortest and longest motion of a generator, in seconds.
+    """Return the shortest and longest motion of a generator, in seconds: limits of its model, narrowed by the bundle.
 
     Raises:
-        InvalidBundle: its manifest lacks them.
+        InvalidBundle: neither manifest nor model states them, or the manifest states more than the model can do.
     """
-    manifest = bundle.manifest
-    fps = manifest.fps or 20.0
-    low, high = (_frames(bundle, name) / fps for name in ("min_frames", "max_frames"))
+    spec = find_model(bundle.manifest.model)
+    limits = None if spec is None else spec.limits
+    low = _seconds(bundle, "min_frames", limits and limits.min_seconds)
+    high = _seconds(bundle, "max_frames", limits and limits.max_seconds)
     if not 0 < low <= high < math.inf:
         raise InvalidBundle(f"has an invalid range of lengths: {low:g} to {high:g} seconds", where=str(bundle.path))
+    if limits is not None and not limits.min_seconds <= low <= high <= limits.max_seconds:
+        raise InvalidBundle(
+            f"makes motions of {low:g} to {high:g} seconds, and the model {bundle.manifest.model!r} makes those of "
+            f"{limits.min_seconds:g} to {limits.max_seconds:g}",
+            where=str(bundle.path),
+        )
     return low, high
 
 
-def _frames(bundle: Bundle, name: str) -> float:
+def _seconds(bundle: Bundle, name: str, of_model: float | None) -> float:
+    """A length in the bundle's parameters, which are frames; where they do not give it, the model's."""
     value = bundle.manifest.parameters.get(name)
+    if value is None and of_model is not None:
+        return of_model
     if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < MAX_FRAMES:
         raise InvalidBundle(f"its parameters give no number as {name!r}", where=str(bundle.path))
-    return float(value)
+    return value / (bundle.manifest.fps or 20.0)
 
 
 def check_seconds(bundle: Bundle, seconds: float | None) -> None:

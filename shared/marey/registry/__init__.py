@@ -2,6 +2,7 @@
 
 from marey.registry.models import (
     Ablation,
+    Limits,
     ModelSpec,
     Setting,
     find_model,
@@ -16,6 +17,7 @@ from marey.registry.training import Choice, Stage, Training
 __all__ = [
     "Ablation",
     "Choice",
+    "Limits",
     "ModelSpec",
     "PlugIns",
     "Setting",

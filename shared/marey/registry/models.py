@@ -11,6 +11,7 @@ torch is imported where a reference is resolved. docs/extending.md builds a mode
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from importlib import import_module
@@ -60,6 +61,23 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """The lengths of the motions that a model makes, in seconds, both ends included. A bundle may narrow them."""
+
+    min_seconds: float
+    max_seconds: float
+
+    def __post_init__(self) -> None:
+        """Check the range.
+
+        Raises:
+            ValueError: it is empty.
+        """
+        if not 0 < self.min_seconds <= self.max_seconds < math.inf:
+            raise ValueError(f"no motion has {self.min_seconds:g} to {self.max_seconds:g} seconds")
+
+
+@dataclass(frozen=True)
 class Ablation:
     """A comparison of trained variants: `marey train ablate NAME`.
 
@@ -85,6 +103,7 @@ class ModelSpec:
         handler: `() -> Handler` of its queue.
         load: `(bundle, *, device, threads) -> Generator` (`marey.generation.port`).
         settings: of sampling.
+        limits: lengths of motions; None = each bundle states its own.
         live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
         training: None = it is not trained here.
         tokenizer: `(parameters) -> MotionTokenizer`, untrained; its weights come from the part `tokenizer` of a bundle
@@ -101,6 +120,7 @@ class ModelSpec:
     handler: str
     load: str
     settings: tuple[Setting, ...] = ()
+    limits: Limits | None = None
     live: str | None = None
     training: Training | None = None
     tokenizer: str | None = None

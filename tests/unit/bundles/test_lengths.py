@@ -1,0 +1,68 @@
+"""Lengths of motions: the model's, which a bundle may narrow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from marey.bundles import Bundle, BundleWriter
+from marey.bundles.limits import check_seconds, seconds_of
+from marey.core.errors import InvalidBundle, InvalidInput
+from tests.support.plugins import installed, write_distribution
+
+DANCER = """\
+from marey.registry import Limits, ModelSpec
+SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", limits=Limits(1.0, 8.0))
+"""
+
+
+def bundle(path: Path, **parameters: Any) -> Bundle:
+    with BundleWriter(path) as writer:
+        return writer.finish(
+            name=path.name, version="1", kind="generator", model="dancer", config="tiny", licence="MIT", fps=20.0,
+            parameters=parameters,
+        )  # fmt: skip
+
+
+@pytest.fixture
+def dancer(tmp_path: Path):
+    """Install the model."""
+    with installed(
+        write_distribution(tmp_path, "dancer", {"dancer": DANCER}, "[marey.models]\ndancer = dancer:SPEC\n")
+    ):
+        yield
+
+
+@pytest.mark.parametrize(
+    ("parameters", "seconds"),
+    [
+        ({}, (1.0, 8.0)),
+        ({"min_frames": 40}, (2.0, 8.0)),
+        ({"max_frames": 40}, (1.0, 2.0)),
+        ({"min_frames": 20, "max_frames": 160}, (1.0, 8.0)),
+    ],
+)
+def test_a_bundle_narrows_its_model(
+    dancer: None, tmp_path: Path, parameters: dict[str, int], seconds: tuple[float, float]
+) -> None:
+    found = bundle(tmp_path / "short", **parameters)
+    assert seconds_of(found) == seconds
+    for value in seconds:
+        check_seconds(found, value)
+    for value in (seconds[0] - 0.1, seconds[1] + 0.1):
+        with pytest.raises(InvalidInput, match="the range of short"):
+            check_seconds(found, value)
+
+
+@pytest.mark.parametrize("parameters", [{"min_frames": 19}, {"max_frames": 161}])
+def test_a_bundle_cannot_do_more_than_its_model(dancer: None, tmp_path: Path, parameters: dict[str, int]) -> None:
+    with pytest.raises(InvalidBundle, match="and the model 'dancer' makes those of 1 to 8"):
+        seconds_of(bundle(tmp_path / "long", **parameters))
+
+
+def test_of_a_model_that_is_not_installed_the_bundle_must_say(tmp_path: Path) -> None:
+    assert seconds_of(bundle(tmp_path / "known", min_frames=10, max_frames=600)) == (0.5, 30.0)
+    with pytest.raises(InvalidBundle, match="no number as 'max_frames'"):
+        seconds_of(bundle(tmp_path / "unknown", min_frames=10))
