@@ -1,7 +1,7 @@
 """`marey review` of 310 motions as a process, with their download from an API on the same machine.
 
-The motions are made once by `mogo-starter`: 31 prompts, each copied nine times with another seed in its file, so that
-no two files are the same. The baseline of the same run is the drawing alone, in one process.
+The motions are made once by the last of the installed models: 31 prompts, each copied nine times with another seed in
+its file, so that no two files are the same. The baseline of the same run is the drawing alone, in one process.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from marey.checks.prompts import evaluation_prompts
 from marey.cli.drawing import Drawing, draw
 from marey.jobs import AssetDigest, ClaimedItem, NewMotion, asset_key
 from marey.motion.clip import MotionClip, load_npz
+from marey.registry import model_names
 from marey.storage import AssetStore
 from marey.tenants import DEFAULT_TENANT
 
@@ -71,7 +72,7 @@ def _measure(ways: dict[str, Callable[[], object]]) -> None:
 def _generate(cluster: Platform, prompts: list[str], folder: Path) -> list[Path]:
     """The files of these prompts, in their order, as the shipped bundle makes them."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
-    options = ("--model", "mogo", "--format", "npz", "--seed", "1", "-o", str(folder))
+    options = ("--model", model_names()[-1], "--format", "npz", "--seed", "1", "-o", str(folder))
     done = subprocess.run(
         marey("generate", *prompts, *options), env=environment, stdout=subprocess.PIPE, text=True, check=True
     )

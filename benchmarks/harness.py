@@ -68,6 +68,17 @@ def table(title: str, timings: list[Timing], *, baseline: str | None = None, not
     return "\n".join([*lines, *(["", note] if note else []), ""])
 
 
+def has_cuda() -> bool:
+    """Print the CUDA device, or that there is none, and return True where there is one."""
+    import torch
+
+    if not torch.cuda.is_available():
+        print("There is no CUDA device here: nothing is measured.\n")
+        return False
+    print(f"{torch.cuda.get_device_name()}, torch {torch.__version__}, CUDA {torch.version.cuda}\n")
+    return True
+
+
 def _unit(seconds: float) -> str:
     for factor, unit in ((1, "s"), (1e3, "ms"), (1e6, "µs")):
         if seconds * factor >= 1:

@@ -10,7 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.marey import TINY, TINY_MOGO, Marey
+from marey.core import defaults
+from marey.registry import get_model
+from tests.support.marey import TINY, Marey, tiny
+from tests.support.models import another_model
 
 
 def nothing_new(marey: Marey, before: list[dict[str, object]]) -> None:
@@ -83,10 +86,13 @@ def test_a_length_this_model_cannot_make_names_its_range(marey: Marey, offline: 
 
 
 def test_a_setting_that_only_another_model_has_is_refused_by_name(marey: Marey, offline: Marey, tmp_path: Path) -> None:
-    line = json.dumps({"prompt": "a person waves", "model": "mogo", "settings": {"steps": 12}})
-    marey("submit", "-f", "-", stdin=line).refused(2, "line 1: settings", "'steps'", TINY_MOGO, "upper_top_k")
-    ran = offline("generate", "-f", "-", "-o", tmp_path / "out", stdin=line)
-    ran.refused(2, "line 1: settings", "'steps'", TINY_MOGO)
+    model = another_model()
+    own = [setting.name for setting in get_model(model).settings]
+    foreign = next(each.name for each in get_model(defaults.MODEL).settings if each.name not in own)
+    line = json.dumps({"prompt": "a person waves", "model": model, "settings": {foreign: 12}})
+    said = (2, "line 1: settings", f"{foreign!r}", tiny(model))
+    marey("submit", "-f", "-", stdin=line).refused(*said, *own)
+    offline("generate", "-f", "-", "-o", tmp_path / "out", stdin=line).refused(*said)
     assert not (tmp_path / "out").exists()
 
 

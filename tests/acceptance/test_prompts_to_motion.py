@@ -10,7 +10,8 @@ import pytest
 
 from marey.motion.clip import load_npz
 from marey.motion.io.bvh import read_bvh
-from tests.support.marey import TINY, TINY_MOGO, Marey
+from tests.support.marey import TINY, Marey, tiny
+from tests.support.models import another_model
 
 FIELDS = ["job", "item", "motion", "name", "prompt", "variant", "model", "bundle", "licence", "seed", "state", "error",
           "frames", "fps", "elapsed", "files"]  # fmt: skip
@@ -69,13 +70,14 @@ def test_a_one_shot_makes_the_same_tokens_as_the_queue(
 
 
 def test_another_model_makes_motions_by_the_same_queue_and_alone(marey: Marey, offline: Marey, tmp_path: Path) -> None:
-    table = "prompt,model,seconds,seed\na person walks,mogo,1,3\nsomeone waves,mogo,,\n"
+    model = another_model()
+    table = f"prompt,model,seconds,seed\na person walks,{model},1,3\nsomeone waves,{model},,\n"
     queued = marey("submit", "-f", "-", "--fetch", tmp_path / "a", "--json", stdin=table).ok().lines
     alone = offline(
-        "generate", "a person walks", "--model", "mogo", "--seed", 3, "--seconds", 1, "-o", tmp_path / "b", "--json"
+        "generate", "a person walks", "--model", model, "--seed", 3, "--seconds", 1, "-o", tmp_path / "b", "--json"
     ).ok().lines  # fmt: skip
-    assert [line["model"] for line in (*queued, *alone)] == ["mogo"] * 3
-    assert {str(line["bundle"]).partition("@")[0] for line in queued} == {TINY_MOGO}
+    assert [line["model"] for line in (*queued, *alone)] == [model] * 3
+    assert {str(line["bundle"]).partition("@")[0] for line in queued} == {tiny(model)}
     ours, theirs = load_npz(alone[0]["files"]["npz"]), load_npz(queued[0]["files"]["npz"])
     assert ours.frames == 20
     np.testing.assert_array_equal(ours.features, theirs.features)

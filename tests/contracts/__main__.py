@@ -10,11 +10,18 @@ from typing import Any
 from marey.db import create_engine, upgrade
 from marey.embedded import start_postgres
 from marey.embedded.postgres import _postgres
-from tests.contracts.motions import BUNDLES, motion, processor
+from marey.registry import model_names
+from tests.contracts.motions import motion, processor
 from tests.contracts.story import events
-from tests.contracts.surfaces import SURFACES, database
+from tests.contracts.surfaces import SURFACES, database, of_model
 
 RECORDED = Path(__file__).parent / "recorded"
+MODELS = Path(__file__).parents[1] / "models"
+
+
+def file_of(model: str) -> Path:
+    """The file of a model's own surfaces: beside its tests, with which it goes."""
+    return MODELS / model / "recorded.json"
 
 
 def pg_dump_program() -> Path:
@@ -23,7 +30,7 @@ def pg_dump_program() -> Path:
 
 
 def main() -> None:
-    """Write the files of `recorded/`."""
+    """Write the files of `recorded/`, and of each model."""
     found: dict[str, Any] = {name: read() for name, read in SURFACES.items()}
     with tempfile.TemporaryDirectory(prefix="marey-") as home, start_postgres(Path(home), durable=False) as server:
         engine = create_engine(server.url)
@@ -31,10 +38,16 @@ def main() -> None:
         found["database"] = database(pg_dump_program(), server.url)
         found["events"] = events(engine)
         engine.dispose()
-    found["motions"] = {"processor": processor()} | {name: motion(name) for name in BUNDLES}
     for name, value in found.items():
-        text = json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
-        (RECORDED / f"{name}.json").write_text(text, encoding="utf-8")
+        _write(RECORDED / f"{name}.json", value)
+    for model in model_names():
+        surfaces = of_model(model)
+        made = {name: motion(name) for name in surfaces["bundle_tensors"]}
+        _write(file_of(model), surfaces | {"motions": made, "processor": processor()})
+
+
+def _write(path: Path, value: Any) -> None:
+    path.write_text(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from marey.bundles import Bundle
 from marey.core.settings import Settings
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
-BUNDLES = ("hgm3-starter", "mogo-starter")
 PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 5, 2.0
 
 

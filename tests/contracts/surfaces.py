@@ -10,9 +10,11 @@ import re
 import subprocess
 import typing
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
+
+from marey.registry import model_names
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
@@ -24,11 +26,20 @@ DEFINE_ERRORS = (
 WORDS = frozenset({"description", "summary", "title", "examples", "example"})
 
 
+MODELS = REPOSITORY / "workers" / "marey" / "models"
+"""Each model is a folder there, and has its own part of the surfaces."""
+
+
 def sources() -> Iterator[tuple[Path, ast.Module]]:
-    """Every module of the product."""
+    """Every module of the platform."""
     for root in ROOTS:
-        for path in sorted((REPOSITORY / root).rglob("*.py")):
-            yield path, ast.parse(path.read_text(encoding="utf-8"))
+        yield from modules(path for path in (REPOSITORY / root).rglob("*.py") if MODELS not in path.parents)
+
+
+def modules(paths: Iterable[Path]) -> Iterator[tuple[Path, ast.Module]]:
+    """Modules, parsed, by path."""
+    for path in sorted(paths):
+        yield path, ast.parse(path.read_text(encoding="utf-8"))
 
 
 # --- HTTP ---
@@ -74,7 +85,15 @@ def errors() -> Any:
 
 
 def command_line() -> Any:
-    """Every command with its arguments and options: names, kind, whether required or repeatable, default."""
+    """Every command with its arguments and options: names, kind, whether required or repeatable, default; without the
+    trainings of models."""
+    found = _all_commands()
+    train = found["commands"]["train"]["commands"]
+    found["commands"]["train"]["commands"] = {name: train[name] for name in train if name not in model_names()}
+    return found
+
+
+def _all_commands() -> Any:
     import typer
 
     from marey.cli.main import app
@@ -165,9 +184,13 @@ LEVELS = frozenset({"debug", "info", "warning", "error", "exception", "critical"
 
 
 def log_events() -> Any:
-    """Every log event with the fields it carries, `…` where a name is computed."""
+    """Every log event of the platform with the fields it carries, `…` where a name is computed."""
+    return _events(sources())
+
+
+def _events(parsed: Iterable[tuple[Path, ast.Module]]) -> Any:
     found: dict[str, set[str]] = defaultdict(set)
-    for _, tree in sources():
+    for _, tree in parsed:
         for node in ast.walk(tree):
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute) or not node.args:
                 continue
@@ -248,14 +271,24 @@ def files() -> Any:
 
 
 def bundle_tensors() -> Any:
-    """Names, shapes and kinds of the tensors in the shipped bundles, and the configuration's keys."""
+    """Those of the shipped bundles that no generator model reads."""
+    return {
+        name: found
+        for model, bundles in _tensors().items()
+        if model not in model_names()
+        for name, found in bundles.items()
+    }
+
+
+def _tensors() -> dict[str, dict[str, Any]]:
+    """Names, shapes and kinds of the tensors in the shipped bundles, and the configuration's keys, by model."""
     import json
 
     from safetensors import safe_open
 
     from marey.bundles import Bundle
 
-    found: dict[str, Any] = {}
+    found: dict[str, dict[str, Any]] = defaultdict(dict)
     for manifest in sorted((REPOSITORY / "models").glob("*/manifest.json")):
         document = json.loads(manifest.read_text(encoding="utf-8"))
         tensors: dict[str, str] = {}
@@ -264,7 +297,7 @@ def bundle_tensors() -> Any:
                 for name in opened.keys():  # noqa: SIM118  (not a mapping)
                     part = opened.get_slice(name)
                     tensors[f"{shard.name}:{name}"] = f"{part.get_dtype()} {part.get_shape()}"
-        found[manifest.parent.name] = {
+        found[document["model"]][manifest.parent.name] = {
             "reference": Bundle.open(manifest.parent, verify=False).reference,
             "parameters": _keys(document["parameters"]),
             "tensors": tensors,
@@ -292,6 +325,18 @@ def database(pg_dump: Path, url: str) -> list[str]:
     ).stdout
     noise = re.compile(r"^(--.*|SET .*|SELECT pg_catalog\..*|\\(un)?restrict .*)?$")
     return [line.rstrip() for line in text.splitlines() if not noise.match(line)]
+
+
+# --- models ---
+
+
+def of_model(model: str) -> Any:
+    """The part of a model: its trainings, its bundles, and the log events of its own code."""
+    return {
+        "command_line": _all_commands()["commands"]["train"]["commands"].get(model),
+        "bundle_tensors": _tensors()[model],
+        "log_events": _events(modules((MODELS / model).rglob("*.py"))),
+    }
 
 
 SURFACES: dict[str, Callable[[], Any]] = {

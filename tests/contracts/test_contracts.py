@@ -10,16 +10,24 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from tests.contracts.motions import BUNDLES, motion, processor
+from marey.registry import model_names
+from tests.contracts.__main__ import RECORDED, file_of
+from tests.contracts.motions import motion, processor
 from tests.contracts.story import events
-from tests.contracts.surfaces import SURFACES, database
+from tests.contracts.surfaces import SURFACES, database, of_model
 
-RECORDED = Path(__file__).parent / "recorded"
 HINT = "if this change is wanted: `python -m tests.contracts`"
 
 
 def recorded(name: str) -> Any:
     return json.loads((RECORDED / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def recorded_of(model: str) -> Any:
+    return json.loads(file_of(model).read_text(encoding="utf-8"))
+
+
+MOTIONS = [(model, name) for model in model_names() for name in recorded_of(model)["motions"]]
 
 
 def differences(recorded: Any, found: Any, place: str = "") -> list[str]:
@@ -51,21 +59,29 @@ def test_events_and_webhooks_are_as_recorded(engine: sa.Engine) -> None:
     assert differences(recorded("events"), json.loads(json.dumps(events(engine)))) == [], HINT
 
 
-@pytest.mark.parametrize("name", BUNDLES)
-def test_a_motion_of_a_shipped_bundle_is_as_recorded(name: str) -> None:
+@pytest.mark.parametrize("model", model_names())
+def test_the_part_of_a_model_is_as_recorded(model: str) -> None:
+    known, found = recorded_of(model), json.loads(json.dumps(of_model(model)))
+    assert set(known) == {*found, "motions", "processor"}
+    assert set(known["motions"]) == set(found["bundle_tensors"])
+    assert differences({name: known[name] for name in found}, found) == [], HINT
+
+
+@pytest.mark.parametrize(("model", "name"), MOTIONS)
+def test_a_motion_of_a_shipped_bundle_is_as_recorded(model: str, name: str) -> None:
     """Bit for bit on the kind of processor it was recorded on; elsewhere its length and its keys.
 
     There a sum is added in another order, which may draw another token.
     """
-    known, found = recorded("motions")[name], motion(name)
+    known, found = recorded_of(model)["motions"][name], motion(name)
     assert found["frames"] == known["frames"]
     assert found["manifest"] == known["manifest"]
-    if recorded("motions")["processor"] == processor():
+    if recorded_of(model)["processor"] == processor():
         assert (found["npz"], found["bvh"]) == (known["npz"], known["bvh"])
         assert found["joints"] == known["joints"]
 
 
 def test_what_is_recorded_is_compared() -> None:
     names = {path.stem for path in RECORDED.glob("*.json")}
-    assert names == {*SURFACES, "database", "events", "motions"}
+    assert names == {*SURFACES, "database", "events"}
     assert all(np.size(recorded(name)) for name in names)

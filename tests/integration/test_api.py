@@ -87,7 +87,7 @@ def test_only_the_first_thousand_problems_are_listed_and_all_are_counted(http: h
 
 
 def test_a_length_or_model_this_server_cannot_make_names_its_line(http: httpx2.Client) -> None:
-    response = http.post("/v1/jobs", json={"items": [WALK, {**WALK, "seconds": 30}, {**WALK, "model": "mogo"}]})
+    response = http.post("/v1/jobs", json={"items": [WALK, {**WALK, "seconds": 30}, {**WALK, "model": "stroller"}]})
     problem = refused(response, 422, "invalid-items")
     assert [(p["line"], p["field"]) for p in problem["problems"]] == [(2, "seconds"), (3, "model")]
     assert "0.8 to 9.8 seconds" in problem["problems"][0]["message"]
@@ -380,7 +380,7 @@ def test_models_are_listed_with_their_terms(http: httpx2.Client) -> None:
     assert (model["name"], model["licence"], model["max_seconds"]) == (BUNDLE, "MIT", 9.8)
     assert http.get("/v1/models/hgm3").json() == model
     assert http.get(f"/v1/models/{model['bundle']}").json() == model
-    refused(http.get("/v1/models/mogo"), 404, "not-found")
+    refused(http.get("/v1/models/stroller"), 404, "not-found")
 
 
 def test_a_broken_bundle_is_told_without_a_path_and_hides_no_other(http: httpx2.Client, api_home: Path) -> None:

@@ -24,7 +24,7 @@ from marey.embedded import EmbeddedServer
 from marey.tenants import create_key, create_tenant
 from tests.support.auth_states import Knock, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.live_streams import add_mogo
+from tests.support.live_streams import add_streamer
 from tests.support.named_fields import names_the_field
 
 EXAMPLES = 12
@@ -78,7 +78,7 @@ def place(
     module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Place]:
     config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
-    add_mogo(config)
+    add_streamer(config)
     with running_api(config, module_database_url) as api:
         lesser = {scope: lesser_knocks(api.engine, scope) for scope in ("read", "submit", "operate", "metrics")}
         with transaction(api.engine) as conn:
@@ -95,7 +95,7 @@ def things(api: LiveApi) -> dict[str, str]:
             noun: http.post(f"/v1/{noun}s", json=body).json()["id"]
             for noun, body in (
                 ("job", {"items": [{"prompt": PROMPT}]}),
-                ("stream", {"prompt": PROMPT, "model": "mogo"}),
+                ("stream", {"prompt": PROMPT}),
                 ("webhook", {"url": "http://127.0.0.1:9/hook"}),
             )
         }

@@ -33,7 +33,7 @@ from tests.support.command import Command
 from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
 from tests.support.live_streams import BUNDLE as STREAMER
-from tests.support.live_streams import add_mogo, watching
+from tests.support.live_streams import add_streamer, watching
 
 PROMPT = "a secretive person waltzes"
 NAME = "unreleased film"
@@ -111,7 +111,7 @@ def place(
     module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Studio]:
     with studio(tmp_path_factory.mktemp("tenants"), module_database_url, valkey.url) as place:
-        add_mogo(place.config)
+        add_streamer(place.config)
         with transaction(place.api.engine) as conn:
             create_tenant(conn, "rival")
         yield place

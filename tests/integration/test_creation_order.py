@@ -55,7 +55,7 @@ def listings(engine: sa.Engine) -> dict[str, tuple[Listing, Callable[[int], UUID
     def stream(n: int) -> UUID:
         with transaction(engine) as conn:
             key = create_key(conn, f"live {n}", ["submit"]).key.id
-            return create_stream(conn, NewStream(DEFAULT_TENANT, key, "walk", "mogo", "m@0", 1, 9), limit=9)
+            return create_stream(conn, NewStream(DEFAULT_TENANT, key, "walk", "stroller", "m@0", 1, 9), limit=9)
 
     def delivery(_: int) -> UUID:
         with transaction(engine) as conn:

@@ -1,10 +1,10 @@
-"""Live streams from the row to the frames, and back to a motion: real Postgres, real Valkey, a small real MOGO."""
+"""Live streams from the row to the frames, and back to a motion: real Postgres, real Valkey, a small real model."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 from uuid import UUID
@@ -13,19 +13,16 @@ import numpy as np
 import pytest
 import redis
 import sqlalchemy as sa
-import torch
 
 from marey.core.settings import Settings
 from marey.db import transaction
 from marey.generation.handler import GeneratorHandler
 from marey.jobs import get_job, list_items
 from marey.jobs.states import ItemState
-from marey.models.mogo.bundle import random_bundle
-from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveSessionPool
+from marey.registry import streaming_models
 from marey.runtime.live import supervisor
 from marey.runtime.live.leased_stream import LeasedStream
-from marey.runtime.live.port import LiveFrame
+from marey.runtime.live.port import LiveFrame, SessionPool
 from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
 from marey.streams import StreamPrompt, StreamState, prompts_with_rewrites, stream_actions, stream_prompts
@@ -38,14 +35,17 @@ from marey.streams.rewrites import PromptRewrite
 from marey.streams.states import STREAM_TRANSITIONS
 from marey.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
+from tests.support.models import load
 from tests.support.runtime import Loop
+from tests.support.streaming_models import Around, Streaming, loaded
 
 Start = Callable[..., LiveWorker]
 
 
-@pytest.fixture(scope="module")
-def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
-    return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu", threads=1)
+@pytest.fixture(scope="module", params=streaming_models())
+def streaming(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Streaming]:
+    with loaded(request.param, tmp_path_factory.mktemp(request.param)) as streaming:
+        yield streaming
 
 
 @pytest.fixture
@@ -55,16 +55,16 @@ def client(queue_url: str) -> Iterator[redis.Redis]:
 
 
 @pytest.fixture
-def studio(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Studio:
-    return Studio(engine, client, generator.bundle.reference)
+def studio(engine: sa.Engine, client: redis.Redis, streaming: Streaming) -> Studio:
+    return Studio(engine, client, streaming.model, streaming.bundle.reference)
 
 
 @pytest.fixture
-def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Iterator[Start]:
+def start(engine: sa.Engine, client: redis.Redis, streaming: Streaming) -> Iterator[Start]:
     workers: list[LiveWorker] = []
 
-    def begin(slots: int = 2, pool: type[LiveSessionPool] = LiveSessionPool, **options: Any) -> LiveWorker:
-        workers.append(LiveWorker(engine, client, lambda: pool(generator, slots), **options))
+    def begin(slots: int = 2, pool: Callable[[SessionPool], Any] = Around, **options: Any) -> LiveWorker:
+        workers.append(LiveWorker(engine, client, lambda: pool(streaming.live.open_pool(slots)), **options))
         return workers[-1]
 
     yield begin
@@ -98,8 +98,9 @@ def farthest_step(frames: list[Frame]) -> float:
 
 
 def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
-    studio: Studio, start: Start, generator: Generator, engine: sa.Engine, folder_store: FolderStore
+    studio: Studio, start: Start, streaming: Streaming, engine: sa.Engine, folder_store: FolderStore
 ) -> None:
+    generator = load(streaming.bundle)
     stream = studio.begin("a person walks")
     assert (studio.row(stream).state, studio.row(stream).position) == (StreamState.WAITING, 0)
     start()
@@ -119,7 +120,7 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     turned = next(frame.number for frame in frames if frame.prompt == 1)
     assert prompts == [(0, "a person walks"), (turned, "a person waves")]
     assert row.job is not None
-    handler = GeneratorHandler("mogo", lambda *_, **__: generator, 4, Settings())
+    handler = GeneratorHandler(streaming.model, lambda *_, **__: generator, 4, Settings())
     loop = Loop(engine, folder_store, handler)
     try:
         loop.run()
@@ -249,7 +250,7 @@ def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio
 def test_a_frame_shown_while_the_worker_stops_is_written_down(
     studio: Studio, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Slow(LiveSessionPool):
+    class Slow(Around):
         def step(self) -> dict[int, LiveFrame]:
             made = super().step()
             time.sleep(0.3)  # the supervisor hears that it is over meanwhile
@@ -329,15 +330,27 @@ def test_a_queue_that_forgets_everything_costs_no_stream(studio: Studio, start: 
     assert studio.row(stream).state is StreamState.LIVE
 
 
-class Fragile(LiveSessionPool):
+class Fragile(Around):
     """Breaks, with all that is in it, at frame 5 of the stream with seed 13."""
 
-    def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
-        made = super()._shown(drawn)
-        for session, live in made.items():
-            row = self._streams.sessions.index(self._sessions[session].stream)
-            if self._streams.state.seeds[row] == 13 and live.frame.number == 5:
-                raise RuntimeError("a bug in the model")
+    def __init__(self, pool: SessionPool) -> None:
+        super().__init__(pool)
+        self._seeds: dict[int, int] = {}
+
+    def start(self, text: TextFeatures, seed: int, **options: Any) -> int:
+        session = self._pool.start(text, seed, **options)
+        self._seeds[session] = seed
+        return session
+
+    def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
+        return [self._held(session, made) for made in self._pool.catch_up(session, frames)]
+
+    def step(self) -> dict[int, LiveFrame]:
+        return {session: self._held(session, made) for session, made in super().step().items()}
+
+    def _held(self, session: int, made: LiveFrame) -> LiveFrame:
+        if self._seeds[session] == 13 and made.frame.number == 5:
+            raise RuntimeError("a bug in the model")
         return made
 
 

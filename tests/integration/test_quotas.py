@@ -278,7 +278,7 @@ def test_equal_content_of_one_tenant_is_stored_and_counted_once(engine: sa.Engin
 
 
 def new_stream(conn: sa.Connection, tenant: str, key: UUID, limit: int = 4) -> UUID:
-    return create_stream(conn, NewStream(tenant, key, "a person walks", "mogo", "mogo@0", 1, 100), limit=limit)
+    return create_stream(conn, NewStream(tenant, key, "a person walks", "stroller", "stroller@0", 1, 100), limit=limit)
 
 
 def test_a_tenants_own_quota_of_streams_goes_before_the_servers(engine: sa.Engine) -> None:
@@ -311,11 +311,11 @@ def test_of_a_suspended_tenant_nothing_is_begun_and_what_runs_is_finished(engine
         assert suspend_tenant(conn, tenant).suspended is not None
         assert claim(conn, "hgm3", "w", 1) is None
         assert waiting_batches(conn, {"hgm3": 1}) == {}
-        assert open_streams(conn, "mogo@0") == []
+        assert open_streams(conn, "stroller@0") == []
     assert len(commit_all(engine, found)) == 1
     with transaction(engine) as conn:
         assert reinstate_tenant(conn, tenant).suspended is None
-        assert [row.id for row in open_streams(conn, "mogo@0")] == [stream]
+        assert [row.id for row in open_streams(conn, "stroller@0")] == [stream]
     assert claim_some(engine).job == job
 
 

@@ -48,7 +48,7 @@ def one_of_each(engine: sa.Engine) -> dict[ReferenceKind, UUID]:
             JOB: job,
             ReferenceKind.MOTION: list_motions(conn, DEFAULT_TENANT, job=job).rows[0].id,
             ReferenceKind.STREAM: create_stream(
-                conn, NewStream(DEFAULT_TENANT, key, "walk", "mogo", "m@0", 1, 9), limit=9
+                conn, NewStream(DEFAULT_TENANT, key, "walk", "stroller", "m@0", 1, 9), limit=9
             ),
             ReferenceKind.KEY: key,
             ReferenceKind.WEBHOOK: webhook,

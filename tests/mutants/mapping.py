@@ -21,7 +21,7 @@ import coverage
 
 from tests.mutants.recording import SOURCES
 
-TESTS = ("tests/unit", "tests/integration", "tests/acceptance", "tests/contracts")
+TESTS = ("tests/unit", "tests/models", "tests/integration", "tests/acceptance", "tests/contracts")
 SHARED_TESTS = ("conftest.py", "tests/support", "tests/servers")
 
 

@@ -1,41 +1,30 @@
 """Checks on a device that is not the processor, each in a process of its own:
 
 python -m tests.support.card_checks NAME FOLDER
+
+NAME is `devices`, `training`, or a model. What only one model has is checked in its own folder of `tests/models`.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from marey.evaluator.config import TINY as TINY_EVALUATOR
-from marey.evaluator.train import train_stage as train_evaluator
-from marey.generation.port import NoControl, Request
-from marey.models.hgm3.bundle import random_bundle as random_hgm3
-from marey.models.hgm3.config import TINY as TINY_HGM3
-from marey.models.hgm3.generate import Generator as HGM3Generator
-from marey.models.hgm3.train import train_stage as train_hgm3
-from marey.models.mogo.bundle import random_bundle as random_mogo
-from marey.models.mogo.config import TINY, DepthConfig, MOGOConfig
-from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveSessionPool
-from marey.models.mogo.model import RQHCTransformer
-from marey.models.mogo.packed_model import PackedModel
-from marey.models.mogo.streaming import StreamBatch
-from marey.models.mogo.train import train_stage as train_mogo
+from marey.generation.port import Request
+from marey.registry import Training, model_names, resolve, trainings
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.card import CARD, card, waits
+from tests.support.models import load, random_bundle
 from tests.support.prepared import text_features, write_prepared
 
 REQUESTS = [*(Request(text_features(seed), seed, frames=24) for seed in range(3)), Request(text_features(9), 9)]
+Check = Callable[[Path], None]
 
 
 def devices(folder: Path) -> None:
@@ -51,89 +40,44 @@ def devices(folder: Path) -> None:
     assert len(waits) == 2
 
 
-def mogo(folder: Path) -> None:
-    """MOGO draws what it draws on the processor; a step never waits, and a frame at most for what is shown."""
-    for config in (TINY, replace(TINY, depth=DepthConfig())):
-        _step_never_waits(config)
-    _same(Generator, random_mogo(folder / "random-mogo", "tiny").path)
-    _batches_share_a_room(Generator.load(str(folder / "random-mogo"), device=CARD))
-    room = LiveSessionPool(Generator.load(str(folder / "random-mogo"), device=CARD), 4)
-    first, second = room.start(text_features(0), 0), room.start(text_features(1), 1)
-    room.steer(first, text_features(2, actions=1))
-    waits.clear()
-    room.step()
-    assert len(waits) <= 2, waits  # features and tokens
-    room.pause(first)
-    room.step()
-    room.resume(first)
-    room.stop(second)
-    assert len(room.step()) == 1
-
-
-def hgm3(folder: Path) -> None:
-    """HGM³ draws what it draws on the processor."""
-    _same(HGM3Generator, random_hgm3(folder / "random-hgm3").path)
-
-
 def training(folder: Path) -> None:
-    """Every stage of every model trains, MOGO's from what it draws itself too."""
+    """Every stage of all that is trained trains."""
     prepared = write_prepared(folder / "prepared")
-
-    def train(stage: Callable[..., Any], name: str, config: Any, *, warm: bool = False) -> None:
-        run = folder / type(config).__name__
-        options = TrainOptions(
-            prepared, run, config, Budget(steps=2), device=CARD, bf16=False, quiet=True, warm=warm
-        )  # fmt: skip
-        assert all(np.isfinite(value) for value in stage(name, options).values())
-
-    for name in ("tokenizer", "masked", "residual", "length"):
-        train(train_hgm3, name, TINY_HGM3)
-    for name in ("tokenizer", "transformer"):
-        train(train_mogo, name, TINY)
-    train(train_mogo, "transformer", TINY, warm=True)
-    train(train_evaluator, "tmr", TINY_EVALUATOR)
+    for name, each in trainings().items():
+        for stage in each.stages:
+            if stage.name != "all":
+                train(each, stage.name, prepared, folder / name)
 
 
-def _step_never_waits(config: MOGOConfig) -> None:
-    packed = PackedModel(RQHCTransformer(config).to(CARD), dtype=torch.bfloat16)
-    streams = StreamBatch(packed, 3)
-    for seed in range(2):
-        streams.start(torch.randn(config.condition.text_width).to(CARD), seed)
-    waits.clear()
-    streams.step()
-    assert waits == []
+def train(training: Training, stage: str, prepared: Path, run: Path, *, warm: bool = False) -> None:
+    """Train two steps of a stage."""
+    config = resolve(training.config)("tiny")
+    options = TrainOptions(prepared, run, config, Budget(steps=2), device=CARD, bf16=False, quiet=True, warm=warm)
+    assert all(np.isfinite(value) for value in resolve(training.train)(stage, options).values())
 
 
-class _Interrupted(NoControl):
-    """Ends a batch after its first frames."""
-
-    def progress(self, done: int, total: int) -> None:
-        raise InterruptedError
-
-
-def _batches_share_a_room(generator: Generator) -> None:
-    first, second = (generator.generate(REQUESTS[:2]) for _ in range(2))
-    assert [a.tokens.tolist() for a in first if a] == [b.tokens.tolist() for b in second if b]
-    room = generator.streams(1, generator.config.inference)
-    with pytest.raises(InterruptedError):
-        generator.generate(REQUESTS, control=_Interrupted())
-    assert generator.streams(2, generator.config.inference) is room
-    assert room.sessions == []
-
-
-def _same(generator: Any, bundle: Path) -> None:
-    wanted = generator.load(str(bundle), device="cpu", dtype=torch.float32).generate(REQUESTS)
-    found = generator.load(str(bundle), device=CARD, dtype=torch.float32).generate(REQUESTS)
+def draws(model: str, folder: Path) -> None:
+    """The model draws what it draws on the processor."""
+    bundle = random_bundle(model, folder / f"random-{model}")
+    wanted = load(bundle, dtype=torch.float32).generate(REQUESTS)
+    found = load(bundle, device=CARD, dtype=torch.float32).generate(REQUESTS)
     for ours, theirs in zip(found, wanted, strict=True):
         assert np.array_equal(ours.tokens, theirs.tokens)
         np.testing.assert_allclose(ours.features, theirs.features, atol=1e-4)
-    lowered = generator.load(str(bundle), device=CARD, dtype=torch.bfloat16).generate(REQUESTS)
+    lowered = load(bundle, device=CARD, dtype=torch.bfloat16).generate(REQUESTS)
     assert [len(each.features) for each in lowered[:3]] == [24] * 3
 
 
-CHECKS = {check.__name__: check for check in (devices, mogo, hgm3, training)}
-
-if __name__ == "__main__":
+def main(checks: Mapping[str, Check]) -> None:
+    """Run the check that the command line names."""
     torch.set_num_threads(1)
     with card():
-        CHECKS[sys.argv[1]](Path(sys.argv[2]))
+        checks[sys.argv[1]](Path(sys.argv[2]))
+
+
+def _drawing(model: str) -> Check:
+    return lambda folder: draws(model, folder)
+
+
+if __name__ == "__main__":
+    main({"devices": devices, "training": training, **{model: _drawing(model) for model in model_names()}})

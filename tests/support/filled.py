@@ -151,7 +151,7 @@ def _streams(engine: sa.Engine) -> None:
         key = create_key(conn, "live", ["submit"], tenant=DEFAULT_TENANT).key.id
         wanted = ("waiting", "live", "paused", "ended", "failed")
         streams = {
-            state: create_stream(conn, NewStream(DEFAULT_TENANT, key, "walk", "mogo", "m@0", 1, 9, state), limit=9)
+            state: create_stream(conn, NewStream(DEFAULT_TENANT, key, "walk", "stroller", "m@0", 1, 9, state), limit=9)
             for state in wanted
         }
         for state, stream in streams.items():
@@ -159,7 +159,7 @@ def _streams(engine: sa.Engine) -> None:
                 take_stream(conn, stream, 1, "live worker")
                 add_chunk(conn, stream, 1, StreamChunk(0, 2, b"\0" * 8, [(0, "walk")], "1-0", StreamState.LIVE))
         add_chunk(conn, streams["paused"], 1, StreamChunk(2, 0, b"", [], "2-0", StreamState.PAUSED))
-        clip = new_item(0, "walk", model="mogo", text_key="stream-1")
+        clip = new_item(0, "walk", model="stroller", text_key="stream-1")
         end_stream(conn, streams["ended"], 1, "stopped", clip=(clip, b"recording"))
         end_stream(conn, streams["failed"], 1, "broken", problem=PROBLEM)
 

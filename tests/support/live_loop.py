@@ -82,14 +82,14 @@ class LiveWorker:
 class Studio:
     """A client's view of streams."""
 
-    def __init__(self, engine: sa.Engine, client: redis.Redis, bundle: str) -> None:
-        self.engine, self.client, self.bundle = engine, client, bundle
+    def __init__(self, engine: sa.Engine, client: redis.Redis, model: str, bundle: str) -> None:
+        self.engine, self.client, self.model, self.bundle = engine, client, model, bundle
         with transaction(engine) as conn:
             self.key = create_key(conn, "studio", ["submit"]).key
 
     def begin(self, prompt: str = "a person walks", *, seed: int = 1, max_frames: int = 10_000) -> UUID:
         """Begin a stream."""
-        new = NewStream(self.key.tenant, self.key.id, prompt, "mogo", self.bundle, seed, max_frames)
+        new = NewStream(self.key.tenant, self.key.id, prompt, self.model, self.bundle, seed, max_frames)
         with transaction(self.engine) as conn:
             return create_stream(conn, new, limit=100)
 

@@ -20,25 +20,26 @@ from websockets.sync.client import ClientConnection, connect
 from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.db import transaction
-from marey.models.mogo.bundle import random_bundle
 from marey.streams import StreamChunk, StreamState, add_chunk, end_stream, take_stream
 from marey.streams.control import START, ControlQueue, StreamControl
 from marey.streams.frames import Frame, encode_frame
 from marey.streams.redis import FrameStream
 from marey.streams.rewrites import PromptRewrite
 from tests.support.marey import REPOSITORY
+from tests.support.models import random_bundle, streaming_model
 
 JOINTS = 22
-BUNDLE = "mogo-paperclip"
+BUNDLE = "streamer-paperclip"
 PATIENCE = 30.0
 """Seconds that anything may take on a busy machine."""
 
 
-def add_mogo(config: Settings) -> None:
+def add_streamer(config: Settings) -> None:
     """A bundle that can stream, for an API that has none: `BUNDLE`, of random weights."""
     if not (config.models / BUNDLE).exists():
+        model = streaming_model()
         (config.models / "srl-light").symlink_to(REPOSITORY / "models" / "srl-light")
-        random_bundle(config.models / BUNDLE)
+        random_bundle(model, config.models / BUNDLE)
 
 
 class Hand:

@@ -20,13 +20,15 @@ from websockets.sync.client import ClientConnection, connect
 
 from marey.client.place import read_server
 from marey.client.transport import Transport
+from marey.core import defaults
+from marey.registry import model_names
+from tests.support.models import random_bundle
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MIGRATIONS = REPOSITORY / "migrations" / "marey" / "migrations"
 COMMAND = (sys.executable, "-m", "marey.cli")
 START_SECONDS = 300.0  # a bound for what hangs; a machine full of other work takes two minutes
-TINY = "hgm3-tiny"
-TINY_MOGO = "mogo-tiny"
+TINY = f"{defaults.MODEL}-tiny"
 
 
 @dataclass(frozen=True)
@@ -157,14 +159,16 @@ def serving(marey: Marey) -> Iterator[Serving]:
 
 
 def tiny_models(folder: Path) -> Path:
-    """A folder of models: HGM³ and MOGO with random weights, and the labeller that comes with the product."""
-    from marey.models.hgm3 import bundle as hgm3
-    from marey.models.mogo import bundle as mogo
-
-    hgm3.random_bundle(folder / TINY)
-    mogo.random_bundle(folder / TINY_MOGO)
+    """A folder of models: a bundle of random weights of each, and the labeller that comes with the product."""
+    for model in model_names():
+        random_bundle(model, folder / tiny(model))
     shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "srl-light")
     return folder
+
+
+def tiny(model: str) -> str:
+    """The name of a model's bundle in `tiny_models`."""
+    return f"{model}-tiny"
 
 
 def _role(process: psutil.Process) -> str:

@@ -80,15 +80,14 @@ def work(engine: sa.Engine) -> set[str]:
             fail_items(conn, held.lease_token, problems)
     with transaction(engine) as conn:
         key = create_key(conn, "live", ["submit"]).key.id
-        streams = [
-            create_stream(conn, NewStream(DEFAULT_TENANT, key, "walk", "mogo", "m@0", 1, 9), limit=9) for _ in range(2)
-        ]
+        new = NewStream(DEFAULT_TENANT, key, "walk", "stroller", "m@0", 1, 9)
+        streams = [create_stream(conn, new, limit=9) for _ in range(2)]
     with recording(engine, said), transaction(engine) as conn:
         open_streams(conn, "m@0")
         for stream in streams:
             take_stream(conn, stream, 1, "live worker")
             add_chunk(conn, stream, 1, StreamChunk(0, 2, b"\0" * 8, [(0, "walk")], "1-0", StreamState.LIVE))
-        clip = new_item(0, "walk", model="mogo", text_key="stream-1")
+        clip = new_item(0, "walk", model="stroller", text_key="stream-1")
         end_stream(conn, streams[0], 1, "stopped", clip=(clip, b"recording"))
         end_stream(conn, streams[1], 1, "broken", problem=PROBLEM)
         retire(conn, "w")

@@ -7,13 +7,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from marey.registry import model_names, streaming_models
 from tests.support.marey import REPOSITORY
 
 UNITS = REPOSITORY / "deploy" / "systemd"
 COMMON, S3 = UNITS / "marey-.service.d" / "10-common.conf", UNITS / "marey-.service.d" / "20-s3.conf"
 ENVIRONMENT = UNITS / "marey.env"
 PROGRAM = "/opt/marey/.venv/bin/marey"
-INSTANCES = ("marey-worker@hgm3.service", "marey-worker@text.service", "marey-live@mogo.service")
+INSTANCES = (
+    *(f"marey-worker@{queue}.service" for queue in (*model_names(), "text")),
+    *(f"marey-live@{model}.service" for model in streaming_models()),
+)
 SERVICES = ("marey-migrate.service", "marey-api.service", "marey-scheduler.service", "marey-text.service", *INSTANCES)
 
 

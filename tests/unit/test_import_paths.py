@@ -115,7 +115,7 @@ def test_modules_that_are_named_exist(lines: list[tuple[str, str]]) -> None:
         "`shared/jobs`",
         '"shared.runtime.status"',
         "services.api.app:create_app",
-        "from workers.mogo import x",
+        "from workers.stroller import x",
     ],
 )
 def test_old_paths_are_found(text: str) -> None:

@@ -21,7 +21,7 @@ EXAMPLES: dict[tuple[str, str], Any] = {
     ("NewJobBody", "application/json"): {
         "name": "day 1",
         "priority": 10,
-        "items": [{**_ITEM, "seconds": 4.0, "seed": 7, "variants": 3}, {"prompt": "a person bows", "model": "mogo"}],
+        "items": [{**_ITEM, "seconds": 4.0, "seed": 7, "variants": 3}, {"prompt": "a person bows", "model": "hgm3"}],
     },
     ("NewItemBody", "application/x-ndjson"): {**_ITEM, "model": "hgm3", "settings": {"guidance": 4.5}},
     ("JobPatch", "application/json"): {"priority": 50, "comment": "for tonight's review"},

@@ -308,7 +308,7 @@ class Streams(Resource):
 
         Args:
             prompt: the first action of the person.
-            model: model, bundle or exact bundle; None = mogo.
+            model: model, bundle or exact bundle; None = the server's.
             seed: None = random.
             seconds: maximum length; None = the server's.
             name: of the stream and its clip.

@@ -76,7 +76,7 @@ class BundleManifest(_Frozen):
     version: str
     kind: Literal["generator", "labeller", "evaluator"]
     model: str
-    """Model that reads it: `hgm3`, `mogo`, `momaskpp`, `light`, …"""
+    """Model that reads it: `hgm3`, `light`, …"""
     config: str
     """Name of the configuration: `paper`, `starter`, `tiny`, …"""
     parameters: dict[str, Any]

@@ -14,11 +14,12 @@ from pathlib import Path
 
 from marey.core.checkout import checkout
 from marey.core.settings import Settings
+from marey.registry import find_model, model_names
 
 GROUP = "marey.bundles"
 OPEN, STARTER = "marey-bundles-open", "marey-bundles-starter"
-DISTRIBUTIONS = {"srl-light": OPEN, "hgm3-starter": STARTER, "mogo-starter": STARTER, "evaluator-starter": STARTER}
-"""Distribution on the package index that provides each bundle of this release."""
+STARTER_ENDING = "-starter"
+_OF_THE_PLATFORM = {"srl-light": OPEN, "evaluator-starter": STARTER}
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +52,14 @@ def installed() -> tuple[Path, ...]:
     return tuple(found)
 
 
+def distributions() -> dict[str, str]:
+    """The distribution on the package index that brings each known bundle: of the platform, and of installed models."""
+    specs = filter(None, map(find_model, model_names()))
+    return _OF_THE_PLATFORM | {spec.name + STARTER_ENDING: spec.distribution for spec in specs if spec.distribution}
+
+
 def how_to_get(name: str) -> str:
     """Return a sentence that names the distribution of a bundle, or of a model's own bundle; empty for other names."""
-    distribution = DISTRIBUTIONS.get(name) or DISTRIBUTIONS.get(f"{name}-starter")
+    known = distributions()
+    distribution = known.get(name) or known.get(name + STARTER_ENDING)
     return f" It comes with `pip install {distribution}`." if distribution else ""

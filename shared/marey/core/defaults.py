@@ -4,5 +4,3 @@ from __future__ import annotations
 
 MODEL = "hgm3"
 """`MAREY_DEFAULT_MODEL`: the model of items that name none."""
-LIVE_MODEL = "mogo"
-"""`MAREY_LIVE_MODEL`: the model of live streams that name none."""

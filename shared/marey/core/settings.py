@@ -233,11 +233,13 @@ class Settings(BaseSettings):
     """Seconds between the scheduler's checks for due webhook deliveries."""
 
     role: str | None = None
-    """Queues that `marey worker` serves where its command line names none, as hgm3+mogo."""
+    """Queues that `marey worker` serves where its command line names none, as hgm3+text; models = every model that
+    has a bundle here."""
     default_model: str = defaults.MODEL
     """Model of items that name none."""
-    live_model: str = defaults.LIVE_MODEL
-    """Model of live streams that name none."""
+    live_model: str | None = None
+    """Model of live streams that name none. Unset = the only installed model that streams, or the only one of these
+    that has a bundle."""
     live_slots: int = Field(default=4, ge=0, le=1000)
     """Live streams of one worker at once."""
     streams_per_key: int = Field(default=4, ge=0, le=1000)

@@ -18,7 +18,7 @@ from marey.motion.features import layout
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
 """Tensors of a tokenizer: state of the codebooks' training, as large as the codebooks; and the bundle's statistics."""
 ASKED_IN_TRAINING = "ahead."
-"""Tensors of MOGO's transformer: heads for frames further ahead, used in training alone."""
+"""Tensors of a transformer: heads for frames further ahead, used in training alone."""
 
 
 def stored(name: str) -> bool:

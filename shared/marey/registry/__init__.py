@@ -9,6 +9,7 @@ from marey.registry.models import (
     get_model,
     model_names,
     resolve,
+    streaming_models,
     trainings,
 )
 from marey.registry.plugins import PlugIns
@@ -27,5 +28,6 @@ __all__ = [
     "get_model",
     "model_names",
     "resolve",
+    "streaming_models",
     "trainings",
 ]

@@ -24,8 +24,8 @@ from marey.registry.training import TRAININGS, Training
 GROUP = "marey.models"
 NAME = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 """A model's name is also its queue, a part of metric labels and of commands."""
-RESERVED = frozenset({"text", "evaluator", "live"})
-"""Queues of the platform itself."""
+RESERVED = frozenset({"text", "evaluator", "live", "models"})
+"""Queues of the platform itself, and the word for all models."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,12 @@ class ModelSpec:
         settings: of sampling.
         limits: lengths of motions; None = each bundle states its own.
         live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
+        live_examples: `(reference) -> prompts` that this bundle performs well while it streams, for the page `/live`;
+            it may import the standard library only, because the API calls it. None = no examples.
         training: None = it is not trained here.
         tokenizer: `(parameters) -> MotionTokenizer`, untrained; its weights come from the part `tokenizer` of a bundle
             or run. None = the model has no such part.
+        distribution: the package on the index that provides the bundle `<name>-starter`; None = there is none.
         random_bundle: `(path) -> Bundle` with random weights, for tests and demos.
         live_adherence: `(generator, prompts, *, steers, walks) -> {title: sessions}`; see `marey eval adherence`.
         self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> number of kept motions`.
@@ -124,7 +127,9 @@ class ModelSpec:
     live: str | None = None
     training: Training | None = None
     tokenizer: str | None = None
+    distribution: str | None = None
     random_bundle: str | None = None
+    live_examples: str | None = None
     live_adherence: str | None = None
     self_train: str | None = None
     ablations: tuple[Ablation, ...] = ()
@@ -175,6 +180,15 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
             hint=f"Installed here: {', '.join(model_names()) or 'none'}. A package that registers it adds it.",
         )
     return spec
+
+
+def streaming_models() -> tuple[str, ...]:
+    """The names of the registered models that make live streams, sorted.
+
+    Raises:
+        PluginError: a model cannot be loaded.
+    """
+    return tuple(name for name, spec in MODELS.all().items() if spec.live is not None)
 
 
 def trainings() -> dict[str, Training]:

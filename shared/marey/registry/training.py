@@ -1,4 +1,4 @@
-"""What `marey train` is told of a training: stages, options, and where their functions are.
+"""Trainings as the registry knows them: stages, options, and references to their functions.
 
 A model's training is a part of its spec. What is trained and is no generator model, such as the evaluator, is
 registered by one line of its own:

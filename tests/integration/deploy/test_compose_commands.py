@@ -17,6 +17,7 @@ from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer
+from marey.registry import model_names
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.support.compose import services, waits_for
 from tests.support.composed import Network, Process, free_ports, write_secrets
@@ -72,8 +73,8 @@ def _empty(database_url: str, valkey: EmbeddedServer) -> None:
         client.flushall()
 
 
-def test_prompts_become_motions_of_both_models(stack: Stack, tmp_path: Path) -> None:
-    for model in ("hgm3", "mogo"):
+def test_prompts_become_motions_of_every_model(stack: Stack, tmp_path: Path) -> None:
+    for model in model_names():
         out = tmp_path / model
         stack.client("submit", "a person walks", "--model", model, "--seconds", 2, "--fetch", out, timeout=300).ok()
         assert {path.suffix for path in out.iterdir()} >= {".bvh", ".npz"}

@@ -17,7 +17,7 @@ from marey.jobs import server_version
 from marey.runtime.queue import check_queue, redis_client
 from tests.servers.debian import INSTALLED, debian_postgres, debian_redis
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.live_streams import Hand, add_mogo
+from tests.support.live_streams import Hand, add_streamer
 from tests.support.proxied import submit_watch_and_fetch, watch_a_stream
 from tests.support.streams_api import WALK
 
@@ -45,7 +45,7 @@ def api(database: str, queue: str, tmp_path_factory: pytest.TempPathFactory) -> 
     engine.dispose()
     config = settings_of(tmp_path_factory.mktemp("oldest"), database, queue)
     config = config.model_copy(update={"rates": {"read": "6000/minute"}})
-    add_mogo(config)
+    add_streamer(config)
     with running_api(config, database) as api:
         yield api
 

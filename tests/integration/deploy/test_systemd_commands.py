@@ -21,6 +21,7 @@ import pytest
 from cryptography.fernet import Fernet
 
 from marey.embedded import EmbeddedServer
+from marey.registry import model_names
 from tests.servers.debian import INSTALLED, debian_postgres, debian_redis
 from tests.servers.ports import free_ports
 from tests.support.marey import REPOSITORY, Marey
@@ -35,7 +36,6 @@ LASTING = (
     "marey-scheduler.service",
     "marey-text.service",
     *INSTANCES,
-    "marey-worker@mogo.service",
 )
 
 
@@ -148,8 +148,8 @@ def short_folder(servers_home: Path) -> Path:
     return folder
 
 
-def test_prompts_become_motions_of_both_models(machine: Machine, tmp_path: Path) -> None:
-    for model in ("hgm3", "mogo"):
+def test_prompts_become_motions_of_every_model(machine: Machine, tmp_path: Path) -> None:
+    for model in model_names():
         out = tmp_path / model
         machine.client("submit", "a person walks", "--model", model, "--seconds", 2, "--fetch", out, timeout=300).ok()
         assert {path.suffix for path in out.iterdir()} >= {".bvh", ".npz"}

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from marey.bundles import Bundle
-from marey.bundles.places import DISTRIBUTIONS
+from marey.bundles.places import distributions
 from marey.motion.io.bvh_write import write_bvh
 from tests.support.marey import REPOSITORY
+from tests.support.models import STARTERS
 from tests.support.releases import installed_release
 from tests.support.walker import walker
 from tests.support.wheels import build_wheel, install_from_index, this_wheel
@@ -38,7 +39,7 @@ def test_wheels_of_bundles_hold_the_trained_weights(bundles: list[Path], tmp_pat
     for wheel in bundles:
         zipfile.ZipFile(wheel).extractall(tmp_path)
     found = {path.parent.name: path.parent for path in tmp_path.glob("marey_bundles_*/*/manifest.json")}
-    assert set(found) == set(DISTRIBUTIONS)
+    assert set(found) == set(distributions())
     for name, path in found.items():
         assert Bundle.open(path).reference == Bundle.open(REPOSITORY / "models" / name).reference
 
@@ -55,6 +56,6 @@ def test_an_extra_brings_what_its_commands_import(
     if extra == "motion":
         assert (tmp_path / "walk.png").read_bytes().startswith(b"\x89PNG")
     if extra == "server":
-        assert [json.loads(line)["name"] for line in printed.splitlines()] == ["hgm3-starter", "mogo-starter"]
+        assert [json.loads(line)["name"] for line in printed.splitlines()] == list(STARTERS)
     if extra == "worker":
         assert json.loads(printed)["bundle"] == Bundle.open(REPOSITORY / "models" / "hgm3-starter").reference

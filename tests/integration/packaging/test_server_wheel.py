@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.bundles.places import DISTRIBUTIONS, OPEN, STARTER
-from marey.models.hgm3 import bundle as hgm3
-from marey.models.mogo import bundle as mogo
+from marey.bundles.places import OPEN, STARTER, distributions
 from marey.motion.clip import load_npz
 from marey.motion.io.bvh import read_bvh
+from marey.registry import model_names
 from tests.support.evaluations import write_evaluator
 from tests.support.marey import REPOSITORY
+from tests.support.models import STARTERS, random_bundle
 from tests.support.releases import Release, installed_release, wait_until
 from tests.support.wheels import Environment, bundles_wheel, make_environment, this_wheel
 
@@ -29,8 +29,8 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """Marey and both distributions of bundles: small ones in place of those that were trained."""
     folder = tmp_path_factory.mktemp("server")
     models = folder / "models"
-    hgm3.random_bundle(models / "hgm3-starter")
-    mogo.random_bundle(models / "mogo-starter")
+    for model, starter in zip(model_names(), STARTERS, strict=True):
+        random_bundle(model, models / starter)
     write_evaluator(models, "evaluator-starter")
     shutil.copytree(REPOSITORY / "models" / "srl-light", models / "srl-light")
     bundles = [bundles_wheel(family, models, folder / family) for family in ("open", "starter")]
@@ -62,7 +62,7 @@ def served(marey: Release) -> Iterator[Release]:
 
 def test_installed_bundles_are_found(marey: Release) -> None:
     listed = [json.loads(line) for line in marey.run("models", "list", "--local", "--json").splitlines()]
-    assert [model["name"] for model in listed] == ["hgm3-starter", "mogo-starter"]
+    assert [model["name"] for model in listed] == list(STARTERS)
     assert all(model["random"] for model in listed), "those of the wheels, not those of the checkout"
 
 
@@ -86,7 +86,7 @@ def test_a_server_makes_motions_and_pages_to_review_them(served: Release) -> Non
     served.run("review", line["job"], "-o", "review.html")
     assert "a person waves" in (served.folder / "review.html").read_text()
     checks = [json.loads(each) for each in served.run("doctor", "--json").splitlines()]
-    assert {"hgm3-starter", "mogo-starter", "evaluator-starter", "srl-light"} <= {
+    assert {*STARTERS, "evaluator-starter", "srl-light"} <= {
         check["message"].partition("@")[0] for check in checks if check["name"] == "models"
     }
 
@@ -122,4 +122,4 @@ def test_a_missing_bundle_names_its_distribution(marey: Release, tmp_path: Path)
     finally:
         for path, hidden in aside:
             hidden.rename(path)
-    assert set(DISTRIBUTIONS.values()) == {OPEN, STARTER}
+    assert set(distributions().values()) == {OPEN, STARTER}

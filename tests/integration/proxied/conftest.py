@@ -16,7 +16,7 @@ from tests.servers.ports import free_ports
 from tests.servers.receiver import Authority
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.live_streams import Hand, add_mogo
+from tests.support.live_streams import Hand, add_streamer
 from tests.support.streams_api import WALK
 
 
@@ -40,7 +40,7 @@ def config(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Settings:
     config = settings_of(tmp_path_factory.mktemp("proxied"), module_database_url, valkey.url)
-    add_mogo(config)
+    add_streamer(config)
     own = {
         "store": f"s3://{swift.new_store().options.bucket}",
         "s3_endpoint": f"http://{swift.endpoint}",

@@ -12,9 +12,7 @@ import redis
 import sqlalchemy as sa
 
 from marey.core.errors import Unreachable
-from marey.models.mogo.bundle import random_bundle
-from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveSessionPool
+from marey.registry import streaming_models
 from marey.runtime.live.main import REDIS_SECONDS
 from marey.runtime.queue import SOCKET_SCHEME, redis_client
 from marey.streams import StreamState
@@ -22,15 +20,17 @@ from marey.streams.frames import Frame
 from marey.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.live_loop import LiveWorker, Studio
+from tests.support.streaming_models import Streaming, loaded
 
 STREAMS = 3
 FRAMES = 20
 """A second of them."""
 
 
-@pytest.fixture(scope="module")
-def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
-    return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu", threads=1)
+@pytest.fixture(scope="module", params=streaming_models())
+def streaming(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Streaming]:
+    with loaded(request.param, tmp_path_factory.mktemp(request.param)) as streaming:
+        yield streaming
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def goes_on(studio: Studio, streams: list[UUID]) -> float:
 
 
 def test_frames_go_on_after_redis_fell_silent(
-    engine: sa.Engine, client: redis.Redis, queue_url: str, generator: Generator, monkeypatch: pytest.MonkeyPatch
+    engine: sa.Engine, client: redis.Redis, queue_url: str, streaming: Streaming, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refused: list[float] = []
     write = FrameStream.write
@@ -64,14 +64,14 @@ def test_frames_go_on_after_redis_fell_silent(
             raise
 
     monkeypatch.setattr(FrameStream, "write", noted)
-    studio = Studio(engine, client, generator.bundle.reference)
+    studio = Studio(engine, client, streaming.model, streaming.bundle.reference)
     with (
         StallingProxy(queue_url.removeprefix(SOCKET_SCHEME)) as proxy,
         redis_client(
             f"redis://127.0.0.1:{proxy.port}/0", timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS
         ) as worker_client,
     ):
-        worker = LiveWorker(engine, worker_client, lambda: LiveSessionPool(generator, STREAMS))
+        worker = LiveWorker(engine, worker_client, lambda: streaming.live.open_pool(STREAMS))
         try:
             streams = [studio.begin("a person walks", seed=seed) for seed in range(STREAMS)]
             studio.until(lambda: all(studio.row(one).state is StreamState.LIVE for one in streams), "the streams")

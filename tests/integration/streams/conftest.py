@@ -12,14 +12,14 @@ from marey.core.settings import Settings
 from marey.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.live_streams import PATIENCE, Hand, add_mogo
+from tests.support.live_streams import PATIENCE, Hand, add_streamer
 from tests.support.streams_api import begin, new_key
 
 
 @pytest.fixture(scope="module")
 def config(module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory) -> Settings:
     config = settings_of(tmp_path_factory.mktemp("streams"), module_database_url, valkey.url)
-    add_mogo(config)
+    add_streamer(config)
     return config
 
 

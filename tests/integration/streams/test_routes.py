@@ -19,6 +19,7 @@ from marey.streams.control import ControlQueue, StreamControl
 from marey.tenants import tables as tenant_tables
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import BUNDLE, PATIENCE, Hand
+from tests.support.models import streaming_model
 from tests.support.streams_api import WALK, begin, close_code, new_key, refused, until, waiting_for_a_row
 
 
@@ -29,7 +30,7 @@ def test_a_stream_begins_waiting_with_exact_bundle_drawn_seed_and_skeleton(http:
     assert (made["prompt"], made["name"], made["max_frames"]) == ("a person walks", "walk", 50)
     assert (made["state"], made["reason"], made["error"]) == ("waiting", None, None)
     assert made["bundle"].split("@")[0] == BUNDLE
-    assert (made["model"], made["licence"], made["fps"], made["frames"]) == ("mogo", "MIT", 20.0, 0)
+    assert (made["model"], made["licence"], made["fps"], made["frames"]) == (streaming_model(), "MIT", 20.0, 0)
     assert 0 <= made["seed"] < 2**31
     assert made["prompts"] == []
     assert made["skeleton"]["names"] == list(HUMANML3D.joint_names)

@@ -138,11 +138,11 @@ def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_s
 def test_what_was_said_to_a_stream_is_erased_with_its_clip(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
         key = create_key(conn, "live", ["submit"]).key.id
-        stream = create_stream(conn, NewStream(DEFAULT_TENANT, key, PROMPT, "mogo", "m@0", 1, 9), limit=1)
+        stream = create_stream(conn, NewStream(DEFAULT_TENANT, key, PROMPT, "stroller", "m@0", 1, 9), limit=1)
         take_stream(conn, stream, 1, "worker")
         read = PromptRewrite(f"{PROMPT} now", f"it leaves out {SECRET}")
         add_chunk(conn, stream, 1, StreamChunk(0, 2, b"0" * 8, [(0, PROMPT)], "1-0", reads=[read]))
-        clip = new_item(0, PROMPT, model="mogo", text_key="stream-1")
+        clip = new_item(0, PROMPT, model="stroller", text_key="stream-1")
         end_stream(conn, stream, 1, "stopped", clip=(clip, PROMPT.encode()))
         job = get_stream(conn, DEFAULT_TENANT, stream).job
         assert job is not None

@@ -107,7 +107,7 @@ def test_a_stream_that_is_over_is_told_once(engine: sa.Engine) -> None:
     webhook = new_webhook(engine)
     with transaction(engine) as conn:
         key = create_key(conn, "studio", ["submit"]).key.id
-        new = NewStream(DEFAULT_TENANT, key, "dance", "mogo", "mogo-tiny@0", 1, 1200)
+        new = NewStream(DEFAULT_TENANT, key, "dance", "stroller", "stroller-tiny@0", 1, 1200)
         streams = [create_stream(conn, new, limit=4) for _ in range(2)]
         assert end_stream(conn, streams[0], None, "stopped")
         assert not end_stream(conn, streams[0], None, "stopped")

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-import marey.api.live
 from marey.api.catalogue import Catalogue
-from marey.api.live.routes import MOST_EXAMPLES, router
-from marey.bundles import find_bundle
-from marey.checks.prompts import evaluation_prompts
+from marey.api.live.routes import MOST_EXAMPLES, examples, router
 from marey.core.settings import Settings
-from marey.models.mogo.examples import LEAST, SETS, act_of
 from marey.viz.live_page import live_page
+from tests.support.live_api import write_bundle
+from tests.support.plugins import installed, write_distribution
 
 
 @pytest.fixture(scope="module")
@@ -52,26 +51,27 @@ def test_the_page_is_no_part_of_the_api_document(client: TestClient):
     assert client.get("/openapi.json").json()["paths"] == {}
 
 
-def test_examples_are_prompts_that_the_bundle_was_measured_to_obey() -> None:
+DANCER = """\
+from marey.registry import ModelSpec
+SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", live="a:b", live_examples="dancer:examples")
+def examples(reference):
+    return ["a person dances"] * 9 if reference.startswith("measured@") else []
+"""
+
+
+@pytest.mark.parametrize(("bundle", "offered"), [("measured", ["a person dances"] * MOST_EXAMPLES), ("new", [])])
+def test_examples_are_those_of_the_bundle_that_streams(tmp_path: Path, bundle: str, offered: list[str]) -> None:
+    entries = "[marey.models]\ndancer = dancer:SPEC\n"
+    write_bundle(tmp_path / "models", bundle, "dancer")
     app = FastAPI()
     app.include_router(router)
-    app.state.catalogue = Catalogue(Settings())
-    page = TestClient(app).get("/live").text
+    app.state.catalogue = Catalogue(Settings(home=tmp_path, models=tmp_path / "models"))
+    with installed(write_distribution(tmp_path, "dancer", {"dancer": DANCER}, entries)):
+        page = TestClient(app).get("/live").text
+    sys.modules.pop("dancer")
     found = re.search(r'<script type="application/json" id="suggested">(.*?)</script>', page)
-    assert found is not None
-    offered = json.loads(found[1])
-    measured = json.loads((Path(marey.api.live.__file__).parent / "examples.json").read_text())
-    rows = {row["prompt"]: row for row in measured[find_bundle("mogo-starter").reference]}
-    assert 3 <= len(offered) <= MOST_EXAMPLES
-    for prompt in offered:
-        row = rows[prompt]
-        assert row["obeyed"] >= LEAST * row["sessions"]
-        assert row["sessions"] >= 6
-    prompts = {each.text: each for which in SETS for each in evaluation_prompts(which)}
-    acts = [act_of(prompts[prompt]) for prompt in offered]
-    assert len(set(acts)) == len(acts)
-    assert not any(prompts[prompt].separate for prompt in offered)
+    assert (json.loads(found[1]) if found else []) == offered
 
 
-def test_a_bundle_that_was_not_measured_has_no_examples(client: TestClient) -> None:
-    assert '<script type="application/json" id="suggested">[]</script>' in client.get("/live").text
+def test_a_server_without_a_bundle_that_streams_offers_none(tmp_path: Path) -> None:
+    assert examples(Catalogue(Settings(home=tmp_path, models=tmp_path))) == ()

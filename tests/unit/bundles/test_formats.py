@@ -19,13 +19,11 @@ from marey.bundles.manifest import DESCRIPTIVE, BundleManifest, parse_manifest
 from marey.core.errors import InvalidBundle, MareyError
 from marey.text.keys import PIPELINE_VERSION, feature_key
 from tests.support.marey import REPOSITORY
+from tests.support.models import STARTERS
 
-SHIPPED = {
-    "evaluator-starter": "9644ff54e80c",
-    "hgm3-starter": "2ec9c8292d99",
-    "mogo-starter": "f71d4a5b39a9",
-    "srl-light": "4ad302e77bf6",
-}
+SHIPPED = {"evaluator-starter": "9644ff54e80c", "srl-light": "4ad302e77bf6"}
+"""Those of models are recorded with the models (`tests/contracts`)."""
+MANIFESTS = sorted(REPOSITORY.glob("models/*/manifest.json"))
 
 
 def write(path: Path, **fields: Any) -> Bundle:
@@ -40,7 +38,7 @@ def write(path: Path, **fields: Any) -> Bundle:
 
 CHANGES: dict[str, tuple[str, Any]] = {
     "kind": ("kind", "evaluator"),
-    "model": ("model", "mogo"),
+    "model": ("model", "stroller"),
     "config": ("config", "paper"),
     "a parameter": ("parameters", {"inference": {"guidance": 5.0}}),
     "random": ("random", True),
@@ -99,8 +97,13 @@ def test_format_1_hashes_the_files_alone_as_it_always_did(tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", sorted(SHIPPED))
 def test_shipped_bundles_keep_their_references(name: str) -> None:
     bundle = Bundle.open(REPOSITORY / "models" / name, verify=False)
-    assert bundle.manifest.format == 1
     assert bundle.reference == f"{name}@{SHIPPED[name]}"
+
+
+def test_shipped_bundles_are_of_the_first_format() -> None:
+    found = {path.parent.name: json.loads(path.read_text())["format"] for path in MANIFESTS}
+    assert found == dict.fromkeys(found, 1)
+    assert {*SHIPPED, *STARTERS} <= set(found)
 
 
 def test_text_keys_of_shipped_bundles_stay() -> None:

@@ -13,12 +13,14 @@ from typing import Any
 import pytest
 
 from marey.bundles import choose_bundle, choose_evaluator, find_bundle, list_bundles
-from marey.bundles.places import DISTRIBUTIONS, OPEN, STARTER, folders, installed
+from marey.bundles.places import OPEN, STARTER, distributions, folders, installed
 from marey.core import checkout
 from marey.core.errors import NotFound
 from marey.core.settings import Settings
+from marey.registry import model_names
 from tests.support.live_api import write_bundle
 from tests.support.marey import REPOSITORY
+from tests.support.models import STARTERS
 
 PACKAGES = {
     path.parent: tomllib.loads(path.read_text()) for path in REPOSITORY.glob("models/packages/*/pyproject.toml")
@@ -81,7 +83,7 @@ def test_a_wheel_has_no_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert checkout.checkout() == tmp_path
 
 
-@pytest.mark.parametrize("name", ["hgm3", "hgm3-starter", "mogo", "mogo-starter"])
+@pytest.mark.parametrize("name", [*model_names(), *STARTERS])
 def test_without_a_bundle_its_distribution_is_named(tmp_path: Path, name: str) -> None:
     config = Settings(home=tmp_path, models=tmp_path)
     with pytest.raises(NotFound) as refused:
@@ -100,7 +102,7 @@ def test_without_a_bundle_its_distribution_is_named(tmp_path: Path, name: str) -
 
 def test_every_bundle_of_the_checkout_is_in_one_distribution() -> None:
     found = {Path(source).name: project["project"]["name"] for project in PACKAGES.values() for source in held(project)}
-    assert found == DISTRIBUTIONS
+    assert found == distributions()
     assert set(found) == {path.parent.name for path in REPOSITORY.glob("models/*/manifest.json")}
 
 

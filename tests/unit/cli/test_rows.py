@@ -136,13 +136,13 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
     defaults = defaults_of(seconds=4.0, seed=1, variants=3, model="hgm3", bundle="hgm3-starter", fps=30.0)
     lines = [
         '{"prompt": "a person bows"}',
-        '{"prompt": "a person waves", "seconds": 2, "seed": 0, "variants": 1, "model": "mogo", '
+        '{"prompt": "a person waves", "seconds": 2, "seed": 0, "variants": 1, "model": "stroller", '
         '"settings": {"fps": 60}}',
         '{"prompt": "a person walks", "seconds": null, "settings": {"guidance": 3}}',
     ]
     assert list(items_from_file(write(tmp_path, "p.jsonl", "\n".join(lines)), defaults=defaults)) == [
         Item("a person bows", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0}),
-        Item("a person waves", None, 2.0, (), 0, 1, "mogo", {"fps": 60.0}),
+        Item("a person waves", None, 2.0, (), 0, 1, "stroller", {"fps": 60.0}),
         Item("a person walks", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0, "guidance": 3.0}),
     ]
     table = write(tmp_path, "p.csv", "prompt,variants,seed\na person bows,1,\na person waves,,9\n")

@@ -9,8 +9,9 @@ import typer
 
 from marey.cli import children
 from marey.cli.main import app
-from marey.cli.roles.serving import known_queues, parse_roles
+from marey.cli.roles.serving import EVERY_MODEL, known_queues, parse_roles
 from marey.core.settings import Settings
+from marey.registry import model_names
 from marey.runtime import worker
 from marey.runtime.live import main as live
 from marey.scheduler import main as scheduler
@@ -39,7 +40,8 @@ def test_every_part_of_the_platform_is_there() -> None:
     assert {service.name for service in OURS} == ours
     workers = [service for service in OURS if service.command[0] == "worker"]
     roles = [service.command[1] if service.command[1:] else service.environment["MAREY_ROLE"] for service in workers]
-    assert sorted(queue for role in roles for queue in role.split("+")) == sorted(known_queues())
+    assert sorted(roles) == ["evaluator", "models", "text"]
+    assert {*roles} - {EVERY_MODEL} | {*model_names()} == {*known_queues()}
 
 
 def test_a_plug_in_is_served_without_an_edit_of_the_file() -> None:
@@ -99,7 +101,7 @@ def test_a_command_is_one_of_the_command_line_with_arguments_it_takes(service: S
     command.make_context(service.name, arguments)  # refuses what it does not know
     if service.command[0] == "worker":
         (role,) = service.command[1:] or [service.environment["MAREY_ROLE"]]
-        assert parse_roles(role) == [tuple(role.split("+"))]
+        assert role == EVERY_MODEL or parse_roles(role) == [tuple(role.split("+"))]
 
 
 @each_of_ours

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from uuid import UUID, uuid4
@@ -13,21 +12,17 @@ from uuid import UUID, uuid4
 import numpy as np
 import pytest
 
-from marey.bundles import Bundle
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.core.settings import Settings
 from marey.generation.handler import GeneratorHandler
 from marey.jobs import Claim, ClaimedItem, ItemStage
-from marey.models.hgm3 import bundle as hgm3
-from marey.models.hgm3.generate import Generator as Hgm3Generator
-from marey.models.mogo import bundle as mogo
-from marey.models.mogo.config import TINY
-from marey.models.mogo.generate import Generator as MogoGenerator
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.io.bvh import parse_bvh
+from marey.registry import get_model, model_names, resolve
 from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
+from tests.support.models import random_bundle
 
 
 class FakeControl:
@@ -44,25 +39,18 @@ class FakeControl:
         return self._dropped
 
 
-BUNDLES: dict[str, Callable[[Path, int], Bundle]] = {
-    "hgm3": lambda path, seed: hgm3.random_bundle(path, "tiny", seed),
-    "mogo": lambda path, seed: mogo.random_bundle(path, replace(TINY, max_frames=196), seed),
-}
-GENERATORS = {"hgm3": Hgm3Generator, "mogo": MogoGenerator}
-
-
 def handler_of(model: str) -> GeneratorHandler[Any]:
-    return GeneratorHandler(model, GENERATORS[model].load, 32, Settings(device="cpu", threads=1))
+    return GeneratorHandler(model, resolve(get_model(model).load), 32, Settings(device="cpu", threads=1))
 
 
-@pytest.fixture(scope="module", params=list(BUNDLES))
+@pytest.fixture(scope="module", params=[name for name in model_names() if get_model(name).random_bundle])
 def model(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
 @pytest.fixture(scope="module")
 def bundle(model: str, tmp_path_factory: pytest.TempPathFactory) -> str:
-    found = BUNDLES[model](tmp_path_factory.mktemp("models") / f"{model}-random", 0)
+    found = random_bundle(model, tmp_path_factory.mktemp("models") / f"{model}-random")
     return f"{found.path}@{found.weights_sha256[:12]}"
 
 
@@ -213,7 +201,7 @@ def test_a_setting_out_of_range_or_unknown_is_told_by_its_name(
 
 
 def test_a_replaced_bundle_is_refused(model: str, bundle: str, tmp_path: Path) -> None:
-    other = BUNDLES[model](tmp_path / "replaced", 1)
+    other = random_bundle(model, tmp_path / "replaced", seed=1)
     exact = bundle.rpartition("@")[2]
     with pytest.raises(Exception, match="replaced since"):
         handler_of(model).load(f"{other.path}@{exact}")

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from functools import cache
-from importlib import resources
-from typing import Any
-
 from fastapi import APIRouter, Request, Response
 
 from marey.api.catalogue import Catalogue
 from marey.core.errors import MareyError
 from marey.http.pages import page_response
+from marey.registry import find_model, resolve
 from marey.viz.live_page import live_page
 
 router = APIRouter()
@@ -19,22 +15,17 @@ router = APIRouter()
 MOST_EXAMPLES = 6
 
 
-@cache
-def _measured() -> dict[str, list[dict[str, Any]]]:
-    return json.loads((resources.files("marey.api.live") / "examples.json").read_text(encoding="utf-8"))
-
-
 def examples(catalogue: Catalogue) -> tuple[str, ...]:
     """Return prompts that this server's model performed correctly while streaming; none for a bundle without
-    measurements.
-
-    Measured by `python -m marey.models.mogo.examples`.
-    """
+    measurements (`ModelSpec.live_examples`)."""
     try:
-        reference = catalogue.capabilities(catalogue.live_model).bundle.reference
+        bundle = catalogue.live_capabilities().bundle
     except MareyError:
         return ()  # no such model here: the page reports it when a stream is started
-    return tuple(row["prompt"] for row in _measured().get(reference, [])[:MOST_EXAMPLES])
+    spec = find_model(bundle.manifest.model)
+    if spec is None or spec.live_examples is None:
+        return ()
+    return tuple(resolve(spec.live_examples)(bundle.reference)[:MOST_EXAMPLES])
 
 
 @router.get("/live", include_in_schema=False)

@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.jobs.schemas import ErrorView
 from marey.bundles import Bundle
-from marey.core import defaults
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from marey.http.problems import ProblemBody
 from marey.http.schemas import View
@@ -41,9 +40,9 @@ class NewStreamBody(BaseModel):
     name: str | None = Field(
         None, description="File name of the clip, without its extension.", json_schema_extra=ITEM_NAME
     )
-    model: str = Field(
-        defaults.LIVE_MODEL,
-        description="Model, bundle or exact bundle that can make motion frame by frame.",
+    model: str | None = Field(
+        None,
+        description="Model, bundle or exact bundle that can make motion frame by frame. None = the server's choice.",
         json_schema_extra=ITEM_MODEL,
     )
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Random by default.")

@@ -19,7 +19,7 @@ from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, R
 from marey.db import transaction
 from marey.items.item import MAX_SEED, Item, read_item
 from marey.jobs.generators import GeneratorCapabilities
-from marey.registry import find_model, model_names
+from marey.registry import find_model, streaming_models
 from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, prompts_with_rewrites
 from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.notifier import StreamNotifier
@@ -165,13 +165,13 @@ def _generator(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
     """Return the capabilities of the stream's bundle."""
     try:
         with named_by("model"):
-            generator = catalogue.capabilities(item.model or catalogue.live_model)
+            generator = catalogue.capabilities(item.model) if item.model else catalogue.live_capabilities()
     except NotFound as error:  # the problem is a field's, not the path's
         raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
     manifest = generator.bundle.manifest
     spec = find_model(manifest.model)
     if spec is None or spec.live is None:
-        live = [name for name in model_names() if (each := find_model(name)) and each.live]
+        live = streaming_models()
         raise InvalidInput(
             f"{manifest.name} is a bundle of {manifest.model}, which cannot make motion frame by frame",
             where="model",

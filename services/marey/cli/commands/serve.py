@@ -58,7 +58,8 @@ def worker(
         str | None,
         typer.Argument(
             metavar="MODEL",
-            help="Queues: a model such as hgm3, text, evaluator; or several, as hgm3+text. Default: MAREY_ROLE.",
+            help="Queues: a model such as hgm3, text, evaluator; or several, as hgm3+text. models = every model that "
+            "has a bundle here. Default: MAREY_ROLE.",
             show_default=False,
         ),
     ] = None,
@@ -71,7 +72,7 @@ def worker(
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL name the database and the queue."""
     os.umask(UMASK)
-    from marey.cli.roles.serving import live_models, parse_roles, role_of
+    from marey.cli.roles.serving import expand, live_models, parse_roles, role_of
     from marey.core.extras import needs_extra
 
     try:
@@ -86,7 +87,8 @@ def worker(
         raise InvalidInput(
             "a worker needs to know what it serves", where=where, hint="Name its queues: `marey worker hgm3`."
         )
-    queues = parse_roles(model.replace(",", "+"), where)[0]
+    model = expand(model.replace(",", "+"), settings())
+    queues = parse_roles(model, where)[0]
     shown = live_models(queues)
     if only is Part.LIVE:
         from marey.runtime.live.main import live_main

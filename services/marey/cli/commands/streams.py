@@ -31,7 +31,9 @@ def stream(
         float | None, typer.Option("--seconds", help="Maximum length in seconds; default: the server's, 10 minutes.")
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; default: random.")] = None,
-    model: Annotated[str | None, typer.Option("--model", help="Model, bundle or exact bundle; else mogo.")] = None,
+    model: Annotated[
+        str | None, typer.Option("--model", help="Model, bundle or exact bundle; default: the server's.")
+    ] = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the stream and its clip.")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="A .bvh that grows while the stream runs.")

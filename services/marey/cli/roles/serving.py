@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 TEXT = "text"
 """The queue of prompts, which computes on no device."""
+EVERY_MODEL = "models"
+"""In the queues of a worker: every model that has a bundle here."""
 PLATFORM = {
     TEXT: "marey.text_service.handler:create_handler",
     "evaluator": "marey.evaluator.handler:create_handler",
@@ -40,9 +42,22 @@ def default_roles(config: Settings) -> str:
     Two children would compete for the cores."""
     from marey.bundles import list_bundles
 
-    here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
     judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
-    return "+".join([*([model for model in model_names() if model in here] or [config.default_model]), "text", *judges])
+    return "+".join([*models_here(config), TEXT, *judges])
+
+
+def models_here(config: Settings) -> list[str]:
+    """The models that have a bundle here; the default model where none has."""
+    from marey.bundles import list_bundles
+
+    here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
+    return [model for model in model_names() if model in here] or [config.default_model]
+
+
+def expand(queues: str, config: Settings) -> str:
+    """Queues with the word `models` replaced by every model that has a bundle here."""
+    parts = queues.split("+")
+    return "+".join("+".join(models_here(config)) if part.strip() == EVERY_MODEL else part for part in parts)
 
 
 def parse_roles(text: str, where: str = "--with") -> list[tuple[str, ...]]:

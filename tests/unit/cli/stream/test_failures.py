@@ -88,7 +88,7 @@ def test_a_file_that_cannot_be_written_any_more_is_2_and_the_stream_is_stopped(
         (("--seconds", "0"), "0 seconds"),
         (("--seed", "-1"), "seed"),
         (("--name", "../x"), "file name"),
-        (("--model", "mogo starter"), "model"),
+        (("--model", "stroller starter"), "model"),
     ],
 )
 def test_what_cannot_be_is_2_before_anything_begins(

@@ -15,14 +15,14 @@ from tests.support.streaming import PROMPT, check_frames, frames_of, run
 
 def test_a_stream_is_followed_to_its_end_and_told_line_by_line(serve: Any, tmp_path: Path) -> None:
     server, path = serve(waiting=2), tmp_path / "clip.bvh"
-    options = ("--seconds", 90, "--seed", 5, "--model", "mogo", "--name", "walk")
+    options = ("--seconds", 90, "--seed", 5, "--model", "stroller", "--name", "walk")
     ran = run(server, *options, "--slow", "pause", "-o", path, "--json", prompt=f" {PROMPT} ").ok()
     (body,) = server.begun
     assert body == {
         "prompt": PROMPT,
         "seconds": 90,
         "seed": 5,
-        "model": "mogo",
+        "model": "stroller",
         "name": "walk",
     }
     assert server.opened[0][1]["slow"] == "pause"

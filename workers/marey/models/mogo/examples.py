@@ -28,7 +28,7 @@ from marey.models.mogo.live import LiveSessionPool
 from marey.text.features import TextFeatures
 from marey.training.adherence import pipeline_of
 
-OUTPUT = Path("services", "marey", "api", "live", "examples.json")
+OUTPUT = Path("workers", "marey", "models", "mogo", "examples.json")
 """Path in the checkout."""
 SETS = ("evaluation", "development")
 CANDIDATES = 3

@@ -26,6 +26,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     limits=Limits(0.8, 9.8),
     live="marey.models.mogo.live:create_live_model",
+    live_examples="marey.models.mogo.live_examples:prompts_of",
     training=Training(
         help="MOGO: tokenizer, transformer, then `bundle`.",
         stages=(
@@ -39,6 +40,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         unpack="marey.models.mogo.assembly:unpack",
     ),
     tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
+    distribution="marey-bundles-starter",
     random_bundle="marey.models.mogo.bundle:random_bundle",
     live_adherence="marey.models.mogo.adherence:judge_streams",
     ablations=(

@@ -1,5 +1,5 @@
-"""Throughput on a CUDA device with random weights: MOGO's frames per second with and without recorded steps, the number
-of live sessions in real time, and HGM³'s motions per second.
+"""MOGO on a CUDA device with random weights: frames per second with and without recorded steps, and the number of live
+sessions in real time.
 
 A session keeps up when 99 of 100 frames are ready within a twentieth of a second, including all processing of a frame
 on the way to the client (decoder, pose, feet), which runs on the processor.
@@ -15,11 +15,8 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.bench_hgm3 import requests
 from benchmarks.bench_mogo import sentence, text
-from benchmarks.harness import measure, table
-from marey.models.hgm3.bundle import random_bundle as random_hgm3
-from marey.models.hgm3.generate import Generator as HGM3Generator
+from benchmarks.harness import has_cuda, measure, table
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
@@ -32,10 +29,8 @@ REAL_TIME = 0.05  # seconds a frame
 
 def main() -> None:
     """Print the tables, or say that there is nothing to measure on."""
-    if not torch.cuda.is_available():
-        print("There is no CUDA device here: nothing is measured.\n")
+    if not has_cuda():
         return
-    print(f"{torch.cuda.get_device_name()}, torch {torch.__version__}, CUDA {torch.version.cuda}\n")
     with tempfile.TemporaryDirectory() as folder:
         for name in ("paper", "starter"):
             generator = Generator.load(random_bundle(Path(folder) / name, name), device="cuda")
@@ -43,7 +38,6 @@ def main() -> None:
             _sessions(generator)
             del generator
             torch.cuda.empty_cache()
-        _hgm3(HGM3Generator.load(random_hgm3(Path(folder) / "hgm3", "paper"), device="cuda"))
 
 
 def _one_session(generator: Generator) -> None:
@@ -94,14 +88,6 @@ def _steps(generator: Generator, sessions: int) -> list[float]:
         room.start(text(generator), seed)
     _run(room.step, 20)
     return sorted(_seconds(room.step) for _ in range(FRAMES))
-
-
-def _hgm3(generator: HGM3Generator) -> None:
-    for batch in (1, 32, 128):
-        asked = requests(batch)
-        (timing,) = measure({f"batch {batch}": lambda asked=asked: generator.generate(asked)}, repeats=9, seconds=30)
-        note = f"{batch / timing.median:.1f} motions/s. {generator.dtype}."
-        print(table("HGM³ paper, 196 frames", [timing], note=note))
 
 
 def _run(step: Callable[[], object], frames: int) -> None:

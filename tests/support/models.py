@@ -1,0 +1,65 @@
+"""Models of the registry, for tests of the platform: chosen by what they can, never by name.
+
+A test of one model lies in `tests/models/<model>`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from marey.bundles import Bundle
+from marey.core import defaults
+from marey.registry import get_model, model_names, resolve, streaming_models
+
+STARTERS = tuple(f"{name}-starter" for name in model_names())
+"""The shipped bundles, by name."""
+OTHERS = tuple(name for name in model_names() if name != defaults.MODEL)
+"""The models that are not the default."""
+
+
+def is_of(model: str, name: str) -> bool:
+    """Return True for a file of a model's own: its code, tests, benchmarks, bundle, and what was measured of that.
+
+    Args:
+        name: path in the checkout.
+    """
+    return name.startswith(
+        (
+            f"workers/marey/models/{model}/",
+            f"tests/models/{model}/",
+            f"models/{model}-",
+            f"models/evaluator-starter/reconstructions/{model}-",
+            f"benchmarks/bench_{model}.",
+            f"benchmarks/bench_{model}_",
+        )
+    )
+
+
+def random_bundle(model: str, path: Path, **options: Any) -> Bundle:
+    """A small bundle of random weights."""
+    reference = get_model(model).random_bundle
+    assert reference is not None, f"{model} makes no bundle of random weights"
+    return resolve(reference)(path, **options)
+
+
+def load(bundle: Bundle, **options: Any) -> Any:
+    """The generator of a bundle, on the processor."""
+    load = resolve(get_model(bundle.manifest.model).load)
+    return load(str(bundle.path), **{"device": "cpu", "threads": 1, **options})
+
+
+def streaming_model() -> str:
+    """A model that streams; where none is installed, the test is skipped."""
+    if not streaming_models():
+        pytest.skip("no installed model streams")
+    return streaming_models()[0]
+
+
+def another_model() -> str:
+    """A model beside the default one; where none is installed, the test is skipped."""
+    if not OTHERS:
+        pytest.skip("only the default model is installed")
+    return OTHERS[0]
