@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -53,7 +52,7 @@ def test_the_page_is_no_part_of_the_api_document(client: TestClient):
 
 DANCER = """\
 from marey.registry import ModelSpec
-SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", live="a:b", live_examples="dancer:examples")
+SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", live="a:b", live_examples="dancer_live:examples")
 def examples(reference):
     return ["a person dances"] * 9 if reference.startswith("measured@") else []
 """
@@ -61,14 +60,13 @@ def examples(reference):
 
 @pytest.mark.parametrize(("bundle", "offered"), [("measured", ["a person dances"] * MOST_EXAMPLES), ("new", [])])
 def test_examples_are_those_of_the_bundle_that_streams(tmp_path: Path, bundle: str, offered: list[str]) -> None:
-    entries = "[marey.models]\ndancer = dancer:SPEC\n"
+    entries = "[marey.models]\ndancer = dancer_live:SPEC\n"
     write_bundle(tmp_path / "models", bundle, "dancer")
     app = FastAPI()
     app.include_router(router)
     app.state.catalogue = Catalogue(Settings(home=tmp_path, models=tmp_path / "models"))
-    with installed(write_distribution(tmp_path, "dancer", {"dancer": DANCER}, entries)):
+    with installed(write_distribution(tmp_path, "dancer", {"dancer_live": DANCER}, entries)):
         page = TestClient(app).get("/live").text
-    sys.modules.pop("dancer")
     found = re.search(r'<script type="application/json" id="suggested">(.*?)</script>', page)
     assert (json.loads(found[1]) if found else []) == offered
 

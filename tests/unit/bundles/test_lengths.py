@@ -29,9 +29,8 @@ def bundle(path: Path, **parameters: Any) -> Bundle:
 @pytest.fixture
 def dancer(tmp_path: Path):
     """Install the model."""
-    with installed(
-        write_distribution(tmp_path, "dancer", {"dancer": DANCER}, "[marey.models]\ndancer = dancer:SPEC\n")
-    ):
+    entries = "[marey.models]\ndancer = dancer_lengths:SPEC\n"
+    with installed(write_distribution(tmp_path, "dancer", {"dancer_lengths": DANCER}, entries)):
         yield
 
 

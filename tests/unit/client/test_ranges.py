@@ -24,7 +24,9 @@ SPEC = ModelSpec(
 def dancer(tmp_path: Path) -> Iterator[None]:
     """Install the model."""
     with installed(
-        write_distribution(tmp_path, "dancer", {"dancer": DANCER}, "[marey.models]\ndancer = dancer:SPEC\n")
+        write_distribution(
+            tmp_path, "dancer", {"dancer_ranges": DANCER}, "[marey.models]\ndancer = dancer_ranges:SPEC\n"
+        )
     ):
         yield
 
