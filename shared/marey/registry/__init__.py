@@ -2,7 +2,7 @@
 
 from marey.registry.models import (
     Ablation,
-    Limits,
+    LengthLimits,
     ModelSpec,
     Setting,
     find_model,
@@ -18,7 +18,7 @@ from marey.registry.training import Choice, Stage, Training
 __all__ = [
     "Ablation",
     "Choice",
-    "Limits",
+    "LengthLimits",
     "ModelSpec",
     "PlugIns",
     "Setting",

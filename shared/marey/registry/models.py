@@ -61,7 +61,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Limits:
+class LengthLimits:
     """The lengths of the motions that a model makes, in seconds, both ends included. A bundle may narrow them."""
 
     min_seconds: float
@@ -123,7 +123,7 @@ class ModelSpec:
     handler: str
     load: str
     settings: tuple[Setting, ...] = ()
-    limits: Limits | None = None
+    limits: LengthLimits | None = None
     live: str | None = None
     training: Training | None = None
     tokenizer: str | None = None

@@ -13,8 +13,8 @@ from marey.core.errors import InvalidBundle, InvalidInput
 from tests.support.plugins import installed, write_distribution
 
 DANCER = """\
-from marey.registry import Limits, ModelSpec
-SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", limits=Limits(1.0, 8.0))
+from marey.registry import LengthLimits, ModelSpec
+SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", limits=LengthLimits(1.0, 8.0))
 """
 
 

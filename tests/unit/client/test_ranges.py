@@ -12,9 +12,9 @@ from marey.client.rows import PromptReader, read_rows
 from tests.support.plugins import installed, write_distribution
 
 DANCER = """\
-from marey.registry import Limits, ModelSpec, Setting
+from marey.registry import LengthLimits, ModelSpec, Setting
 SPEC = ModelSpec(
-    "dancer", "", "", handler="a:b", load="a:b", limits=Limits(1.0, 8.0),
+    "dancer", "", "", handler="a:b", load="a:b", limits=LengthLimits(1.0, 8.0),
     settings=(Setting("steps", 1, 100, 10, whole=True), Setting("heat", 0.5, 2.0, 1.0)),
 )
 """
@@ -83,15 +83,15 @@ def test_what_is_not_known_here_is_left_to_the_server(dancer: None, values: dict
 
 
 def test_a_model_without_limits_leaves_lengths_to_the_server(tmp_path: Path) -> None:
-    source = DANCER.replace(" limits=Limits(1.0, 8.0),", "")
+    source = DANCER.replace(" limits=LengthLimits(1.0, 8.0),", "")
     with installed(write_distribution(tmp_path, "free", {"free": source}, "[marey.models]\ndancer = free:SPEC\n")):
         (item,) = read_rows([row(seconds=50.0)])
     assert item.seconds == 50.0
 
 
 def test_a_range_must_hold_a_length(tmp_path: Path) -> None:
-    from marey.registry import Limits
+    from marey.registry import LengthLimits
 
     for low, high in ((0.0, 1.0), (2.0, 1.0), (1.0, float("inf"))):
         with pytest.raises(ValueError, match="no motion has"):
-            Limits(low, high)
+            LengthLimits(low, high)

@@ -155,7 +155,7 @@ def _with_choices(command: Callable[..., None], training: Training) -> Callable[
 
 
 evaluator = typer.Typer(name="evaluator")
-"""What the evaluator has beside its training, which is registered."""
+"""Commands of the evaluator beside its training, which is registered."""
 app.add_typer(evaluator)
 
 

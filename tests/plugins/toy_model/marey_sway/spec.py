@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import Choice, Limits, ModelSpec, Setting, Stage, Training
+from marey.registry import Choice, LengthLimits, ModelSpec, Setting, Stage, Training
 
 SPEC = ModelSpec(
     name="sway",
@@ -14,7 +14,7 @@ SPEC = ModelSpec(
         Setting("width", 0.0, 0.5, 0.1, "Metres from side to side."),
         Setting("beats", 1, 8, 2, "Sways per motion.", whole=True),
     ),
-    limits=Limits(0.8, 9.8),
+    limits=LengthLimits(0.8, 9.8),
     training=Training(
         help="Sway: the pose, then `bundle`.",
         stages=(Stage("pose", "Average the training clips."),),

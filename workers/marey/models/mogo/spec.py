@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import Ablation, Limits, ModelSpec, Setting, Stage, Training
+from marey.registry import Ablation, LengthLimits, ModelSpec, Setting, Stage, Training
 
 SPEC = ModelSpec(
     name="mogo",
@@ -24,7 +24,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("upper_temperature", 0.0, 100.0, 0.6, "As temperature, for all other levels."),
         Setting("upper_top_k", 0.001, 1.0, 0.1, "As top_k, for all other levels."),
     ),
-    limits=Limits(0.8, 9.8),
+    limits=LengthLimits(0.8, 9.8),
     live="marey.models.mogo.live:create_live_model",
     live_examples="marey.models.mogo.live_examples:prompts_of",
     training=Training(
