@@ -27,17 +27,7 @@ class Recording:
     """
 
     def __init__(self, path: Path, *, overwrite: bool) -> None:
-        if path.suffix.lower() != ".bvh":
-            raise InvalidInput(
-                "only a .bvh can grow with a stream",
-                where=str(path),
-                hint="Fetch the other formats from the stream's job after its end.",
-            )
-        try:
-            from marey.motion.io.bvh_live import check_place
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
-        check_place(path, overwrite=overwrite)
+        check_recording(path, overwrite=overwrite)
         self._path = path
         self._overwrite = overwrite
         self._file: LiveBVH | None = None
@@ -82,3 +72,23 @@ class Recording:
         except (TypeError, ValueError) as error:
             raise InvalidInput(f"the server's skeleton cannot be used: {error}", where=where) from error
         return LiveBVH.open(self._path, skeleton, stream.fps, overwrite=self._overwrite)
+
+
+def check_recording(path: Path, *, overwrite: bool) -> None:
+    """Validate that a stream can be written to a file.
+
+    Raises:
+        InvalidInput: not a `.bvh`, or numpy is not installed.
+        Conflict: it exists.
+    """
+    if path.suffix.lower() != ".bvh":
+        raise InvalidInput(
+            "only a .bvh can grow with a stream",
+            where=str(path),
+            hint="Fetch the other formats from the stream's job after its end.",
+        )
+    try:
+        from marey.motion.io.bvh_live import check_place
+    except ImportError as error:
+        raise needs_extra("motion", error) from error
+    check_place(path, overwrite=overwrite)

@@ -299,7 +299,7 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(InvalidInput, match="all 1 sessions"):
         streams.start(said(1), 1)
     streams.stop(session)
-    with pytest.raises(InvalidInput, match="no session 1"):
+    with pytest.raises(InvalidInput, match="unknown session 1"):
         streams.steer(session, said(1))
     with pytest.raises(InvalidInput, match="not given"):
         streams.start(said(1), 1, skipped=4)

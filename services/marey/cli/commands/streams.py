@@ -66,6 +66,10 @@ def stream(
         from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything begins
+    if output is not None:
+        from marey.client.recording import check_recording
+
+        check_recording(output, overwrite=overwrite)
     from marey.client import Client
 
     with Client() as client:

@@ -105,7 +105,8 @@ class Follower:
             self._report(update)
         if self._screen.due():
             self._screen.count(self._counter())
-        if not (self._live.connected or self._live.has_ended) and self._broken_on is None:
+        broken = update is None and not (self._live.connected or self._live.has_ended)  # all that arrived is read
+        if broken and self._broken_on is None:
             self._broken_on = self._live.connections
             self._screen.say("No connection; trying again.")
 
