@@ -301,7 +301,7 @@ def test_what_cannot_be_is_refused() -> None:
     streams.stop(session)
     with pytest.raises(InvalidInput, match="unknown session 1"):
         streams.steer(session, said(1))
-    with pytest.raises(InvalidInput, match="not given"):
+    with pytest.raises(InvalidInput, match="frames to continue from are missing"):
         streams.start(said(1), 1, skipped=4)
     with pytest.raises(InvalidInput, match="window of 25 frames"):
         opened(transformer(), 1, replace(TINY.inference, window=25))
