@@ -19,7 +19,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -31,6 +31,7 @@ from marey.db.tables import Time
 from marey.jobs import tables
 from marey.takes.types import MotionFilter
 
+Value = TypeVar("Value")
 WALKED = 20_000
 """Motions walked in order before the index is used: about 10 ms."""
 NEAR = 5_000
@@ -78,14 +79,14 @@ class _Page:
 
     def find(self) -> list[UUID]:
         if not _conditions(self.found, tables.motion_search.c.terms):
-            return self._ids(self._walk().with_only_columns(tables.motion_search.c.motion_id).limit(self.limit), _WALK)
+            return self._read(self._walk().with_only_columns(tables.motion_search.c.motion_id).limit(self.limit), _WALK)
         ids = self._among_newest()
         return ids if len(ids) == self.limit else self._by_terms()
 
     def _among_newest(self) -> list[UUID]:
         recent = self._walk().limit(WALKED).subquery("recent")
         query = sa.select(recent.c.motion_id).where(*_conditions(self.found, recent.c.terms)).limit(self.limit)
-        return self._ids(query, _WALK)
+        return self._read(query, _WALK)
 
     def _by_terms(self) -> list[UUID]:
         table = tables.motion_search.c
@@ -98,14 +99,13 @@ class _Page:
         order = Order(matches.c.created_at, matches.c.motion_id, descending=self.order.descending)
         after = [] if self.place is None else [order.beyond(self.place)]
         query = sa.select(matches.c.created_at).where(*after).order_by(order.by()[0]).limit(self.limit)
-        with _plan(self.conn, _LOOK_UP):
-            times = list(self.conn.execute(query).scalars())
+        times = self._read(query, _LOOK_UP)
         ids = self._made_at(times) if times else []
         if len(ids) == len(times):
             return ids
         # Many other motions were made in the same microseconds (a bulk load): sort the matches themselves.
         query = sa.select(matches.c.motion_id).where(*after).order_by(*order.by()).limit(self.limit)
-        return self._ids(query, _LOOK_UP)
+        return self._read(query, _LOOK_UP)
 
     def _made_at(self, times: Sequence[datetime]) -> list[UUID]:
         """Return ids of matching motions by their creation times; ends early after `NEAR` motions of these times."""
@@ -114,7 +114,7 @@ class _Page:
         # A lateral subquery with an order is always run as a nested loop, which keeps the order of the times.
         each = self._walk(tables.motion_search.c.created_at == moment.c.at).lateral("each")
         near = sa.select(each).select_from(moment.join(each, sa.true())).limit(NEAR).subquery("near")
-        return self._ids(
+        return self._read(
             sa.select(near.c.motion_id).where(*_conditions(self.found, near.c.terms)).limit(self.limit), _WALK
         )
 
@@ -125,7 +125,7 @@ class _Page:
         rows = sa.select(table.motion_id, table.created_at, table.terms)
         return rows.where(self.ours, *conditions, *after).order_by(*self.order.by())
 
-    def _ids(self, query: sa.Select[Any], plan: Sequence[str]) -> list[UUID]:
+    def _read(self, query: sa.Select[Value], plan: Sequence[str]) -> list[Value]:
         with _plan(self.conn, plan):
             return list(self.conn.execute(query).scalars())
 

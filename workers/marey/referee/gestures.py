@@ -334,9 +334,7 @@ def lie_down(body: Body) -> bool:
         return False
     begin = int(np.flatnonzero(up)[-1])
     falling = body.height("head")
-    top = int(np.argmax(falling[: begin + 1][::-1] < np.inf))
-    high = np.flatnonzero(falling > 0.9 * falling[: begin + 1].max())
-    start = int(high[-1]) if len(high) else begin - top
+    start = int(np.flatnonzero(falling > 0.9 * falling[: begin + 1].max())[-1])
     end = int(np.flatnonzero(~lying)[-1]) + 1
     return (end - start) / body.fps >= 0.9
 
