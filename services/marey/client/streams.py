@@ -163,11 +163,10 @@ class LiveStream:
             Unauthenticated, Refused, NotFound: the server refuses the connection.
             Unreachable: the connection broke and could not be opened again for three minutes.
         """
-        if not self._updates:
-            if not self._messages:
-                self._messages.extend(self._link.receive(wait))
-            if self._messages:
-                self._read(self._messages.popleft())
+        if not (self._updates or self._messages):
+            self._messages.extend(self._link.receive(wait))
+        while self._messages and not self._updates:
+            self._read(self._messages.popleft())
         return self._updates.popleft() if self._updates else None
 
     def try_send(self, kind: Command, prompt: str | None = None) -> bool:

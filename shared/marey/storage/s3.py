@@ -241,7 +241,7 @@ class S3Store:
                 raise self._untrusted(why) from error
             self._silence.note(error)  # within an object, where no retry applies
             cause = getattr(error, "reason", None) or error
-            raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
+            raise self._unreachable(f"{type(cause).__name__}: {cause}", what="does not answer") from error
 
     def _refined(self, error: S3Error) -> S3Error:
         """Return the error, or a more precise one: the answer to a HEAD names neither a missing bucket nor invalid
@@ -272,10 +272,10 @@ class S3Store:
         message = f"the certificate of the object store is not trusted ({why})"
         return Unreachable(message, where=self._where(), hint=UNTRUSTED_HINT, public=PUBLIC)
 
-    def _unreachable(self, cause: str) -> Unreachable:
+    def _unreachable(self, cause: str, *, what: str = "failed") -> Unreachable:
         STORE_ERRORS.labels("s3").inc()
         return Unreachable(
-            f"the object store failed ({cause})",
+            f"the object store {what} ({cause})",
             where=self._where(),
             hint="Is it running, has it free space, and are MAREY_S3_ENDPOINT (with its scheme) and the keys right?",
             public=PUBLIC,

@@ -105,8 +105,8 @@ class Follower:
             self._report(update)
         if self._screen.due():
             self._screen.count(self._counter())
-        broken = update is None and not (self._live.connected or self._live.has_ended)  # all that arrived is read
-        if broken and self._broken_on is None:
+        ended = self._live.has_ended or self._live.stream.has_ended  # the server closes the connection of an ended one
+        if update is None and not (self._live.connected or ended) and self._broken_on is None:
             self._broken_on = self._live.connections
             self._screen.say("No connection; trying again.")
 
