@@ -51,7 +51,14 @@ if TYPE_CHECKING:
         Quota,
         Speed,
     )
-    from marey.client.types.models import BrokenModel, Model, ModelCatalogue, SamplingSetting, TrainingData
+    from marey.client.types.models import (
+        BrokenModel,
+        Model,
+        ModelActions,
+        ModelCatalogue,
+        SamplingSetting,
+        TrainingData,
+    )
     from marey.client.types.motions import Motion, MotionDetail, Reroll, Review
     from marey.client.types.references import ReferenceMatch
     from marey.client.types.schedules import Schedule
@@ -102,7 +109,7 @@ __getattr__ = lazy_names(
         "marey.client.types.jobs": (
             "CheckedJob Counters Erasure Estimate Job JobEvent JobItem QueuePosition Quota Speed"
         ),
-        "marey.client.types.models": "BrokenModel Model ModelCatalogue SamplingSetting TrainingData",
+        "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Motion MotionDetail Reroll Review",
         "marey.client.types.references": "ReferenceMatch",
         "marey.client.types.schedules": "Schedule",
@@ -162,6 +169,7 @@ __all__ = [
     "MetricChange",
     "MetricPair",
     "Model",
+    "ModelActions",
     "ModelCatalogue",
     "Motion",
     "MotionDetail",

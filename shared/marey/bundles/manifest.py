@@ -9,11 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidBundle
+from marey.vocabulary.scope import ActionLists
 
 FORMAT = 2
 """Format of new bundles. Format 1, whose hash covers the files alone, is still read with the same hash."""
 MANIFEST_NAME = "manifest.json"
-DESCRIPTIVE = {"name", "version", "metrics", "training"}
+DESCRIPTIVE = {"name", "version", "metrics", "training", "actions"}
 """Fields that only describe a bundle: format 2 hashes all others."""
 SHARD_ENDING = ".safetensors"
 RESERVED = frozenset({MANIFEST_NAME, "readme.md"})
@@ -93,6 +94,8 @@ class BundleManifest(_Frozen):
     metrics: dict[str, float] = {}
     training: dict[str, Any] = {}
     """Provenance: commit, commands, budgets and data hash."""
+    actions: ActionLists | None = None
+    """Actions that a generator supports and those that it was trained on in vain, measured; None = not measured."""
     parts: dict[PlainName, tuple[PlainName, ...]]
     """Shards of each part, in order."""
     files: dict[PlainName, BundleFile]

@@ -33,7 +33,7 @@ _ORDER: dict[str, int] = {verdict: rank for rank, verdict in enumerate(get_args(
 
 @dataclass(frozen=True)
 class ActionLists:
-    """The actions that a bundle's card lists, by id.
+    """The actions that a bundle's manifest lists, by id.
 
     Attributes:
         supported: at least 80 % adherence.
@@ -45,16 +45,14 @@ class ActionLists:
     single_take: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Ids of all supported actions."""
+        return (*self.supported, *self.single_take)
+
     def knows(self, name: str) -> bool:
         """Return True if the action is supported."""
         return name in self.supported or name in self.single_take
-
-
-UNLISTED = ActionLists(
-    supported=("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow"),
-    tried=("kick", "punch", "slash", "dance"),
-)
-"""Lists of bundles whose manifest has none: those trained on the Bandai-Namco sets."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ def _matcher() -> ScopeMatcher:
     return ScopeMatcher(load_vocabulary())
 
 
-def match_scope(prompt: str, lists: ActionLists = UNLISTED) -> Scope:
+def match_scope(prompt: str, lists: ActionLists) -> Scope:
     """Return the scope of a prompt by its words.
 
     Args:

@@ -18,6 +18,8 @@ from marey.bundles import Bundle, BundleWriter, DataSource, TextSpec
 from marey.bundles.manifest import DESCRIPTIVE, BundleManifest, parse_manifest
 from marey.core.errors import InvalidBundle, MareyError
 from marey.text.keys import PIPELINE_VERSION, feature_key
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import ActionLists
 from tests.support.marey import REPOSITORY
 from tests.support.models import STARTERS
 
@@ -49,7 +51,13 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "data": ("data", (DataSource(name="d", licence="MIT", credit="c"),)),
     "licence": ("licence", "CC-BY-NC-4.0"),
 }
-DESCRIBING: dict[str, Any] = {"name": "c", "version": "2", "metrics": {"fid": 1.0}, "training": {"commit": "0"}}
+DESCRIBING: dict[str, Any] = {
+    "name": "c",
+    "version": "2",
+    "metrics": {"fid": 1.0},
+    "training": {"commit": "0"},
+    "actions": ActionLists(("walk",)),
+}
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -104,6 +112,15 @@ def test_shipped_bundles_are_of_the_first_format() -> None:
     found = {path.parent.name: json.loads(path.read_text())["format"] for path in MANIFESTS}
     assert found == dict.fromkeys(found, 1)
     assert {*SHIPPED, *STARTERS} <= set(found)
+
+
+@pytest.mark.parametrize("name", STARTERS)
+def test_shipped_bundles_list_actions_of_the_vocabulary_once_each(name: str) -> None:
+    lists = Bundle.open(REPOSITORY / "models" / name, verify=False).manifest.actions
+    assert lists is not None
+    listed = [*lists.known, *lists.tried]
+    assert set(listed) <= set(load_vocabulary().actions)
+    assert len(set(listed)) == len(listed)
 
 
 def test_text_keys_of_shipped_bundles_stay() -> None:

@@ -45,6 +45,7 @@ NAMES = {
     models.TrainingData: "DataView",
     models.Model: "ModelView",
     models.SamplingSetting: "SettingView",
+    models.ModelActions: "ActionsView",
     models.BrokenModel: "BrokenView",
     models.ModelCatalogue: "ModelsView",
     evaluations.EvaluationRequest: "RequestView",

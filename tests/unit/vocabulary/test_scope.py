@@ -7,6 +7,10 @@ from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope, read_policy
 
+FEW = ActionLists(
+    supported=("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow"),
+    tried=("kick", "punch", "slash", "dance"),
+)
 ALL = ActionLists(tuple(load_vocabulary().actions))
 DEVELOPMENT = scope_prompts("development")
 
@@ -52,8 +56,10 @@ def test_a_prompt_out_of_scope_is_right_only_as_unknown() -> None:
         ("picks the heavy box up", "unknown", "pick-up", None),
     ],
 )
-def test_verdicts_of_a_bundle_without_lists(prompt: str, verdict: str, action: str | None, read_as: str | None) -> None:
-    (named,) = match_scope(prompt).actions
+def test_verdicts_of_a_bundle_with_few_actions(
+    prompt: str, verdict: str, action: str | None, read_as: str | None
+) -> None:
+    (named,) = match_scope(prompt, FEW).actions
     assert (named.verdict, named.action, named.read_as) == (verdict, action, read_as)
 
 
@@ -81,13 +87,13 @@ def test_prompts_without_counts(prompt: str) -> None:
 
 
 def test_the_worst_action_is_the_verdict_of_a_prompt() -> None:
-    scope = match_scope("he walks, kicks and juggles")
+    scope = match_scope("he walks, kicks and juggles", FEW)
     assert [named.verdict for named in scope.actions] == ["known", "tried", "unknown"]
     assert scope.verdict == "unknown"
 
 
 def test_a_prompt_without_an_action_has_one_unknown() -> None:
-    assert match_scope("hmm").as_json() == {
+    assert match_scope("hmm", FEW).as_json() == {
         "version": 1,
         "by": "words",
         "verdict": "unknown",

@@ -7,6 +7,7 @@ from marey.bundles.limits import settings_of
 from marey.http.schemas import View
 from marey.jobs.generators import GeneratorCapabilities, GeneratorList
 from marey.registry import find_model
+from marey.vocabulary.scope import ActionLists
 
 
 class DataView(View):
@@ -30,6 +31,22 @@ class SettingView(View):
     help: str
 
 
+class ActionsView(View):
+    """Actions of a bundle, by their ids in the vocabulary."""
+
+    supported: list[str]
+    """At least 80 % adherence."""
+    single_take: list[str]
+    """Supported, learned from fewer than four sources."""
+    tried: list[str]
+    """Trained on, below 80 % adherence or hardly measured."""
+
+    @classmethod
+    def of(cls, lists: ActionLists) -> ActionsView:
+        """Convert the lists of a manifest."""
+        return cls(**{name: list(getattr(lists, name)) for name in cls.model_fields})
+
+
 class ModelView(View):
     """A bundle."""
 
@@ -51,6 +68,8 @@ class ModelView(View):
     data: list[DataView]
     metrics: dict[str, float]
     settings: list[SettingView]
+    actions: ActionsView | None
+    """Null if the bundle lists none: its prompts have no scope."""
     about: str
     """Capabilities and limits of the model, in a few lines; empty if the model is not installed on the server."""
 
@@ -58,6 +77,7 @@ class ModelView(View):
     def of(cls, generator: GeneratorCapabilities) -> ModelView:
         """Convert capabilities."""
         manifest = generator.bundle.manifest
+        lists = manifest.actions
         spec = find_model(manifest.model)
         own = ("name", "model", "version", "config", "random", "licence", "commercial", "skeleton", "fps", "metrics")
         return cls(
@@ -77,6 +97,7 @@ class ModelView(View):
                 )
                 for each in settings_of(generator.bundle)
             ],
+            actions=None if lists is None else ActionsView.of(lists),
             about="" if spec is None else spec.about,
             **{name: getattr(manifest, name) for name in own},
         )

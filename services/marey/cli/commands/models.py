@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import typer
@@ -52,6 +52,8 @@ def show(
         console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
     for line in found.get("about", "").splitlines():  # an older server does not send it
         console.result(f"{'about':<12} {line}")
+    for line in _actions(found.get("actions")):
+        console.result(f"{'actions':<12} {line}")
     for setting in found.get("settings", []):
         kind = "whole, " if setting["whole"] else ""
         shown = f"{setting['name']} = {setting['default']:g} ({kind}{setting['minimum']:g} to {setting['maximum']:g})"
@@ -132,6 +134,16 @@ def _local_model(name: str) -> dict[str, Any]:
 
 def _length(model: Mapping[str, Any]) -> str:
     return f"{model['min_seconds']:g} to {model['max_seconds']:g} s"
+
+
+def _actions(lists: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield a line for each list of actions that is not empty."""
+    if lists is None:
+        yield "not listed: prompts are not compared with what it supports"
+        return
+    for field, kind in (("supported", "supported"), ("single_take", "supported, of few takes"), ("tried", "tried")):
+        if names := lists.get(field):
+            yield f"{kind}: {', '.join(names)}"
 
 
 def _weights(model: Mapping[str, Any]) -> str:

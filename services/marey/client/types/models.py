@@ -31,6 +31,21 @@ class SamplingSetting(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ModelActions(Result):
+    """Actions of a bundle, by their ids in the vocabulary.
+
+    Attributes:
+        supported: at least 80 % adherence.
+        single_take: supported, learned from fewer than four sources.
+        tried: trained on, below 80 % adherence or hardly measured.
+    """
+
+    supported: tuple[str, ...] = ()
+    single_take: tuple[str, ...] = ()
+    tried: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Model(Result):
     """A bundle."""
 
@@ -50,6 +65,8 @@ class Model(Result):
     data: tuple[TrainingData, ...] = ()
     metrics: Mapping[str, float] = field(default_factory=dict[str, float])
     settings: tuple[SamplingSetting, ...] = ()
+    actions: ModelActions | None = None
+    """None where the bundle lists none."""
     about: str = ""
     """A few lines on the abilities and limits of the model; empty where the server does not know it."""
 
