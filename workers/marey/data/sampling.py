@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.manifest import Clip
+from marey.data.splits import actions_of
 
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Share of the draws that are sequences of two and of three actions; clips of one action have the rest."""
@@ -21,14 +21,15 @@ must follow each other, and the feet stand), and there are 14 bows and 14 ways b
 def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     """Probability of each clip (N,), summing to 1.
 
-    The training split has 1,064 raised hands and one kick. Clips of one action weigh count^-0.5 of their content,
-    shared out within the content by count^-0.5 of the style: a content with 100 times fewer clips is drawn 10 times
-    more rarely, not 100 times; some actions count more (`ACT_WEIGHT`). Sequences have a fixed share (`SEQUENCE_SHARE`)
-    and are drawn evenly, since they were composed by weights.
+    The training split has 1,064 raised hands and one kick. Clips of one action weigh count^-0.5 of their class,
+    shared out within the class by count^-0.5 of the style: a class with 100 times fewer clips is drawn 10 times
+    more rarely, not 100 times; some actions count more (`ACT_WEIGHT`). A class is an action, whatever data set its
+    clips come from; a clip whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences
+    have a fixed share (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights.
     """
     weights = np.zeros(len(clips))
     single = [k for k, clip in enumerate(clips) if len(clip.acts) == 1]
-    weights[single] = _by_content([clips[k] for k in single])
+    weights[single] = _by_class([clips[k] for k in single])
     lengths = np.array([len(clip.acts) for clip in clips])
     for length, share in SEQUENCE_SHARE.items():
         chosen = lengths == length
@@ -37,22 +38,27 @@ def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     return weights / weights.sum()
 
 
-def _by_content(clips: Sequence[Clip]) -> NDArray[np.float64]:
-    """Weights of clips of one action, summing to 1."""
-    keys = [(_content(clip), clip.style) for clip in clips]
-    per_content, per_key = Counter(content for content, _ in keys), Counter(keys)
+def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
+    """Weights of clips that are not sequences, summing to 1."""
+    classes = [classes_of(clip) for clip in clips]
+    per_class, per_key = dict[str, float](), dict[tuple[str, str], float]()
+    for clip, names in zip(clips, classes, strict=True):
+        for name in names:
+            key = name, clip.style
+            per_class[name] = per_class.get(name, 0.0) + 1 / len(names)
+            per_key[key] = per_key.get(key, 0.0) + 1 / len(names)
     styles: dict[str, float] = {}
-    for (content, _), count in per_key.items():
-        styles[content] = styles.get(content, 0.0) + count**0.5
-    weights = np.array(
-        [
-            per_content[content] ** 0.5 * (per_key[content, style] ** 0.5 / styles[content]) / per_key[content, style]
-            for content, style in keys
-        ]
-    ) * [ACT_WEIGHT.get(clip.acts[0], 1.0) for clip in clips]
+    for (name, _), count in per_key.items():
+        styles[name] = styles.get(name, 0.0) + count**0.5
+    weights = np.zeros(len(clips))
+    for k, (clip, names) in enumerate(zip(clips, classes, strict=True)):
+        for name in names:
+            weights[k] += per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
+        weights[k] *= ACT_WEIGHT.get(clip.acts[0], 1.0)
     return weights / weights.sum() if len(weights) else weights
 
 
-def _content(clip: Clip) -> str:
-    """Label of a clip of one action; the kind alone of a source whose labels are free text."""
-    return f"{clip.dataset}/{clip.content.split(' - ')[0]}" if clip.acts == ("cmu",) else clip.content
+def classes_of(clip: Clip) -> tuple[str, ...]:
+    """Classes of a clip that is no sequence: the actions of its label; the kind alone where that is free text, as in
+    `dance - ballet, pirouette`."""
+    return actions_of(clip.content.split(" - ")[0]) or (clip.content,)

@@ -129,8 +129,8 @@ def _average(values: Tensor, valid: Tensor) -> Tensor:
 
 
 SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
-"""Share of the windows drawn from a data set; others share the rest. The first has 6 % of the clips, each of another
-content or style, and three times the error of the second if clips are drawn evenly."""
+"""Share of the windows drawn from a data set; all others together have the rest. The first has 6 % of the clips, each
+of another content or style, and three times the error of the second if clips are drawn evenly."""
 
 
 class TokenizerStage:
@@ -201,14 +201,15 @@ class TokenizerStage:
 
 
 def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
-    """Return sampling weights (sum 1): longer clips more often, rare contents raised, data sets by their `SHARES`."""
+    """Return sampling weights (sum 1): longer clips more often, rare classes raised; data sets with `SHARES` by those,
+    and what they leave to all others together, so that a small set has no more than its clips weigh."""
     weights = sampling_weights(clips) * np.sqrt([c.length for c in clips])
-    names = [dataset_of(c) for c in clips]
-    named = sum(SHARES.get(n, 0.0) for n in set(names))
-    others = sum(n not in SHARES for n in set(names))
-    for name in sorted(set(names)):
-        rows = np.array([n == name for n in names])
-        weights[rows] *= SHARES.get(name, (1 - named) / max(others, 1)) / weights[rows].sum()
+    names = (dataset_of(c) for c in clips)
+    groups = np.array([name if name in SHARES else "" for name in names])
+    shares = {name: share for name, share in SHARES.items() if (groups == name).any()}
+    shares[""] = 1 - sum(shares.values())
+    for group in np.unique(groups):
+        weights[groups == group] *= shares[group] / weights[groups == group].sum()
     return weights / weights.sum()
 
 
