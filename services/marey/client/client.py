@@ -36,7 +36,6 @@ class Client:
 
     Attributes:
         jobs, motions, streams, evaluations, schedules, webhooks, models, references: the nouns of the API.
-        transport: requests by path, for routes without a method; not part of the public API.
     """
 
     def __init__(
@@ -51,15 +50,15 @@ class Client:
             server = find_server() if server is None else server_at(server, key)
         if key is not None and key != server.key:
             server = Server(server.url, key)
-        self.transport = Transport(server, timeout=timeout, attempts=attempts)
-        self.jobs = Jobs(self.transport)
-        self.motions = Motions(self.transport)
-        self.streams = Streams(self.transport)
-        self.evaluations = Evaluations(self.transport)
-        self.schedules = Schedules(self.transport)
-        self.webhooks = Webhooks(self.transport)
-        self.models = Models(self.transport)
-        self.references = References(self.transport)
+        self._transport = Transport(server, timeout=timeout, attempts=attempts)
+        self.jobs = Jobs(self._transport)
+        self.motions = Motions(self._transport)
+        self.streams = Streams(self._transport)
+        self.evaluations = Evaluations(self._transport)
+        self.schedules = Schedules(self._transport)
+        self.webhooks = Webhooks(self._transport)
+        self.models = Models(self._transport)
+        self.references = References(self._transport)
 
     def __enter__(self) -> Self:
         return self
@@ -72,8 +71,8 @@ class Client:
     @property
     def server(self) -> Server:
         """The server and the key that this client uses."""
-        return self.transport.server
+        return self._transport.server
 
     def close(self) -> None:
         """Close the connections."""
-        self.transport.close()
+        self._transport.close()

@@ -53,3 +53,10 @@ def test_the_reference_names_everything_that_is_public_and_every_example() -> No
     assert {name for name in public if hasattr(errors, name)} <= set(re.findall(r"`(\w+)`", page))
     scripts = {path.name for path in (ROOT / "examples").glob("*.py")}
     assert set(re.findall(r"`(\w+\.py)`", page)) == scripts
+
+
+def test_the_reference_names_every_public_attribute_of_a_client() -> None:
+    page = (ROOT / "docs" / "reference" / "python-api.md").read_text(encoding="utf-8")
+    with import_module("marey.client").Client("http://127.0.0.1:1", "key") as client:
+        public = {name for name in dir(client) if not name.startswith("_")}
+    assert public == set(re.findall(r"(?<!\.)\bclient\.(\w+)", page))
