@@ -6,7 +6,9 @@
 2. through the index of terms, which intersects all conditions of the filter, however old the matches. The matches
    are either rare, or older than all walked ones. First only their creation times are sorted, then the motions of
    the page's times are read: Postgres sorts a single number by value, and copies wider rows, which takes five times
-   as long when every row enters the page for a while (rows come oldest first).
+   as long when every row enters the page for a while (rows come oldest first). Where no other tenant has motions,
+   the times are sought without the term of the tenant: intersecting with the list of all motions takes half as long
+   again.
 
 The cost is bounded by the walks plus the matching rows, independent of the table size. Without statistics (after a
 bulk load), or with old ones, the planner would walk the primary key or read the whole table instead: so each
@@ -57,10 +59,11 @@ def find_motions(
     """
     table = tables.motion_search.c
     order = Order(table.created_at, table.motion_id, descending=job is None)
+    others = sa.true() if job is not None else _any_of_others(tenant)
     ours = table.tenant_id == tenant if job is None else table.job_id == job
     scope = _lexeme("t", tenant) if job is None else _lexeme("j", str(job))
     place = None if cursor is None else order.place(cursor, ours)
-    return _Page(conn, found, order, ours, scope, place, limit).find()
+    return _Page(conn, found, order, ours, scope, others, place, limit).find()
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,8 @@ class _Page:
     """The motions of the listing, by a column."""
     scope: sa.ColumnElement[str]
     """The same as a term."""
+    others: sa.ColumnElement[bool]
+    """True if there may be motions outside the listing."""
     place: Place | None
     limit: int
 
@@ -89,23 +94,29 @@ class _Page:
         return self._read(query, _WALK)
 
     def _by_terms(self) -> list[UUID]:
+        scope = _has(tables.motion_search.c.terms, self.scope)
+        has_others = any(self._read(sa.select(self.others), _WALK))
+        # Without the scope they may be times of a tenant that has just begun: `_made_at` reads only our motions.
+        times = self._read(self._matching("created_at", *([scope] if has_others else [])), _LOOK_UP)
+        ids = self._made_at(times) if times else []
+        if len(ids) == len(times):
+            return ids
+        # Many other motions were made in the same microseconds (a bulk load): sort the matches themselves.
+        return self._read(self._matching("motion_id", scope), _LOOK_UP)
+
+    def _matching(self, column: str, *scope: sa.ColumnElement[bool]) -> sa.Select[Any]:
+        """Return a column of the matching motions of a page, in order: of their time alone, or with ties by id."""
         table = tables.motion_search.c
         matches = (
             sa.select(table.motion_id, table.created_at)
-            .where(_has(table.terms, self.scope), *_conditions(self.found, table.terms))
+            .where(*scope, *_conditions(self.found, table.terms))
             .offset(0)  # optimization fence: order and page condition stay outside
             .subquery("matches")
         )
         order = Order(matches.c.created_at, matches.c.motion_id, descending=self.order.descending)
         after = [] if self.place is None else [order.beyond(self.place)]
-        query = sa.select(matches.c.created_at).where(*after).order_by(order.by()[0]).limit(self.limit)
-        times = self._read(query, _LOOK_UP)
-        ids = self._made_at(times) if times else []
-        if len(ids) == len(times):
-            return ids
-        # Many other motions were made in the same microseconds (a bulk load): sort the matches themselves.
-        query = sa.select(matches.c.motion_id).where(*after).order_by(*order.by()).limit(self.limit)
-        return self._read(query, _LOOK_UP)
+        by = order.by()[:1] if column == "created_at" else order.by()
+        return sa.select(matches.c[column]).where(*after).order_by(*by).limit(self.limit)
 
     def _made_at(self, times: Sequence[datetime]) -> list[UUID]:
         """Return ids of matching motions by their creation times; ends early after `NEAR` motions of these times."""
@@ -128,6 +139,12 @@ class _Page:
     def _read(self, query: sa.Select[Value], plan: Sequence[str]) -> list[Value]:
         with _plan(self.conn, plan):
             return list(self.conn.execute(query).scalars())
+
+
+def _any_of_others(tenant: str) -> sa.ColumnElement[bool]:
+    """True if another tenant has motions; two look-ups in an index."""
+    table = tables.motion_search.c
+    return sa.or_(*(sa.exists().where(beside) for beside in (table.tenant_id < tenant, table.tenant_id > tenant)))
 
 
 def motions_at(conn: sa.Connection, job: UUID, index: int) -> list[UUID]:

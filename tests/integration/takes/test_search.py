@@ -171,6 +171,50 @@ def test_matches_behind_the_walk_are_read_by_their_times_or_sorted(
     assert seen.count("SELECT matches.motion_id ") == sorts
 
 
+def _give_to_another(conn: sa.Connection, motion: UUID) -> None:
+    change = "SET tenant_id = 'zebra', terms = CAST(replace(terms::text, 'tdefault', 'tzebra') AS tsvector)"
+    conn.execute(sa.text(f"UPDATE motion_search {change} WHERE motion_id = :id"), {"id": motion})
+
+
+def test_the_term_of_the_tenant_is_sought_only_where_others_have_motions(
+    engine: sa.Engine, jobs: list[UUID], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reading the list of all motions takes half as long again as reading those of a common word."""
+    seen: list[str] = []
+
+    def note(_conn: object, _cursor: object, statement: str, parameters: object, *_: object) -> None:
+        if statement.startswith("SELECT matches.created_at"):
+            seen.append(str(parameters))
+
+    monkeypatch.setattr(searching._Page, "_among_newest", lambda *_: [])
+    sa.event.listen(engine, "before_cursor_execute", note)
+    with engine.connect() as conn:
+        alone = list_motions(conn, "default", found=MotionFilter(text="walk")).rows
+        _give_to_another(conn, alone[0].id)
+        beside = list_motions(conn, "default", found=MotionFilter(text="walk")).rows
+        conn.rollback()
+    sa.event.remove(engine, "before_cursor_execute", note)
+    assert ["default" in parameters for parameters in seen] == [False, True]
+    assert beside == alone[1:]
+
+
+def test_motions_of_a_tenant_that_has_just_begun_are_not_shown_to_another(
+    engine: sa.Engine, jobs: list[UUID], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has begun between the question whether there are others and the search."""
+    monkeypatch.setattr(searching._Page, "_among_newest", lambda *_: [])
+    monkeypatch.setattr(searching, "_any_of_others", lambda _: sa.false())
+    found = MotionFilter(text="walk")
+    with engine.connect() as conn:
+        everything = list_motions(conn, "default", found=found).rows
+        for motion in everything[::2]:
+            _give_to_another(conn, motion.id)
+        for limit in (1, 2, 3, 100):
+            rows = list_motions(conn, "default", found=found, limit=limit).rows
+            assert rows == everything[1::2][:limit]
+        conn.rollback()
+
+
 def test_motions_of_another_tenant_are_not_looked_through(engine: sa.Engine, jobs: list[UUID]) -> None:
     with transaction(engine) as conn:
         for found in (MotionFilter(), MotionFilter(text="walk"), MotionFilter(name="take")):
