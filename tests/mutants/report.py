@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from marey.referee.adherence import interval
 from tests.mutants.drawing import Mutant
 
 EQUIVALENTS = Path(__file__).with_name("equivalent.toml")
@@ -34,14 +34,9 @@ def read_equivalents(path: Path = EQUIVALENTS) -> list[Equivalent]:
     return [Equivalent(**entry) for entry in tomllib.loads(path.read_text()).get("equivalent", [])]
 
 
-def wilson(killed: int, total: int, z: float = 1.96) -> tuple[float, float]:
+def wilson(killed: int, total: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a share; (0, 1) for a total of 0."""
-    if not total:
-        return 0.0, 1.0
-    share = killed / total
-    middle = share + z * z / (2 * total)
-    half = z * math.sqrt(share * (1 - share) / total + z * z / (4 * total * total))
-    return max(0.0, (middle - half) / (1 + z * z / total)), min(1.0, (middle + half) / (1 + z * z / total))
+    return interval(killed / total, total) if total else (0.0, 1.0)
 
 
 def describe(

@@ -52,3 +52,22 @@ def test_an_ablation_that_a_model_has_not_is_told_with_those_it_has(bundle: str,
     assert done.exit_code == InvalidInput.exit_code
     assert "has no ablation 'depth'" in done.stderr
     assert "masks (Hard and random masks" in done.stderr
+
+
+def test_actions_are_measured_by_their_held_out_prompts(bundle: str, tmp_path: Path) -> None:
+    options = ["--action", "bow", "--seeds", "1", "--set", "steps=2", "-o", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, ["eval", "actions", bundle, *options])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "report.json").read_text())
+    assert json.loads(done.stdout) == found
+    (rate,) = found["actions"]
+    assert (rate["action"], rate["authors"], rate["standing"]) == ("bow", 2, "unproven")
+    assert len(found["trials"]) == rate["motions"] >= 10
+    assert "| bow |" in (tmp_path / "report.md").read_text()
+
+
+def test_an_action_without_prompts_is_told_with_those_that_have_some(bundle: str) -> None:
+    done = CliRunner().invoke(app, ["eval", "actions", bundle, "--action", "levitate"])
+    assert done.exit_code == InvalidInput.exit_code
+    assert "no held-out prompts for 'levitate'" in done.stderr
+    assert "walk-backward" in done.stderr

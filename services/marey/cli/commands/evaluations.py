@@ -238,3 +238,30 @@ def adherence(
         console.result_json(judged.document)
     else:
         console.result(judged.markdown.rstrip("\n"))
+
+
+@app.command()
+def actions(
+    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")],
+    chosen: Annotated[
+        list[str] | None, typer.Option("--action", help="An action of the vocabulary; may be repeated. Default: all.")
+    ] = None,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")] = 4,
+    settings: evaluating.Settings = None,
+    threads: Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")] = 0,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure which actions of the vocabulary a bundle supports, by held-out prompts. Needs no server."""
+    from marey.cli.roles.actions import measure_actions
+
+    with console.bar() as bar:
+        task = bar.add_task("judging", total=None)
+        found = measure_actions(
+            bundle, actions=chosen or (), seeds=seeds, settings=options.settings_of(settings or ()), threads=threads,
+            output=output, progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )  # fmt: skip
+    if as_json:
+        console.result_json(found.document)
+    else:
+        console.result(found.markdown.rstrip("\n"))

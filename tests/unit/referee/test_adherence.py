@@ -1,0 +1,79 @@
+"""Rates of actions: which are supported, and what is too little to say so."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from marey.referee import Body
+from marey.referee.adherence import ActionTrial, document, interval, judge_trial, markdown, rates
+from marey.referee.prompts import ActionPrompt, action_prompts
+from marey.vocabulary.entries import load_vocabulary
+from tests.unit.referee.bodies import FPS, standing, walking
+
+
+def _trials(
+    fails: dict[int, int], *, phrasings: int = 10, seeds: int = 4, authors: int = 2, action: str = "walk"
+) -> list[ActionTrial]:
+    """Trials of one action; of phrasing `n` the first `fails[n]` seeds fail."""
+    return [
+        ActionTrial(ActionPrompt(f"prompt {n}", (action,), "", n % authors), seed, seed >= fails.get(n, 0))
+        for n in range(phrasings)
+        for seed in range(seeds)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("trials", "standing"),
+    [
+        (_trials({}), "supported"),
+        (_trials({0: 4, 1: 4}), "supported"),
+        (_trials({0: 4, 1: 4, 2: 1}), "tried"),  # 31 of 40
+        (_trials({0: 4, 1: 4, 2: 4}, phrasings=20), "tried"),  # 85 %, and three phrasings never work
+        (_trials({}, phrasings=9), "unproven"),
+        (_trials({}, authors=1), "unproven"),
+        (_trials({}, seeds=3), "unproven"),
+    ],
+)
+def test_an_action_is_supported_at_80_percent_of_enough_phrasings(trials: list[ActionTrial], standing: str) -> None:
+    (rate,) = rates(trials)
+    assert rate.standing == standing
+    assert rate.share == sum(trial.passed for trial in trials) / len(trials)
+
+
+def test_actions_are_counted_apart_and_the_table_begins_with_the_best() -> None:
+    trials = _trials(dict.fromkeys(range(10), 4), action="bow") + _trials({0: 4}, action="walk")
+    found = rates(trials)
+    assert [(rate.action, rate.share, rate.lost) for rate in found] == [("bow", 0.0, 10), ("walk", 0.9, 1)]
+    lines = markdown("toy@1", found).splitlines()
+    assert lines[0].startswith("Bundle `toy@1`: 1 of 2 actions are supported; 45.0% of 80 motions")
+    assert [line.split(" | ")[0] for line in lines[4:]] == ["| walk", "| bow"]
+    assert len(document("toy@1", {}, trials)["trials"]) == 80  # pyright: ignore[reportArgumentType]
+
+
+@given(st.integers(1, 500), st.floats(0, 1))
+def test_an_interval_holds_its_share_and_shrinks_with_the_sample(size: int, share: float) -> None:
+    low, high = interval(share, size)
+    assert 0 <= low <= share + 1e-9
+    assert share - 1e-9 <= high <= 1
+    narrow_low, narrow_high = interval(share, 4 * size)
+    assert narrow_high - narrow_low <= high - low
+
+
+def test_the_referee_judges_a_trial_by_the_actions_of_its_prompt() -> None:
+    prompt = ActionPrompt("she walks", ("walk",), "", 1)
+    assert judge_trial(prompt, 0, Body(walking(3.0, 1.2), FPS)).passed
+    assert not judge_trial(prompt, 0, Body(standing(3.0), FPS)).passed
+
+
+def test_every_action_has_prompts_of_two_authors_and_no_prompt_is_asked_twice() -> None:
+    prompts = action_prompts()
+    asked = Counter((prompt.actions, prompt.author) for prompt in prompts)
+    for action in load_vocabulary().actions:
+        assert asked[(action,), 1] + asked[(action,), 2] >= 10, action
+        assert min(asked[(action,), 1], asked[(action,), 2]) >= 5, action
+    texts = [prompt.text.casefold() for prompt in prompts]
+    assert len(set(texts)) == len(texts)
