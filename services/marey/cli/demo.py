@@ -150,14 +150,13 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
     if random:
         title = f"RANDOM WEIGHTS ({title}): these motions show the machinery, not the prompts"
     table = Table(title=title, title_justify="left")
-    for column in ("prompt", "weights", "state", "length", "seed", "took", "files"):
+    for column in ("prompt", "state", "length", "seed", "took", "files"):
         table.add_column(column, no_wrap=column != "prompt")
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
         took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""
         files = f"{line['name']}.*" if line["files"] else ""
-        weights = "random" if random else "trained"
-        table.add_row(line["prompt"], weights, line["state"], length, str(line["seed"]), took, files)
+        table.add_row(line["prompt"], line["state"], length, str(line["seed"]), took, files)
     console.drawing(sys.stdout).print(table)
 
 

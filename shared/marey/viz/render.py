@@ -225,5 +225,5 @@ def draw_legend(paper: Paper) -> None:
         draw.ellipse([x, y + 3, x + 10, y + 13], fill=theme.parts[part])
         paper.text((x + 16, y), label, 13, theme.muted)
         x += 16 + paper.length(label, 13) + 22
-    paper.text((x, y), "a lit patch of floor is a foot in contact", 13, theme.muted)
+    paper.text((x, y), "lit floor and bars: foot on the floor (pale bar: heel or toe alone)", 13, theme.muted)
     paper.text((width - MARGIN, y), "Marey", 13, theme.muted, align="right")

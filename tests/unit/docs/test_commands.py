@@ -11,12 +11,14 @@ import re
 import subprocess
 from functools import cache
 from importlib.util import find_spec
+from itertools import takewhile
 from typing import Any
 
 import pytest
 import typer
 
 from marey.cli.main import app
+from marey.data.dataset import known_sets
 from tests.support.pages import ROOT, Block, blocks
 
 ALL = blocks()
@@ -47,6 +49,15 @@ def module_exists(name: str) -> bool:
         return False
 
 
+def unknown_source(words: list[str]) -> str | None:
+    """The error of `marey data prepare` and `pack`, which read pairs of a source and its path before the options."""
+    if words[:2] not in (["data", "prepare"], ["data", "pack"]):
+        return None
+    sources = set([*takewhile(lambda word: not word.startswith("-"), words[2:])][::2])
+    unknown = sources - {"own", "pack", *known_sets()}
+    return f"no known set: {unknown}" if unknown else None
+
+
 def check(words: list[str]) -> str | None:
     """The error of a command; None if it is right."""
     while ENVIRONMENT.match(words[0]) and len(words) > 1:
@@ -59,16 +70,17 @@ def check(words: list[str]) -> str | None:
             return None
         except Exception as error:  # the parser's own errors have no public base class
             return str(error)
-    elif program == "make":
+        return unknown_source(words[1:])
+    if program == "make":
         targets = [word for word in words[1:] if "=" not in word and not word.startswith(("-", "/"))]
         return None if set(targets) <= TARGETS else f"no target of the Makefile: {targets}"
-    elif program in ("python", "python3") and words[1] == "-m":
+    if program in ("python", "python3") and words[1] == "-m":
         return None if module_exists(words[2]) else f"no module {words[2]}"
-    elif program in ("pytest", "uvx") or ENVIRONMENT.match(program):
+    if program in ("pytest", "uvx") or ENVIRONMENT.match(program):
         return None
-    elif program.startswith("deploy/"):
+    if program.startswith("deploy/"):
         return None if (ROOT / program).is_file() else "no such file"
-    elif program not in SYSTEM:
+    if program not in SYSTEM:
         return "not a known program: add it to SYSTEM, or mark the block as text"
     return None
 
@@ -97,6 +109,7 @@ def test_every_block_has_a_command() -> None:
         ["marey", "no-such-command"],
         ["marey", "convert", "a.npz"],
         ["marey", "submit", "--seed", "x", "a person walks"],
+        ["marey", "data", "prepare", "no-such-set", "set.zip", "-o", "prepared"],
         ["make", "no-such-target"],
         ["python", "-m", "marey.no_such_module"],
         ["frobnicate"],
