@@ -202,7 +202,7 @@ def test_the_residual_transformer_predicts_each_samples_own_level(compact: bool)
 
 def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
     texts = made_up_texts([2] * 6)
-    data = CaptionData.of(texts, [2] * 6, TINY.condition, CPU)
+    data = CaptionData.of(texts, [(2,)] * 6, TINY.condition, CPU)
     for k in range(12):
         g = graph(k % 4, (k % 4 > 0) * (k % 5))
         slots = g.slots(8, 16)
@@ -214,7 +214,7 @@ def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
 
 def test_text_statistics_weigh_a_string_by_how_often_it_occurs() -> None:
     texts = made_up_texts([2] * 6)
-    data = CaptionData.of(texts, [2] * 6, TINY.condition, CPU)
+    data = CaptionData.of(texts, [(2,)] * 6, TINY.condition, CPU)
     mean, std = data.statistics(range(6), TINY.condition)
     rows = texts.strings[texts.node_string[texts.node_level == 1]].astype("f8")
     torch.testing.assert_close(mean[ACTION], torch.from_numpy(rows.mean(0)).float(), atol=1e-5, rtol=1e-4)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from marey.data.manifest import Clip, Measured
-from marey.data.sampling import classes_of, sampling_weights
+from marey.data.sampling import author_table, classes_of, draw_captions, sampling_weights
 from marey.training.tokenizing import SHARES, tokenizer_weights
 
 STILL = Measured(seconds=1, path=0, turn=0, speed=0, steps=0, side="")
@@ -74,3 +75,12 @@ def test_sets_with_a_share_have_it_and_all_others_the_rest() -> None:
     assert weights[2:].sum() == pytest.approx(1 - share - other)
     longer = tokenizer_weights([clip("walk", length=25), clip("walk", length=100)])
     assert longer[1] / longer[0] == pytest.approx(2)
+
+
+def test_a_caption_is_drawn_by_author_first_and_then_among_the_authors_own() -> None:
+    authors = author_table([(1, 3), (4,)])
+    draws = np.linspace(0, 1, 600, endpoint=False)
+    first = np.bincount(draw_captions(authors[[0] * 600], draws), minlength=4) / 600
+    assert first == pytest.approx([1 / 2, 1 / 6, 1 / 6, 1 / 6])
+    # one author: the number that it would be without authors
+    assert (draw_captions(authors[[1] * 600], draws) == np.floor(draws * 4)).all()

@@ -41,7 +41,7 @@ def folder(tmp_path: Path) -> Path:
 def test_a_folder_that_describes_itself_is_read(folder: Path) -> None:
     pack = pack_set(CaptureSet.own(folder), processes=1)
     assert [clip.id for clip in pack.clips] == ["a", "b@30"]
-    assert pack.clips[0].captions == ("a person walks", "someone walks")
+    assert pack.clips[0].captions == (("a person walks", "someone walks"),)
     assert pack.clips[1].frames == 20  # of 30 at 30 frames a second
     assert pack.terms == (CaptureSet.own(folder).dataset.terms,)
     assert pack.left_out["b@0"] == "not to be used"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from marey.core.errors import Conflict, InvalidInput
 from marey.core.hashing import sha256_of
 from marey.data import manifest as names
+from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COUNTS, compose
 from marey.data.describe import ACTS, Facts, describe, describe_text
@@ -131,28 +132,35 @@ def _lengthened(
 ) -> tuple[PackClip, NDArray[np.float32]]:
     """The clip with travel where it is a gait on the spot, and no shorter than it can be made; see `lengthen`. Sets
     with fixed splits are left as they are."""
-    cyclic = clip.in_place
+    cyclic = clip.in_place and not _ONCE.search(clip.facts)
     if clip.in_place and (moved := travelling(joints)) is not None:
         joints = moved.astype(np.float32)
-        clip = replace(clip, in_place=False, facts=_said_to_travel(clip.facts))
+        clip = replace(_said(clip, wording.travelling), in_place=False)
     if not clip.source or len(joints) > SHORT:
         return clip, joints
     if (cyclic or clip.content == IDLE) and closes(joints):
-        return clip, repeated(joints).astype(np.float32)
+        return _said(clip, wording.repeated), repeated(joints).astype(np.float32)
     made = between_idles(joints, idles.get((clip.dataset, clip.split), ()), clip.id)
     return clip, joints if made is None else made.astype(np.float32)
 
 
-def _said_to_travel(facts: str) -> str:
-    return re.sub(r",? ?\b(in place|on the spot)\b", "", facts).strip(" ,")
+_ONCE = re.compile(r"\b(once|twice|one (shot|blow))\b")
+
+
+def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
+    """The clip with what is said of it changed; what cannot be changed is left out."""
+    changed = (tuple(new for text in said if (new := change(text))) for said in clip.captions)
+    return replace(clip, facts=change(clip.facts) or "", captions=tuple(said for said in changed if said))
 
 
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
     """Facts of a clip: captions of its index, or the caption grammar where that knows the action."""
     if clip.captions or content not in ACTS:
         seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
-        said = clip.captions or (seen,)
-        return describe_text(tuple(map(swap_sides, said)) if mirrored else said, joints, FPS)
+        authors = clip.captions or ((seen,),)
+        if mirrored:
+            authors = tuple(tuple(map(wording.mirrored, said)) for said in authors)
+        return describe_text(authors, joints, FPS)
     return describe(content, clip.style, joints, FPS)
 
 
@@ -231,6 +239,7 @@ class FolderWriter:
                     side=acts[0].side,
                 ),
                 captions=captions(acts, name, phrasings(acts, spliced=bool(spliced))),
+                authors=tuple(map(len, acts[0].text)),
                 seams=seams,
                 act_captions=tuple(
                     captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(acts) if len(acts) > 1
@@ -304,6 +313,7 @@ class FolderWriter:
             lengths={split: dict(sorted(counts.items())) for split, counts in lengths.items()},
             kinds=dict(sorted(kinds.items())),
             captions=len({text for clip in self.clips for text in clip.captions}),
+            caption_files={name: sha256 for pack in packs for name, sha256 in pack.caption_files.items()},
             left_out=dict(sorted(left_out.items())),
             compositional_pairs=tuple(sorted(held_out_pairs(packs))),
             files={

@@ -235,7 +235,7 @@ def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ..
         count: how many.
     """
     if parts[0].text:
-        return parts[0].text
+        return tuple(text for said in parts[0].text for text in said)
     rng = seeded("captions", seed)
     out: dict[str, None] = {}
     wanted = count

@@ -59,7 +59,7 @@ class Facts:
         side: left, right, both, or empty.
         gait, hands, lean: what was measured; lean is the deepest forward lean over the standing one, degrees.
         repeats: how often the action is done (a spliced loop of raises, for instance).
-        text: a caption of the source's own, where it has one.
+        text: captions of the source's own, of each author, where it has any.
     """
 
     act: str
@@ -69,7 +69,7 @@ class Facts:
     hands: tuple[Hand, Hand]
     lean: float
     repeats: int = 1
-    text: tuple[str, ...] = ()
+    text: tuple[tuple[str, ...], ...] = ()
 
 
 def measure(joints: NDArray[np.floating], fps: float) -> tuple[Gait, tuple[Hand, Hand], float]:
@@ -131,7 +131,7 @@ FREE_TEXT = "cmu"
 """Action of a clip whose captions are its own, and not of the caption grammar."""
 
 
-def describe_text(captions: tuple[str, ...], joints: NDArray[np.floating], fps: float) -> Facts:
-    """Facts of a clip that has captions of its own."""
+def describe_text(captions: tuple[tuple[str, ...], ...], joints: NDArray[np.floating], fps: float) -> Facts:
+    """Facts of a clip that has captions of its own, of each author."""
     walked, hands, bend = measure(joints, fps)
     return Facts(FREE_TEXT, "normal", "", walked, hands, bend, text=captions)

@@ -65,6 +65,8 @@ class Manifest(BaseModel):
     kinds: dict[str, int]
     """captured, mirrored, looped, spliced."""
     captions: int
+    caption_files: dict[str, str] = {}
+    """Files with captions by people, as `set/captions-author.csv`, with the sha256 of each."""
     left_out: dict[str, str]
     """Captured clips that are not used, each with the reason."""
     compositional_pairs: tuple[tuple[str, str], ...]
@@ -95,7 +97,8 @@ class Clip(BaseModel):
     `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
     its first part. `acts` are the actions in order, as the caption grammar calls them, `sides` the measured side of
     each: left, right, both, or empty. Where several actions were joined, `seams` are the first frames of all but the
-    first action, and `act_captions` say each action alone.
+    first action, and `act_captions` say each action alone. `authors` counts the captions of each author, in their
+    order; empty: all by one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -114,5 +117,6 @@ class Clip(BaseModel):
     sides: tuple[str, ...] = ()
     measured: Measured
     captions: tuple[str, ...]
+    authors: tuple[int, ...] = ()
     seams: tuple[int, ...] = ()
     act_captions: tuple[str, ...] = ()

@@ -22,7 +22,7 @@ from marey.data.licences import Terms
 
 MAX_BYTES = 8 * 2**30
 """A day of motion takes 1.5 GB."""
-FORMAT = "marey-joints-pack-2"
+FORMAT = "marey-joints-pack-3"
 SPLITS = ("train", "val", "test", "compositional")
 
 
@@ -37,7 +37,8 @@ class PackClip:
         split: train, val, test or compositional; empty: made by source when the data are built.
         start, frames: its rows in the pack.
         source: the independent capture that it comes from.
-        captions, side, in_place, facts: see `marey.data.index.Row`.
+        captions: true sentences about it, of each author.
+        side, in_place, facts: see `marey.data.index.Row`.
         tier, licence, credit: its own terms; empty where they are those of the set.
     """
 
@@ -49,7 +50,7 @@ class PackClip:
     start: int
     frames: int
     source: str = ""
-    captions: tuple[str, ...] = ()
+    captions: tuple[tuple[str, ...], ...] = ()
     side: str = ""
     in_place: bool = False
     facts: str = ""
@@ -66,6 +67,7 @@ class JointsPack:
         clips: in the order of the rows.
         terms: of each set that they come from.
         left_out: clips of the index that are not here, each with the reason.
+        caption_files: files that captions came from, as `set/captions-author.csv`, with the sha256 of each.
         local: (N, 21, 3) float16, joints 1 to 21 relative to the root, metres.
         root: (N, 3) float32 metres.
     """
@@ -75,6 +77,7 @@ class JointsPack:
     root: NDArray[np.float32]
     terms: tuple[Terms, ...] = ()
     left_out: Mapping[str, str] = field(default_factory=dict[str, str])
+    caption_files: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def joints(self, clip: PackClip) -> NDArray[np.float32]:
         """(T, 22, 3) metres."""
@@ -99,6 +102,7 @@ class JointsPack:
         clips: list[tuple[PackClip, NDArray[np.float32]]],
         terms: Sequence[Terms] = (),
         left_out: Mapping[str, str] | None = None,
+        caption_files: Mapping[str, str] | None = None,
     ) -> JointsPack:
         """Pack clips with their joints (T, 22, 3); `start` and `frames` are set here."""
         table, start = [], 0
@@ -107,12 +111,13 @@ class JointsPack:
             start += len(joints)
         halves = [split_root(joints) for _, joints in clips]
         local, root = np.concatenate([h[0] for h in halves]), np.concatenate([h[1] for h in halves])
-        return cls(tuple(table), local, root, tuple(terms), dict(left_out or {}))
+        return cls(tuple(table), local, root, tuple(terms), dict(left_out or {}), dict(caption_files or {}))
 
     def save(self, path: Path) -> None:
         """Write one compressed npz, complete or not at all."""
         terms, clips = ([asdict(entry) for entry in entries] for entries in (self.terms, self.clips))
-        table = json.dumps({"format": FORMAT, "terms": terms, "left_out": self.left_out, "clips": clips})
+        about = {"left_out": self.left_out, "caption_files": self.caption_files}
+        table = json.dumps({"format": FORMAT, "terms": terms, **about, "clips": clips})
         temporary = path.with_name(path.name + ".part")
         with temporary.open("wb") as file:
             np.savez_compressed(file, local=self.local, root=self.root, table=np.array(table))
@@ -137,7 +142,9 @@ class JointsPack:
         try:
             clips = TypeAdapter(tuple[PackClip, ...]).validate_python(table.get("clips"))
             terms = TypeAdapter(tuple[Terms, ...]).validate_python(table.get("terms"))
-            left_out = TypeAdapter(dict[str, str]).validate_python(table.get("left_out"))
+            left_out, caption_files = (
+                TypeAdapter(dict[str, str]).validate_python(table.get(name)) for name in ("left_out", "caption_files")
+            )
         except ValidationError as error:
             raise InvalidFile(f"not a joints pack: {error.errors()[0]['msg']}", where=where) from error
         rows = 0
@@ -147,7 +154,7 @@ class JointsPack:
             rows += clip.frames
         local = check_array(arrays["local"], "local", where, kinds="float16", shape=(rows, 21, 3))
         root = check_array(arrays["root"], "root", where, kinds="float32", shape=(rows, 3))
-        return cls(clips, local, root, terms, left_out)
+        return cls(clips, local, root, terms, left_out, caption_files)
 
 
 def split_root(joints: NDArray[np.floating]) -> tuple[NDArray[np.float16], NDArray[np.float32]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.archive import bvh_files
+from marey.data.caption_files import CaptionFile, read_caption_files
 from marey.data.dataset import DATASET, INDEX, SETS, Dataset, known_set, read_dataset
 from marey.data.floor import on_floor
 from marey.data.index import UNUSED, Row, read_index
@@ -34,23 +35,32 @@ class CaptureSet:
     path: Path
     dataset: Dataset
     rows: tuple[Row, ...]
+    caption_files: tuple[CaptionFile, ...] = ()
 
     @classmethod
     def known(cls, name: str, path: Path) -> CaptureSet:
-        """A known set, in an archive or folder; its index is the one described here, or the folder's own.
+        """A known set, in an archive or folder; its index with the captions beside it is the one described here, or the
+        folder's own.
 
         Raises:
-            NotFound, InvalidFile: no such set, or no index.
+            NotFound, InvalidFile: no such set, or no index; a broken caption file.
         """
         dataset = known_set(name)
         own = SETS / name / INDEX
         if own.is_file():
-            return cls(path, dataset, read_index(own, dataset.model_copy(update={"columns": {}})))
-        return cls(path, dataset, read_index(path / INDEX, dataset))
+            rows = read_index(own, dataset.model_copy(update={"columns": {}}))
+            return cls(path, dataset, rows, read_caption_files(own.parent, rows))
+        rows = read_index(path / INDEX, dataset)
+        return cls(path, dataset, rows, read_caption_files(path, rows))
+
+    def captions_of(self, row: Row) -> tuple[tuple[str, ...], ...]:
+        """Captions of a row by each author; those of the index come first, as one author's."""
+        authors = (row.captions, *(file.captions.get(row.id, ()) for file in self.caption_files))
+        return tuple(said for said in authors if said)
 
     @classmethod
     def own(cls, folder: Path) -> CaptureSet:
-        """A folder with its own `dataset.toml` and `index.csv`.
+        """A folder with its own `dataset.toml`, `index.csv` and, where there are any, `captions-*.csv`.
 
         Raises:
             NotFound, InvalidFile: one of them is missing or broken.
@@ -62,7 +72,8 @@ class CaptureSet:
                 hint="Write one: docs/tutorials/train-your-own.md has an example.",
             )
         dataset = read_dataset(folder / DATASET)
-        return cls(folder, dataset, read_index(folder / INDEX, dataset))
+        rows = read_index(folder / INDEX, dataset)
+        return cls(folder, dataset, rows, read_caption_files(folder, rows))
 
 
 def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | None = None) -> JointsPack:
@@ -95,7 +106,7 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
             if len(piece) < LEAST_FRAMES:
                 left_out[row.id] = f"fewer than {LEAST_FRAMES} frames"
             else:
-                clips.append((_clip(row, dataset), piece))
+                clips.append((_clip(row, captures), piece))
         if progress:
             progress(len(done), len(rows))
     if missing := sorted(rows.keys() - done):
@@ -105,20 +116,25 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
         )
     if not clips:
         raise InvalidInput("no clip is left", where=str(captures.path))
-    return JointsPack.of(sorted(clips, key=lambda pair: pair[0].id), [dataset.terms], left_out)
+    return JointsPack.of(
+        sorted(clips, key=lambda pair: pair[0].id),
+        [dataset.terms],
+        left_out,
+        {f"{dataset.name}/{file.name}": file.sha256 for file in captures.caption_files},
+    )
 
 
-def _clip(row: Row, dataset: Dataset) -> PackClip:
+def _clip(row: Row, captures: CaptureSet) -> PackClip:
     return PackClip(
         id=row.id,
-        dataset=dataset.name,
+        dataset=captures.dataset.name,
         content=row.action,
         style=row.style,
         split=row.split,
         start=0,
         frames=0,
         source=row.source,
-        captions=row.captions,
+        captions=captures.captions_of(row),
         side=row.side,
         in_place=row.in_place,
         facts=row.facts,

@@ -76,8 +76,8 @@ class PreparedData:
 
     @property
     def sha256(self) -> str:
-        """Hash of the manifest, which names every file's."""
-        return hashlib.sha256(self.manifest.model_dump_json().encode()).hexdigest()
+        """Hash of the manifest, which names every file's; fields that it does not have leave it as it was."""
+        return hashlib.sha256(self.manifest.model_dump_json(exclude_unset=True).encode()).hexdigest()
 
     @property
     def layout(self) -> FeatureLayout:
@@ -85,9 +85,9 @@ class PreparedData:
         return layout(self.manifest.layout)
 
     @property
-    def caption_counts(self) -> list[int]:
-        """Captions of each whole clip."""
-        return [len(clip.captions) for clip in self.clips]
+    def caption_counts(self) -> list[tuple[int, ...]]:
+        """How many captions each whole clip has by each author."""
+        return [clip.authors or (len(clip.captions),) for clip in self.clips]
 
     @cached_property
     def _by_split(self) -> dict[str, tuple[Clip, ...]]:
@@ -198,6 +198,8 @@ def _check_clips(clips: tuple[Clip, ...], manifest: Manifest, path: Path) -> Non
     for number, clip in enumerate(clips, start=1):
         if (clip.start, clip.joints_start) != (frame, row) or clip.length < 1 or clip.split not in SPLITS:
             raise InvalidFile("clips do not fit the arrays", where=f"{path}:{number}")
+        if clip.authors and sum(clip.authors) != len(clip.captions):
+            raise InvalidFile("captions and their authors differ in number", where=f"{path}:{number}")
         if not all(0 <= seam <= clip.length for seam in clip.seams):
             raise InvalidFile("seams do not lie within the clip", where=f"{path}:{number}")
         frame, row = frame + clip.length, row + clip.length + 1

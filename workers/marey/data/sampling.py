@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,32 @@ def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
             weights[k] += per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
         weights[k] *= ACT_WEIGHT.get(clip.acts[0], 1.0)
     return weights / weights.sum() if len(weights) else weights
+
+
+def draw_captions(authors: NDArray[np.int64], draws: NDArray[np.floating]) -> NDArray[np.int64]:
+    """A caption of each clip, every author alike, and every caption of an author alike.
+
+    Args:
+        authors: (B, A) captions of each author, in their order, 0 beyond the last; each row has at least one.
+        draws: (B,) random numbers in 0 … 1.
+
+    Returns:
+        (B,) its number among all captions of the clip.
+    """
+    scaled = draws * (authors > 0).sum(axis=1)
+    author = np.floor(scaled).astype(np.int64)
+    rows = np.arange(len(authors))
+    before = np.cumsum(authors, axis=1) - authors
+    return before[rows, author] + np.floor((scaled - author) * authors[rows, author]).astype(np.int64)
+
+
+def author_table(counts: Iterable[Sequence[int]]) -> NDArray[np.int64]:
+    """Captions of each author (C, A) for each clip, 0 beyond a clip's last author."""
+    counts = list(counts)
+    table = np.zeros((len(counts), max(map(len, counts), default=1)), np.int64)
+    for row, own in zip(table, counts, strict=True):
+        row[: len(own)] = own
+    return table
 
 
 def classes_of(clip: Clip) -> tuple[str, ...]:

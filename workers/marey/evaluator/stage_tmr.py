@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.core.errors import InvalidFile, InvalidInput
-from marey.data.sampling import sampling_weights
+from marey.data.sampling import author_table, draw_captions, sampling_weights
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.losses import divergences, info_nce, latent_distance, reconstruction
@@ -56,6 +56,7 @@ class TMRStage:
         self.config = config
         self.optimisation = config.train_tmr
         self.clips = data.prepared.clips
+        self.authors = author_table(data.prepared.caption_counts)
         device = data.features.device
         self.data = dataclasses.replace(data, features=data.features[:, : config.inputs].clone())
         self.captions = CaptionStates(encoder, device)
@@ -88,8 +89,8 @@ class TMRStage:
         """Return the loss of one batch, each clip with a random caption."""
         size = self.optimisation.batch
         clips: NDArray[np.int64] = context.rng.choice(self.train, size=size, p=self.weights)
-        own = [self.clips[int(i)].captions for i in clips]
-        said = [texts[int(draw * len(texts))] for texts, draw in zip(own, context.rng.random(size), strict=True)]
+        chosen = draw_captions(self.authors[clips], context.rng.random(size))
+        said = [self.clips[int(i)].captions[k] for i, k in zip(clips, chosen, strict=True)]
         terms = self._terms(self._batch(clips, said))
         return terms["loss"], {name: value.detach() for name, value in terms.items()}
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.core.errors import InvalidFile
+from marey.data.sampling import author_table, draw_captions
 from marey.training.texts import CaptionTexts
 
 
@@ -22,11 +23,13 @@ class SentenceData:
     strings: Tensor  # (U, W) float16
     sentence: Tensor  # (K,) int64: string of each caption
     first: NDArray[np.int64]  # (C,): captions of clip c begin there; those of its actions alone follow them
-    count: NDArray[np.int64]  # (C,): captions of the whole clip
+    authors: NDArray[np.int64]  # (C, A): captions of the whole clip by each author, 0 beyond its last
 
     @classmethod
-    def of_sentences(cls, texts: CaptionTexts, counts: Sequence[int], width: int, device: torch.device) -> SentenceData:
-        """Put the captions on a device; `counts` are those of each whole clip.
+    def of_sentences(
+        cls, texts: CaptionTexts, counts: Sequence[Sequence[int]], width: int, device: torch.device
+    ) -> SentenceData:
+        """Put the captions on a device; `counts` are those of each whole clip by each author.
 
         Raises:
             InvalidFile: texts of another encoder's width.
@@ -35,12 +38,17 @@ class SentenceData:
 
     def repeated(self, clips: NDArray[np.int64]) -> Self:
         """Return the same data with further clips that have the captions of clips (M,)."""
-        first, count = (np.concatenate([own, own[clips]]) for own in (self.first, self.count))
-        return replace(self, first=first, count=count)
+        first, authors = (np.concatenate([own, own[clips]]) for own in (self.first, self.authors))
+        return replace(self, first=first, authors=authors)
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Captions (C,) of each whole clip."""
+        return self.authors.sum(axis=1)
 
     def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
-        """Draw one caption of each clip (B,)."""
-        chosen = self.first[clips] + np.floor(rng.random(len(clips)) * self.count[clips]).astype(np.int64)
+        """Draw one caption of each clip (B,): first an author, then one of the author's."""
+        chosen = self.first[clips] + draw_captions(self.authors[clips], rng.random(len(clips)))
         return torch.from_numpy(chosen).to(self.sentence.device)
 
     def sentences(self, captions: Tensor) -> Tensor:
@@ -49,11 +57,14 @@ class SentenceData:
 
     def captions_of(self, clips: Sequence[int]) -> Tensor:
         """Return all captions of some whole clips."""
-        rows = np.concatenate([self.first[c] + np.arange(self.count[c]) for c in clips])
+        count = self.count
+        rows = np.concatenate([self.first[c] + np.arange(count[c]) for c in clips])
         return torch.from_numpy(rows).to(self.sentence.device)
 
 
-def sentence_fields(texts: CaptionTexts, counts: Sequence[int], width: int, device: torch.device) -> dict[str, Any]:
+def sentence_fields(
+    texts: CaptionTexts, counts: Sequence[Sequence[int]], width: int, device: torch.device
+) -> dict[str, Any]:
     """Return the fields of `SentenceData`, validated."""
     if texts.strings.shape[1] != width:
         raise InvalidFile(
@@ -65,7 +76,7 @@ def sentence_fields(texts: CaptionTexts, counts: Sequence[int], width: int, devi
         "strings": torch.from_numpy(np.asarray(texts.strings)).to(device),
         "sentence": torch.from_numpy(whole.astype(np.int64)).to(device),
         "first": np.asarray(texts.first[:-1], np.int64),
-        "count": np.asarray(counts, np.int64),
+        "authors": author_table(counts),
     }
 
 

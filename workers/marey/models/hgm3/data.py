@@ -24,9 +24,9 @@ class CaptionData(SentenceData):
 
     @classmethod
     def of(
-        cls, texts: CaptionTexts, counts: Sequence[int], config: ConditionConfig, device: torch.device
+        cls, texts: CaptionTexts, counts: Sequence[Sequence[int]], config: ConditionConfig, device: torch.device
     ) -> CaptionData:
-        """Put the captions' graphs into slots; `counts` are captions of each whole clip.
+        """Put the captions' graphs into slots; `counts` are captions of each whole clip by each author.
 
         Raises:
             InvalidFile: texts of another encoder's width.

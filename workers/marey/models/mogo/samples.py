@@ -142,7 +142,7 @@ class Samples:
         """Return captions (N,) of all actions of some clips, and the frames (N,) of each action."""
         said: list[tuple[int, int]] = []
         for clip in clips.tolist():
-            first, count = int(self.captions.first[clip]), int(self.captions.count[clip])
+            first, count = int(self.captions.first[clip]), int(self.captions.authors[clip].sum())
             edges = [0, *self.clips[clip].seams, int(self.lengths[clip])]
             actions = np.diff(edges).tolist()
             if len(actions) > 1:
@@ -171,11 +171,13 @@ class Samples:
         about, length = self.clips[clip], int(self.lengths[clip])
         if not about.seams:
             return [0, length], [self._caption(clip, rng)]
-        own = int(self.captions.first[clip] + self.captions.count[clip])
+        own = int(self.captions.first[clip] + self.captions.authors[clip].sum())
         return [0, *about.seams, length], [own + action for action in range(len(about.seams) + 1)]
 
     def _caption(self, clip: int, rng: np.random.Generator) -> int:
-        return int(self.captions.first[clip] + rng.integers(self.captions.count[clip]))
+        authors = self.captions.authors[clip]
+        author = rng.integers(np.count_nonzero(authors))
+        return int(self.captions.first[clip] + authors[:author].sum() + rng.integers(authors[author]))
 
     def _cut(self, whole: TokenSpan, rng: np.random.Generator) -> TokenSpan:
         """Crop some spans, and cut all to the longest length."""

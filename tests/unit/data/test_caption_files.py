@@ -1,0 +1,79 @@
+"""`captions-*.csv` beside an index: several authors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from marey.core.errors import InvalidFile
+from marey.core.hashing import sha256_of
+from marey.data.build import build
+from marey.data.caption_files import read_caption_files
+from marey.data.dataset import DATASET, INDEX, SETS
+from marey.data.index import UNUSED, Row, parse_index
+from marey.data.pack import JointsPack
+from marey.data.prepare import CaptureSet, pack_set
+from marey.data.prepared import PreparedData
+from tests.support.bodies import bandai_bvh, walker
+
+STUDIO = (SETS / "bandai-namco" / DATASET).read_text().replace('"bandai-namco"', '"studio"', 1)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    out = tmp_path / "studio"
+    out.mkdir()
+    (out / "a.bvh").write_bytes(bandai_bvh(walker(4.0)))
+    (out / DATASET).write_text(STUDIO)
+    (out / INDEX).write_text("file,start,end,action,captions\na.bvh,0,90,walk,a person walks\na.bvh,90,100,none,\n")
+    (out / "captions-x.csv").write_text('id,captions\na@0,"left foot first, walk | walk ahead"\na@90,stand\n')
+    (out / "captions-y.csv").write_text("id,captions\na@0,Someone walks.\n")
+    return out
+
+
+def test_captions_of_all_authors_join_those_of_the_index_and_the_manifest_names_them(folder: Path) -> None:
+    pack = pack_set(CaptureSet.own(folder), processes=1)
+    assert pack.clips[0].captions == (
+        ("a person walks",),
+        ("left foot first, walk", "walk ahead"),
+        ("Someone walks.",),
+    )
+    pack.save(folder / "pack.npz")
+    build([JointsPack.load(folder / "pack.npz")], folder / "out")
+    data = PreparedData.open(folder / "out")
+    files = ("captions-x.csv", "captions-y.csv")
+    assert data.manifest.caption_files == {f"studio/{name}": sha256_of(folder / name) for name in files}
+    captured, mirrored = data.clips
+    assert captured.authors == mirrored.authors == (1, 2, 1)
+    assert captured.captions[1] == "left foot first, walk"
+    assert mirrored.captions[1] == "right foot first, walk"
+    assert data.caption_counts == [(1, 2, 1)] * 2
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("id,captions\na@0,walk\nb,walk\n", r"x\.csv, line 3: the index has no clip 'b'"),
+        ("id,captions\na@0,walk\na@0,go\n", "line 3: 'a@0' has a line already"),
+        ("id,captions\na@0, | \n", "line 2: says nothing"),
+        ("id,captions\na@0,walk,slowly\n", "line 2: has not as many cells"),
+        ("clip,captions\na@0,walk\n", "its header is not id,captions"),
+    ],
+)
+def test_a_broken_caption_file_is_refused_with_its_line(folder: Path, text: str, says: str) -> None:
+    (folder / "captions-x.csv").write_text(text)
+    with pytest.raises(InvalidFile, match=says):
+        CaptureSet.own(folder)
+
+
+def rows_of(name: str) -> tuple[Row, ...]:
+    return parse_index((SETS / name / INDEX).read_text(encoding="utf-8"), {}, name)
+
+
+@pytest.mark.parametrize("name", sorted({path.parent.name for path in SETS.glob("*/captions-*.csv")}))
+def test_every_author_of_a_known_set_captioned_every_clip_that_is_used(name: str) -> None:
+    rows = rows_of(name)
+    used = {row.id for row in rows if row.action != UNUSED}
+    files = read_caption_files(SETS / name, rows)
+    assert {file.name: used - file.captions.keys() for file in files} == {file.name: set() for file in files}
