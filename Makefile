@@ -80,7 +80,7 @@ lock: $(STAMP) ## Write the locks and docs/reference/dependencies.md anew
 	$(COMPILE) --extra server pyproject.toml -o requirements/server.lock
 	for extra in worker dev; do \
 	  $(COMPILE) --extra $$extra --override requirements/overrides.txt pyproject.toml requirements/torch-deps.in \
-	    requirements/encoder.in -o requirements/$$extra.lock; \
+	    -o requirements/$$extra.lock; \
 	done
 	$(BIN)/pip install -q --no-deps --require-hashes -r requirements/dev.lock
 	$(BIN)/python -m requirements.dependencies docs/reference/dependencies.md

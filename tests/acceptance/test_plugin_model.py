@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from marey.motion.clip import load_npz
-from tests.support.marey import REPOSITORY, Marey, serving
+from tests.support.marey import Marey, serving
+from tests.support.models import add_text_bundles
 from tests.support.plugin_wheels import install_plugin
 from tests.support.prepared import write_prepared
 
@@ -30,7 +31,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
     output = folder / "models" / BUNDLE
     made = marey("train", "sway", "bundle", data, "--run", folder / "run", "-o", output, "--side", "right").ok()
     assert made.out.startswith(f"{BUNDLE}@")
-    shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "models" / "srl-light")
+    add_text_bundles(folder / "models")
     yield marey
     shutil.rmtree(home, ignore_errors=True)
 

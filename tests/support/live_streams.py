@@ -25,8 +25,7 @@ from marey.streams.control import START, ControlQueue, StreamControl
 from marey.streams.frames import Frame, encode_frame
 from marey.streams.redis import FrameStream
 from marey.streams.rewrites import PromptRewrite
-from tests.support.marey import REPOSITORY
-from tests.support.models import random_bundle, streaming_model
+from tests.support.models import add_text_bundles, random_bundle, streaming_model
 
 JOINTS = 22
 BUNDLE = "streamer-paperclip"
@@ -38,7 +37,7 @@ def add_streamer(config: Settings) -> None:
     """A bundle that can stream, for an API that has none: `BUNDLE`, of random weights."""
     if not (config.models / BUNDLE).exists():
         model = streaming_model()
-        (config.models / "srl-light").symlink_to(REPOSITORY / "models" / "srl-light")
+        add_text_bundles(config.models)
         random_bundle(model, config.models / BUNDLE)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -22,7 +21,7 @@ from marey.client.place import read_server
 from marey.client.transport import Transport
 from marey.core import defaults
 from marey.registry import model_names
-from tests.support.models import random_bundle
+from tests.support.models import add_text_bundles, random_bundle
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MIGRATIONS = REPOSITORY / "migrations" / "marey" / "migrations"
@@ -159,10 +158,10 @@ def serving(marey: Marey) -> Iterator[Serving]:
 
 
 def tiny_models(folder: Path) -> Path:
-    """A folder of models: a bundle of random weights of each, and the labeller that comes with the product."""
+    """A folder of models: a bundle of random weights of each, and what reads prompts."""
     for model in model_names():
         random_bundle(model, folder / tiny(model))
-    shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "srl-light")
+    add_text_bundles(folder)
     return folder
 
 

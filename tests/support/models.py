@@ -5,6 +5,7 @@ A test of one model lies in `tests/models/<model>`.
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from marey.registry import get_model, model_names, resolve, streaming_models
 
 STARTERS = tuple(f"{name}-starter" for name in model_names())
 """The shipped bundles, by name."""
+TEXT_BUNDLES = ("minilm-l6", "srl-light")
+"""The shipped bundles that read prompts."""
 OTHERS = tuple(name for name in model_names() if name != defaults.MODEL)
 """The models that are not the default."""
 
@@ -36,6 +39,13 @@ def is_of(model: str, name: str) -> bool:
             f"benchmarks/bench_{model}_",
         )
     )
+
+
+def add_text_bundles(folder: Path) -> None:
+    """Copy the encoder and the labeller of the product into a folder of bundles."""
+    models = Path(__file__).resolve().parents[2] / "models"
+    for name in TEXT_BUNDLES:
+        shutil.copytree(models / name, folder / name)
 
 
 def random_bundle(model: str, path: Path, **options: Any) -> Bundle:

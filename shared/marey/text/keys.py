@@ -60,9 +60,9 @@ def resolve(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
     """
     changes: dict[str, str] = {}
     if spec.encoder_sha256 is None:
-        from marey.text.encoders import find_weights, weights_sha256
+        from marey.text.encoders import encoder_sha256
 
-        changes["encoder_sha256"] = weights_sha256(find_weights(spec.encoder, config=config))
+        changes["encoder_sha256"] = encoder_sha256(spec.encoder, config=config)
     if spec.labeller_sha256 is None and spec.labeller != NO_LABELLER:
         bundle = find_bundle(labeller_bundle(spec.labeller), config=config, verify=False)
         changes["labeller_sha256"] = bundle.weights_sha256

@@ -7,7 +7,6 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -17,8 +16,7 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle
 from marey.nn.threads import one_thread
 from marey.text.bio import start_scores, transition_scores, viterbi
-from marey.text.encoders import weights_sha256
-from marey.text.fetching import need_weights
+from marey.text.encoders import find_encoder
 from marey.text.light_network import SUFFIX_BUCKETS, LightConfig, LightNetwork
 from marey.text.minilm import MiniLM
 from marey.text.roles import Frame, spans_to_arguments
@@ -45,27 +43,28 @@ class LightLabeller:
         self._decoder = Decoder(network.config.tags, network.transitions)
 
     @classmethod
-    def load(cls, bundle: Bundle, *, minilm: Path | None = None) -> LightLabeller:
-        """Load the head of `bundle` on MiniLM from `minilm` (None = the installed one; fetched if missing).
+    def load(cls, bundle: Bundle) -> LightLabeller:
+        """Load the head of `bundle` on the installed MiniLM.
 
         Raises:
             InvalidBundle: the head is damaged, or was trained on another MiniLM.
+            NotFound: MiniLM is not installed.
         """
-        folder = minilm or need_weights("minilm")
+        minilm = find_encoder("minilm")
         parameters = dict(bundle.manifest.parameters)
         expected = parameters.pop("minilm_sha256", None)
-        if expected != weights_sha256(folder):
+        if expected != minilm.weights_sha256:
             raise InvalidBundle(
-                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on the installed one",
-                where=str(folder),
-                hint="Remove that one, then run `marey models fetch minilm`.",
+                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on {minilm.reference}",
+                where=str(minilm.path),
+                hint="Install the bundles of one release together.",
             )
         try:
             config = light_config(parameters)
             network = LightNetwork(config)
             network.load_state_dict(_tensors(bundle, "labeller"))
             updates = _tensors(bundle, UPDATES) if UPDATES in bundle.manifest.parts else None
-            states = WordStates(folder, config.layers, updates)
+            states = WordStates(minilm, config.layers, updates)
         except (TypeError, RuntimeError, KeyError) as error:
             raise InvalidBundle(f"its weights do not fit: {error}", where=str(bundle.path)) from error
         return cls(network, states, bundle.weights_sha256)
@@ -122,8 +121,10 @@ class Decoder:
 class WordStates:
     """Hidden states of int8 MiniLM, with `updates` as it takes them, for the words of a sentence."""
 
-    def __init__(self, folder: Path, layers: Sequence[int], updates: Mapping[str, torch.Tensor] | None = None) -> None:
-        self._minilm = MiniLM(folder, int8=True, updates=updates)
+    def __init__(
+        self, minilm: Bundle, layers: Sequence[int], updates: Mapping[str, torch.Tensor] | None = None
+    ) -> None:
+        self._minilm = MiniLM(minilm, int8=True, updates=updates)
         self._layers = list(layers)
         self._first, self._last = self._minilm.tokenizer.encode("").ids  # [CLS], [SEP]
         self._pieces = lru_cache(CACHED_WORDS)(self._find_pieces)

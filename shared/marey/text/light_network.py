@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from marey.nn.compiled import compiled
-from marey.text.minilm import WIDTH as STATE_WIDTH
+from marey.text.minilm_bundle import WIDTH as STATE_WIDTH
 
 SUFFIX_BUCKETS = 1024
 SUFFIXES = 2  # of two and three letters

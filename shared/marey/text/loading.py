@@ -10,8 +10,7 @@ from pathlib import Path
 from marey.bundles import find_bundle
 from marey.core.errors import InvalidBundle, NotFound
 from marey.core.settings import settings
-from marey.text.encoders import WIDTHS, TextEncoder
-from marey.text.fetching import need_weights
+from marey.text.encoders import WIDTHS, TextEncoder, find_encoder, find_weights
 from marey.text.keys import NO_LABELLER, labeller_bundle
 from marey.text.labellers import NoLabeller
 from marey.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
@@ -19,21 +18,20 @@ from marey.text.roles import RoleLabeller
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
-    """Load the encoder `name` from `path`, or from where `need_weights` finds or fetches it.
+    """Load the encoder `name` from the folder `path`, or from where it is installed.
 
     Raises:
-        InvalidBundle: no such encoder.
-        NotFound: its weights are not installed and cannot be fetched.
-        Unreachable: the package index does not answer.
+        InvalidBundle: no such encoder, or its bundle is damaged.
+        NotFound: its weights are not installed.
         InvalidFile: they are another encoder's, damaged, or not safetensors.
     """
     if name not in WIDTHS:
         raise InvalidBundle(f"unknown text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
-    folder = path or need_weights(name)
     if name == "minilm":
         from marey.text.minilm_encoder import MiniLMEncoder
 
-        return MiniLMEncoder(folder)
+        return MiniLMEncoder(find_encoder(name, path))
+    folder = path or find_weights(name)
     if name == "clip-vit-b32":
         from marey.text.clip_encoder import ClipEncoder
 

@@ -1,9 +1,9 @@
 """The forward pass of MiniLM (Wang et al. 2020, arXiv 2002.10957; BERT's layers), written for short sentences.
 
 `transformers`' BertModel gives the same numbers, but takes twice as long at batch 1 (11 ms against 5.4 ms for 12
-words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`marey.nn.compiled`).
-It is the labeller's; node features come from the float32 one, since "left hand" and "right hand" lie closer together
-(cosine .9) than int8 is exact (cosine .98).
+words on one core) and two seconds to import. Int8 products take a third of that, compiled (`marey.nn.compiled`).
+They are the labeller's; node features come from float32 products of the same weights, since "left hand" and "right
+hand" lie closer together (cosine .9) than products in int8 are exact (cosine .98).
 
 Many texts go through one product of all their tokens (`last`), so that the weights are read once for all of them. On
 a CPU the float32 matrices are packed, and a token's bits do not depend on the texts beside it (`marey.nn.packed`).
@@ -13,25 +13,21 @@ from __future__ import annotations
 
 import itertools
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import torch
 import torch.nn.functional as F
-from safetensors import SafetensorError
-from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariableType]
-from tokenizers import Tokenizer
 from torch import Tensor, nn
 
-from marey.core.errors import InvalidFile
 from marey.nn.compiled import compiled
 from marey.nn.packed import PackedLinear, can_pack
+from marey.text.minilm_bundle import LAYERS, WIDTH, load_tokenizer, load_weights
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-WIDTH = 384
-LAYERS = 6
+    from marey.bundles import Bundle
+
 HEADS = 12
 MAX_TOKENS = 256  # sentence_bert_config.json
 EPS = 1e-12
@@ -41,19 +37,19 @@ class MiniLM:
     """all-MiniLM-L6-v2, frozen.
 
     Args:
-        folder: holds `model.safetensors` and `tokenizer.json`.
+        bundle: of `find_encoder("minilm")`.
         int8: dynamic int8 matrix products, weights per output channel.
         updates: added to matrices first: `<matrix>.up` (out, rank) times `<matrix>.down` (rank, in). In int8 inputs
             are divided by `<matrix>.smooth` (in,), where it is there, and the matrix multiplied: without that a
             few large features leave little of seven bits to the others (Xiao et al. 2022, arXiv 2211.10438).
 
     Raises:
-        InvalidFile: the folder holds something else.
+        InvalidBundle: it is damaged, or holds something else.
     """
 
-    def __init__(self, folder: Path, *, int8: bool = False, updates: Mapping[str, Tensor] | None = None) -> None:
-        self.tokenizer = load_tokenizer(folder / "tokenizer.json")
-        weights = _updated(_load(folder / "model.safetensors"), updates or {})
+    def __init__(self, bundle: Bundle, *, int8: bool = False, updates: Mapping[str, Tensor] | None = None) -> None:
+        self.tokenizer = load_tokenizer(bundle)
+        weights = _updated(load_weights(bundle), updates or {})
         self._words = weights["embeddings.word_embeddings.weight"]
         self._positions = (
             weights["embeddings.position_embeddings.weight"] + weights["embeddings.token_type_embeddings.weight"][0]
@@ -190,21 +186,6 @@ class _Int8Linear(nn.Module):
         return torch.ops.quantized.linear_dynamic(x, self.packed, True)
 
 
-def load_tokenizer(file: Path) -> Tokenizer:
-    """A `tokenizer.json`, without the padding and truncation that may be saved in it.
-
-    Raises:
-        InvalidFile: it is missing or foreign.
-    """
-    try:
-        tokenizer = Tokenizer.from_file(str(file))
-    except Exception as error:  # the library raises bare Exception
-        raise InvalidFile(f"is not a tokenizer: {error}", where=str(file), hint="Fetch the encoder again.") from error
-    tokenizer.no_padding()
-    tokenizer.no_truncation()
-    return tokenizer
-
-
 def _updated(weights: dict[str, Tensor], updates: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The weights with low-rank updates added to some of their matrices; raises KeyError where those do not fit."""
     matrices = [name.removesuffix(".up") for name in updates if name.endswith(".up")]
@@ -214,22 +195,3 @@ def _updated(weights: dict[str, Tensor], updates: Mapping[str, Tensor]) -> dict[
     }
     smooth = {name: vector for name, vector in updates.items() if name.endswith(".smooth")}
     return weights | changed | smooth
-
-
-def _load(file: Path) -> dict[str, Tensor]:
-    try:
-        weights = load_file(file)
-    except (SafetensorError, OSError) as error:
-        raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Fetch the encoder again.") from error
-    last = f"encoder.layer.{LAYERS - 1}.output.dense.weight"
-    if (
-        last not in weights
-        or weights[last].shape[0] != WIDTH
-        or f"encoder.layer.{LAYERS}.output.dense.weight" in weights
-    ):
-        raise InvalidFile(
-            f"is not MiniLM: {LAYERS} BERT layers of width {WIDTH} are expected",
-            where=str(file),
-            hint="The folder needs the files of sentence-transformers/all-MiniLM-L6-v2.",
-        )
-    return weights

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.bundles import Bundle
 from marey.nn.threads import one_thread
-from marey.text.encoders import WIDTHS, Encoding, weights_sha256
+from marey.text.encoders import WIDTHS, Encoding
 from marey.text.minilm import MAX_TOKENS, MiniLM
 
 MAX_TEXTS = 32
@@ -22,9 +22,9 @@ class MiniLMEncoder:
     name = "minilm"
     width = WIDTHS["minilm"]
 
-    def __init__(self, folder: Path) -> None:
-        self.sha256 = weights_sha256(folder)
-        self._model = MiniLM(folder)
+    def __init__(self, bundle: Bundle) -> None:
+        self.sha256 = bundle.weights_sha256
+        self._model = MiniLM(bundle)
 
     @one_thread()
     def encode(self, text: str) -> Encoding:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
-from marey.text.fetching import need_weights
-from marey.text.minilm import load_tokenizer
+from marey.text.encoders import find_encoder
+from marey.text.minilm_bundle import load_tokenizer
 from marey.text.words import one_slip
 
 MIN_LETTERS = 4
@@ -64,5 +64,5 @@ class Speller:
 
 @lru_cache(maxsize=1)
 def _dictionary() -> frozenset[str]:
-    vocabulary = load_tokenizer(need_weights("minilm") / "tokenizer.json").get_vocab()
+    vocabulary = load_tokenizer(find_encoder("minilm")).get_vocab()
     return frozenset(piece for piece in vocabulary if piece.isalpha())

@@ -18,8 +18,7 @@ from marey.motion.clip import load_npz
 from marey.motion.io.bvh import read_bvh
 from marey.registry import model_names
 from tests.support.evaluations import write_evaluator
-from tests.support.marey import REPOSITORY
-from tests.support.models import STARTERS, random_bundle
+from tests.support.models import STARTERS, TEXT_BUNDLES, add_text_bundles, random_bundle
 from tests.support.releases import Release, installed_release, wait_until
 from tests.support.wheels import Environment, bundles_wheel, make_environment, this_wheel
 
@@ -32,7 +31,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     for model, starter in zip(model_names(), STARTERS, strict=True):
         random_bundle(model, models / starter)
     write_evaluator(models, "evaluator-starter")
-    shutil.copytree(REPOSITORY / "models" / "srl-light", models / "srl-light")
+    add_text_bundles(models)
     bundles = [bundles_wheel(family, models, folder / family) for family in ("open", "starter")]
     return make_environment(folder / "environment", [this_wheel(tmp_path_factory), *bundles], borrow=True)
 
@@ -86,7 +85,7 @@ def test_a_server_makes_motions_and_pages_to_review_them(served: Release) -> Non
     served.run("review", line["job"], "-o", "review.html")
     assert "a person waves" in (served.folder / "review.html").read_text()
     checks = [json.loads(each) for each in served.run("doctor", "--json").splitlines()]
-    assert {*STARTERS, "evaluator-starter", "srl-light"} <= {
+    assert {*STARTERS, *TEXT_BUNDLES, "evaluator-starter"} <= {
         check["message"].partition("@")[0] for check in checks if check["name"] == "models"
     }
 

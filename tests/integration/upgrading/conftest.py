@@ -10,17 +10,27 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
+from marey.bundles import Bundle
+from marey.core.settings import Settings
+from marey.registry import model_names
+from marey.text.keys import resolve
 from tests.servers.ports import free_ports
-from tests.support.marey import tiny_models
+from tests.support.marey import tiny, tiny_models
 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Bundles of format 1, as the oldest of these releases wrote them."""
+    """Generators of format 1, as the oldest of these releases wrote them, with encoder and labeller of this one.
+
+    They name both by hash: an earlier release has no encoder of its own to look at.
+    """
     folder = tiny_models(tmp_path_factory.mktemp("models"))
-    for file in folder.glob("*/manifest.json"):
-        document = json.loads(file.read_text())
-        file.write_text(json.dumps({**document, "format": 1}))
+    for name in map(tiny, model_names()):
+        bundle = Bundle.open(folder / name)
+        assert bundle.manifest.text is not None
+        text = resolve(bundle.manifest.text, config=Settings(models=folder)).model_dump(mode="json")
+        document = bundle.manifest.model_dump(mode="json", exclude_unset=True, exclude={"actions"})
+        (folder / name / "manifest.json").write_text(json.dumps({**document, "format": 1, "text": text}))
     return folder
 
 

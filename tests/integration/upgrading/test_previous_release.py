@@ -86,7 +86,7 @@ def test_each_release_finishes_what_the_other_has_queued(
         assert bundles_of(http, queued) == {reference}
 
         newer = submit(http, "new")
-        with previous.running(log, "worker", "hgm3+text"):
+        with current.running(log, "worker", "text"), previous.running(log, "worker", "hgm3"):
             wait_until(lambda: job(http, newer)["counters"].get("succeeded") == COUNT, log)
         assert bundles_of(http, newer) == {reference}
         theirs, ours = (fetched_by(client, newer, tmp_path / name) for name, client in

@@ -12,9 +12,10 @@ import torch
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle, InvalidFile, NotFound
 from marey.core.settings import Settings
-from marey.text.encoders import Encoding, find_weights, weights_sha256
+from marey.text.encoders import Encoding, find_encoder, find_weights, weights_sha256
 from marey.text.loading import load_encoder
 from marey.text.minilm import MiniLM
+from marey.text.minilm_bundle import LAYERS, WIDTH, load_tokenizer, load_weights
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
 
@@ -24,7 +25,7 @@ LONG = " ".join(["a person walks forward and then turns left slowly"] * 20)
 
 @pytest.fixture(scope="module")
 def minilm() -> MiniLMEncoder:
-    return MiniLMEncoder(find_weights("minilm"))
+    return MiniLMEncoder(find_encoder("minilm"))
 
 
 def check_alignment(encoding: Encoding, text: str, word: str) -> None:
@@ -39,14 +40,16 @@ def check_alignment(encoding: Encoding, text: str, word: str) -> None:
 
 
 def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
-    from transformers import AutoTokenizer, BertModel
+    from transformers import BertConfig, BertModel
 
-    folder = find_weights("minilm")
-    model = BertModel.from_pretrained(folder, add_pooling_layer=False).eval()
-    inputs = AutoTokenizer.from_pretrained(folder)(TEXT, return_tensors="pt")
+    bundle = find_encoder("minilm")
+    config = BertConfig(hidden_size=WIDTH, num_hidden_layers=LAYERS, intermediate_size=4 * WIDTH)
+    model = BertModel(config, add_pooling_layer=False).eval()
+    model.load_state_dict(load_weights(bundle))
+    ids = load_tokenizer(bundle).encode(TEXT).ids
     with torch.inference_mode():
-        reference = model(**inputs, output_hidden_states=True).hidden_states
-    states = MiniLM(folder).states(inputs["input_ids"][0].tolist())
+        reference = model(torch.tensor([ids]), output_hidden_states=True).hidden_states
+    states = MiniLM(bundle).states(ids)
     assert len(states) == 7
     for mine, theirs in zip(states, reference, strict=True):
         assert torch.allclose(mine, theirs[0], atol=2e-5)
@@ -56,18 +59,18 @@ def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
 
 def test_minilm_int8_is_close_but_not_equal() -> None:
     ids = [101, 1037, 2711, 7365, 102]
-    exact = MiniLM(find_weights("minilm")).states(ids)[-1]
-    coarse = MiniLM(find_weights("minilm"), int8=True).states(ids)[-1]
+    bundle = find_encoder("minilm")
+    exact, coarse = MiniLM(bundle).states(ids)[-1], MiniLM(bundle, int8=True).states(ids)[-1]
     similarity = float((exact * coarse).sum() / exact.norm() / coarse.norm())
     assert 0.9 < similarity < 0.9999
 
 
 def test_minilm_int8_gives_the_same_bits_compiled_and_not(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = [[101, 1037, 2711, 7365, 102], [101, 2711, 102], [101, 7365, 2830, 102], [101, 1037, 102]]
-    folder = find_weights("minilm")
-    compiled = MiniLM(folder, int8=True)
+    bundle = find_encoder("minilm")
+    compiled = MiniLM(bundle, int8=True)
     monkeypatch.setattr("marey.text.minilm.compiled", lambda module: module)
-    plain = MiniLM(folder, int8=True)
+    plain = MiniLM(bundle, int8=True)
     for ids in [*texts, *texts]:  # torch compiles a script again in its second call
         for one, other in zip(compiled.states(ids), plain.states(ids), strict=True):
             assert torch.equal(one, other)

@@ -17,7 +17,7 @@ from marey.labeller.pools import CaptionPool, frequent_roles, propbank_batches, 
 from marey.labeller.propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
 from marey.labeller.recipe import Recipe
 from marey.labeller.weights import Weights
-from marey.text.encoders import find_weights
+from marey.text.encoders import find_encoder
 from marey.text.light import LightLabeller, WordStates
 from marey.text.light_network import LightConfig
 from marey.text.minilm import MiniLM
@@ -114,36 +114,36 @@ def test_rare_roles_are_left_out() -> None:
 
 
 def test_what_is_trained_reads_like_minilm_with_its_updates() -> None:
-    folder = find_weights("minilm")
-    words = WordStates(folder, (0, 3, 6))
+    bundle = find_encoder("minilm")
+    words = WordStates(bundle, (0, 3, 6))
     batch = token_batch([encode(Example(w, ()), words, ["O"]).tokens for w in (EXAMPLE.words, ("a", *EXAMPLE.words))])
-    adapted = AdaptedMiniLM(folder, 2).eval()
+    adapted = AdaptedMiniLM(bundle, 2).eval()
     torch.manual_seed(0)
     for up in adapted.up.values():
         torch.nn.init.normal_(up, std=0.05)
     states = adapted(batch, (0, 3, 6))[0, : len(EXAMPLE.words)]
     ids, weights = words.tokens(EXAMPLE.words)
-    hidden = MiniLM(folder, updates=adapted.updates()).states(ids)
+    hidden = MiniLM(bundle, updates=adapted.updates()).states(ids)
     exact = torch.stack([torch.as_tensor(weights) @ hidden[layer] for layer in (0, 3, 6)], 1)
     assert torch.cosine_similarity(states, exact, dim=-1).min() > 0.99  # bfloat16
     assert torch.cosine_similarity(states[:, 1:], words(EXAMPLE.words)[:, 1:], dim=-1).max() < 0.98
 
 
 def test_smoothing_brings_int8_closer_to_minilm() -> None:
-    folder = find_weights("minilm")
-    words = WordStates(folder, (6,))
+    bundle = find_encoder("minilm")
+    words = WordStates(bundle, (6,))
     seen = token_batch([encode(Example(EXAMPLE.words, ()), words, ["O"]).tokens])
-    smooth = AdaptedMiniLM(folder, 1).updates([seen])
+    smooth = AdaptedMiniLM(bundle, 1).updates([seen])
     ids = words.tokens(("a", "woman", "waves", "at", "the", "old", "man"))[0]
-    exact = MiniLM(folder).states(ids)[6]
-    plain, smoothed = (MiniLM(folder, int8=True, updates=each).states(ids)[6] for each in (None, smooth))
+    exact = MiniLM(bundle).states(ids)[6]
+    plain, smoothed = (MiniLM(bundle, int8=True, updates=each).states(ids)[6] for each in (None, smooth))
     near = torch.nn.functional.cosine_similarity
     assert near(smoothed, exact).mean() > near(plain, exact).mean()
 
 
 @pytest.mark.slow
 def test_the_first_training_is_kept_and_shipped_whole(tmp_path: Path) -> None:
-    minilm = find_weights("minilm")
+    minilm = find_encoder("minilm")
     network = LightConfig(tag_set(roles_of([EXAMPLE])), layers=(3, 6), width=48, heads=4, trunk=1, body=1)
     config = FitConfig(steps=40, batch=4, learning_rate=4e-3, rank=2, average=0.5)
     losses: list[float] = []

@@ -22,7 +22,7 @@ from marey.labeller.pools import CaptionPool, caption_batches
 from marey.labeller.recipe import Recipe
 from marey.labeller.score import Scores
 from marey.labeller.train import cross_validate, main
-from marey.text.encoders import find_weights
+from marey.text.encoders import find_encoder
 from marey.text.light import LightLabeller
 from marey.text.light_network import LightConfig
 from marey.text.roles import Argument, Frame
@@ -163,7 +163,7 @@ NOTHING = CaptionPool(variants=0, grammar=0, propbank=0)
 def recipe() -> Recipe:
     network = LightConfig(tag_set(roles_of([WALK, WAVE])), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
     config = FitConfig(steps=40, batch=4, learning_rate=4e-3, rank=2)
-    return Recipe(find_weights("minilm"), network, config, NOTHING, 0)
+    return Recipe(find_encoder("minilm"), network, config, NOTHING, 0)
 
 
 @pytest.mark.parametrize(("given", "missing"), [("--propbank", "--words"), ("--words", "--propbank")])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidBundle
-from marey.text.encoders import find_weights
+from marey.text.encoders import find_encoder
 from marey.text.light import LightLabeller, WordStates, segments
 from marey.text.light_network import LightConfig, LightNetwork, sentence_dropout
 from marey.text.loading import load_labeller
@@ -224,11 +224,11 @@ WORDS = ["a", "jumping-jack,", "(naïve)", "3x", "counterclockwise...", "#!?", "
 
 
 def test_word_states_are_means_over_the_pieces_of_the_sentence() -> None:
-    folder = find_weights("minilm")
-    minilm = MiniLM(folder, int8=True)
+    bundle = find_encoder("minilm")
+    minilm = MiniLM(bundle, int8=True)
     encoded = minilm.tokenizer.encode(WORDS, is_pretokenized=True)
     hidden = minilm.states(encoded.ids)[6]
-    found = WordStates(folder, (6,))(WORDS)
+    found = WordStates(bundle, (6,))(WORDS)
     for word, state in enumerate(found[:, 0]):
         pieces = [index for index, owner in enumerate(encoded.word_ids) if owner == word]
         content = [index for index in pieces if any(c.isalnum() for c in encoded.tokens[index])]
@@ -237,7 +237,7 @@ def test_word_states_are_means_over_the_pieces_of_the_sentence() -> None:
 
 
 def test_word_states_leave_out_punctuation() -> None:
-    states = WordStates(find_weights("minilm"), (0,))
+    states = WordStates(find_encoder("minilm"), (0,))
     (plain,), (stopped,) = states(["forward"]), states(["forward."])
     # embeddings (layer 0) of one token at one position: equal only if the full stop's are not averaged in
     assert torch.allclose(plain, stopped, atol=1e-6)

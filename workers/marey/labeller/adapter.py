@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
 import torch.nn.functional as F
-from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariableType]
 from torch import Tensor, nn
 
-from marey.text.minilm import EPS, HEADS, LAYERS, WIDTH
+from marey.bundles import Bundle
+from marey.text.minilm import EPS, HEADS
+from marey.text.minilm_bundle import LAYERS, WIDTH, load_weights
 
 PROJECTIONS = ("attention.self.query", "attention.self.key", "attention.self.value")  # of one input
 MATRICES = (*PROJECTIONS, "attention.output.dense", "intermediate.dense", "output.dense")
@@ -47,14 +47,14 @@ class AdaptedMiniLM(nn.Module):
     """Frozen MiniLM in bfloat16 with trained updates of rank `rank` in every matrix of its layers.
 
     Args:
-        folder: MiniLM.
+        minilm: its bundle.
         rank: of the updates.
         start: updates to begin with, as `updates` gives them; None = none.
     """
 
-    def __init__(self, folder: Path, rank: int, start: Mapping[str, Tensor] | None = None) -> None:
+    def __init__(self, minilm: Bundle, rank: int, start: Mapping[str, Tensor] | None = None) -> None:
         super().__init__()
-        self._weights = load_file(folder / "model.safetensors")
+        self._weights = load_weights(minilm)
         self._half = {name: self._weights[f"{name}.weight"].bfloat16() for name in NAMES}
         self._largest: dict[str, Tensor] | None = None  # inputs of matrices by feature, while they are looked at
         self.down = nn.ParameterDict()

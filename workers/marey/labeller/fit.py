@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from marey.bundles import Bundle
 from marey.labeller.adapter import AdaptedMiniLM, TokenBatch, token_batch
 from marey.labeller.grammar import Example
 from marey.labeller.weights import Weights
@@ -89,7 +89,7 @@ def encode(example: Example, words: WordStates, tags: Sequence[str]) -> Encoded:
 
 def fit(
     batches: Iterator[list[Encoded]],
-    minilm: Path,
+    minilm: Bundle,
     network_config: LightConfig,
     config: FitConfig,
     seed: int,
@@ -100,7 +100,7 @@ def fit(
 
     Args:
         batches: at least `config.steps`, and those that int8 is prepared with.
-        minilm: the folder of MiniLM.
+        minilm: the bundle of MiniLM.
         start: what to begin with; None = MiniLM as it is, and a random head.
         progress: called with the step and its loss.
     """

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from marey.bundles import Bundle, BundleWriter, DataSource
 from marey.labeller.card import card
 from marey.labeller.fit import PROPBANK_FIT
-from marey.text.encoders import weights_sha256
 from marey.text.light import UPDATES
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def pack(output: Path, weights: Weights, gold: Sequence[Path], recipe: Recipe, r
             kind="labeller",
             model="light",
             config="light",
-            parameters={**asdict(weights.network), "minilm_sha256": weights_sha256(recipe.minilm)},
+            parameters={**asdict(weights.network), "minilm_sha256": recipe.minilm.weights_sha256},
             data=tuple(sources),
             licence="CC-BY-SA-4.0" if recipe.first else "Apache-2.0",
             metrics=result.metrics() if result else {},

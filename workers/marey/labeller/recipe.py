@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
+from marey.bundles import Bundle
 from marey.labeller.data import corrected
 from marey.labeller.fit import FitConfig, fit
 from marey.labeller.grammar import Example
@@ -69,7 +69,7 @@ class Validation:
 class Recipe:
     """The recipe of the weights."""
 
-    minilm: Path
+    minilm: Bundle
     network: LightConfig
     config: FitConfig
     pool: CaptionPool

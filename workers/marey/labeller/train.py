@@ -19,6 +19,7 @@ from pathlib import Path
 
 import torch
 
+from marey.bundles import Bundle
 from marey.core.errors import InvalidInput, MareyError
 from marey.labeller.data import distinct, fold_of, read_gold
 from marey.labeller.fit import PROPBANK_FIT, FitConfig, fit, roles_of, tag_set
@@ -35,7 +36,7 @@ from marey.labeller.propbank import read_propbank
 from marey.labeller.recipe import Recipe, Validation
 from marey.labeller.score import Scores
 from marey.labeller.weights import Weights
-from marey.text.fetching import need_weights
+from marey.text.encoders import find_encoder
 from marey.text.light import WordStates
 from marey.text.light_network import LightConfig
 
@@ -65,7 +66,7 @@ def _say(line: str) -> None:
 
 
 def learn_propbank(
-    kept: Sequence[Example], held_out: Sequence[Example], minilm: Path, network: LightConfig, seed: int
+    kept: Sequence[Example], held_out: Sequence[Example], minilm: Bundle, network: LightConfig, seed: int
 ) -> Weights:
     """The first training, and what it comes to on sentences that were held out."""
     words, size = WordStates(minilm, network.layers), PROPBANK_FIT.batch
@@ -78,7 +79,7 @@ def learn_propbank(
     return first
 
 
-def prepare(options: argparse.Namespace, gold: Sequence[Example], minilm: Path) -> Recipe:
+def prepare(options: argparse.Namespace, gold: Sequence[Example], minilm: Bundle) -> Recipe:
     """The recipe, with the first training where PropBank is given.
 
     Raises:
@@ -132,7 +133,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         gold, *others = [read_gold(file) for file in options.gold]
         more = [example for other in others for example in other]
-        minilm = need_weights("minilm")
+        minilm = find_encoder("minilm")
         recipe = prepare(options, [*gold, *more], minilm)
         result = None
         if options.folds:

