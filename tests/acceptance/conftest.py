@@ -26,6 +26,8 @@ def served(models: Path) -> Iterator[tuple[Marey, Serving]]:
     marey = Marey(home, models)
     with serving(marey) as server:
         yield marey, server
+        server.stop()
+        assert not (home / "server.json").exists()
     shutil.rmtree(home, ignore_errors=True)
 
 

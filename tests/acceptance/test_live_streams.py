@@ -53,6 +53,7 @@ def frames_until(socket: ClientConnection, enough: Callable[[list[Frame]], bool]
     return frames
 
 
+@pytest.mark.slow
 def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey) -> None:
     with serving(alone) as server, alone.client() as client:
         stream: dict[str, Any] = client.post_once("/v1/streams", {"prompt": ACTS, "seed": 7})

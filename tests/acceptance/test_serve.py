@@ -14,8 +14,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from marey.client.health import is_healthy
 from marey.embedded import socket_folder
-from tests.support.marey import Marey, serving
+from tests.support.marey import START_SECONDS, Marey, Serving, serving
 
 COUNT = 40
 
@@ -41,17 +42,56 @@ def open_to_others(home: Path) -> list[str]:
     return [str(path) for path in paths if path.lstat().st_mode & 0o077]
 
 
+def deep(home: Path) -> Path:
+    """A home whose path is too long for a socket in it."""
+    home = home.joinpath(*["a-rather-long-name"] * 6)
+    home.parent.mkdir(parents=True)
+    return home
+
+
+def kill_outright(server: Serving) -> None:
+    """SIGKILL, after which every process that it started, and theirs, must end."""
+    family = psutil.Process(server.process.pid).children(recursive=True)
+    assert len(family) >= 6
+    os.kill(server.process.pid, signal.SIGKILL)
+    server.process.wait()
+    _, alive = psutil.wait_procs(family, timeout=45)
+    assert alive == []
+
+
 @pytest.fixture
 def alone(models: Path, short_home: Path) -> Marey:
     """The command line of a server that a test may break."""
     return Marey(short_home, models)
 
 
-def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Marey) -> None:
-    (alone.home / "logs").mkdir(parents=True, exist_ok=True)
-    (alone.home / "logs" / "api.log").touch()
-    for path in (alone.home, alone.home / "logs", alone.home / "logs" / "api.log"):
+def test_what_dies_is_started_again_and_nothing_outlives_a_killed_server_even_in_a_deep_folder(alone: Marey) -> None:
+    """With the smallest worker: the tests below kill one that makes motions, and start the server again."""
+    alone = replace(alone, home=deep(alone.home), environment={"MAREY_LIVE_SLOTS": "0"})
+    opened = (alone.home, alone.home / "logs", alone.home / "logs" / "api.log")
+    opened[1].mkdir(parents=True)
+    opened[2].touch()
+    for path in opened:
         path.chmod(0o755)  # a home that was open before
+    with serving(alone, "--with", "hgm3") as server:
+        job = alone.submit("a person waves", "--seconds", 2)
+        before = server.children()
+        assert before.keys() == {"postgres", "valkey-server", "api", "scheduler", "text", "worker"}
+        for kind in ("scheduler", "postgres", "valkey-server"):  # a child, and what the children need
+            before[kind].kill()
+        for kind in ("scheduler", "postgres", "valkey-server"):
+            wait_for(lambda kind=kind: _is_back(server.children, kind, before[kind].pid), START_SECONDS)
+        with alone.client() as client:
+            wait_for(lambda: is_healthy(f"{client.server.url}/readyz", timeout=2), START_SECONDS)
+        assert [each["id"] for each in alone.jobs()] == [job]
+        assert open_to_others(alone.home) == []
+        kill_outright(server)
+    alone("jobs", "list").refused(4, "does not answer")
+    shutil.rmtree(socket_folder(alone.home))
+
+
+@pytest.mark.slow
+def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Marey) -> None:
     with serving(alone) as server:
         job = alone.submit("-f", "-", stdin="\n".join(map(json.dumps, slow_items())))
         with alone.client() as client:
@@ -68,26 +108,17 @@ def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Mare
             assert succeeded() == COUNT
             motions = list(client.pages(f"/v1/jobs/{job}/motions"))
             assert len({motion["item"] for motion in motions}) == len(motions) == COUNT
-        assert open_to_others(alone.home) == []
-        server.stop()
-        assert not (alone.home / "server.json").exists()
 
 
-def test_a_killed_server_leaves_no_process_and_can_be_started_again_even_in_a_deep_folder(alone: Marey) -> None:
-    alone = replace(alone, home=alone.home.joinpath(*["a-rather-long-name"] * 6))  # too long for a socket in it
-    alone.home.parent.mkdir(parents=True)
+@pytest.mark.slow
+def test_a_killed_server_leaves_no_process_and_makes_its_motions_once_it_is_started_again(alone: Marey) -> None:
     with serving(alone) as server:
         job = alone.submit("a person waves", "--seconds", 2)
-        family = psutil.Process(server.process.pid).children(recursive=True)
-        assert len(family) >= 6
-        os.kill(server.process.pid, signal.SIGKILL)
-        server.process.wait()
-        _, alive = psutil.wait_procs(family, timeout=45)
-        assert alive == []
-    alone("jobs", "list").refused(4, "does not answer")
-    with serving(alone):
+        kill_outright(server)
+    with serving(alone) as server:
         assert alone("jobs", "wait", job, "--timeout", 60).code == 0
-    shutil.rmtree(socket_folder(alone.home))
+        server.stop()
+        assert not (alone.home / "server.json").exists()
 
 
 def _is_back(children: Callable[[], dict[str, psutil.Process]], kind: str, old: int) -> bool:

@@ -20,6 +20,7 @@ from tests.chaos.places import S3, Folder
 from tests.servers.swift import Swift
 from tests.support.toy_jobs import audit, ended, job_row, states, submit_toys
 
+pytestmark = pytest.mark.slow
 Stage = Callable[..., Cluster]
 
 
@@ -78,7 +79,6 @@ def working(cluster: Cluster, name: str) -> Callable[[], bool]:
     return holds
 
 
-@pytest.mark.slow
 def test_the_faults_of_the_contract_at_the_products_own_times(stage: Stage, tmp_path: Path, swift: Swift) -> None:
     """kill -9 of a child and of the scheduler, FLUSHALL, Postgres restart, 10 s without S3, in one 40-item job."""
     bucket = S3(swift)
@@ -98,7 +98,6 @@ def test_the_faults_of_the_contract_at_the_products_own_times(stage: Stage, tmp_
     assert found == {"dead": ["kill the worker"], "succeeded": prompts(39)}
 
 
-@pytest.mark.slow
 def test_a_killed_workers_items_start_again_within_15_seconds(stage: Stage, tmp_path: Path) -> None:
     disk = Folder(tmp_path / "assets")
     cluster = stage(disk.environment, workers=2)
@@ -127,7 +126,6 @@ def test_a_killed_workers_items_start_again_within_15_seconds(stage: Stage, tmp_
     assert not ended(cluster.engine, job)
 
 
-@pytest.mark.slow
 def test_sigterm_gives_items_back_at_no_cost(stage: Stage, tmp_path: Path) -> None:
     disk = Folder(tmp_path / "assets")
     cluster = stage(disk.environment)
@@ -157,7 +155,6 @@ def test_two_schedulers_and_a_restarted_queue_are_harmless(stage: Stage, tmp_pat
     assert job_row(cluster.engine, late).succeeded == 100
 
 
-@pytest.mark.slow
 def test_eight_workers_claiming_a_thousand_items_claim_none_twice(stage: Stage, tmp_path: Path) -> None:
     disk = Folder(tmp_path / "assets")
     cluster = stage(disk.environment, workers=8)

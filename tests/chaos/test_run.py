@@ -1,4 +1,4 @@
-"""Every accepted item ends exactly once, whatever is killed: a short seed for every day, long ones by `make chaos`."""
+"""Every accepted item ends exactly once, whatever is killed: one short seed, and the long ones of `make chaos`."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from tests.chaos.studios import Quota
 from tests.chaos.webhooks import Flaky
 from tests.servers.swift import Swift
 
+pytestmark = pytest.mark.slow
 ITEMS = int(os.environ.get("MAREY_CHAOS_ITEMS", "10000"))
 SEEDS = [int(seed) for seed in os.environ.get("MAREY_CHAOS_SEEDS", "1,2,4").split(",")]
 REPORTS = os.environ.get("MAREY_CHAOS_REPORTS")
@@ -96,7 +97,6 @@ def test_every_item_ends_once_whatever_is_killed(short_home: Path, swift: Swift)
     }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "place"), [(seed, seed) for seed in SEEDS], indirect=["place"], ids=map(str, SEEDS))
 def test_ten_thousand_items_of_three_tenants_end_once(short_home: Path, place: Place, seed: int) -> None:
     report = chaos(short_home, place, long_plan(seed), seconds=7200.0)

@@ -137,13 +137,17 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(marey: Marey) -> Iterator[Serving]:
+def serving(marey: Marey, *options: str) -> Iterator[Serving]:
     """`marey serve` on any free port, ready, until the end of the block."""
     marey.home.mkdir(mode=0o700, parents=True, exist_ok=True)
     log = marey.home / "serve.log"
     with log.open("wb") as output:
         process = subprocess.Popen(
-            [*COMMAND, "serve", "--port", "0"], stdout=output, stderr=output, cwd=REPOSITORY, env=marey.environ()
+            [*COMMAND, "serve", "--port", "0", *options],
+            stdout=output,
+            stderr=output,
+            cwd=REPOSITORY,
+            env=marey.environ(),
         )
     try:
         deadline = time.monotonic() + START_SECONDS

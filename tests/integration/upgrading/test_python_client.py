@@ -18,6 +18,7 @@ from tests.integration.upgrading.test_previous_release import COUNT, PREVIOUS, n
 from tests.support.releases import Release, earlier_release, installed_release
 from tests.support.wheels import make_environment, this_wheel
 
+pytestmark = pytest.mark.slow
 FIRST_CLIENT = "7d0528c"
 """The first commit with `marey.client`."""
 
