@@ -196,7 +196,7 @@ def test_the_tokenizer_learns(prepared: PreparedData, tmp_path: Path) -> None:
 def test_the_masked_transformer_and_the_predictor_learn(prepared: PreparedData, tmp_path: Path) -> None:
     stage = masked_stage(prepared)
     before = stage.validate()
-    train(stage, RunOptions(tmp_path, Budget(steps=80), bf16=False, quiet=True), {})
+    train(stage, RunOptions(tmp_path, Budget(steps=20), bf16=False, quiet=True), {})
     assert stage.validate()["reconstruction/specific"] < before["reconstruction/specific"] - 0.1
 
 

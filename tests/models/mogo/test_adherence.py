@@ -43,13 +43,14 @@ def test_steers_go_between_different_acts_and_are_the_same_every_time() -> None:
 
 
 def test_a_report_holds_whole_motions_and_live_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adherence, "LONG", 120)
+    for name, value in {"LONG": 100, "BEFORE": 1.0, "AFTER": 4.0}.items():
+        monkeypatch.setattr(adherence, name, value)
     bundle = random_bundle(tmp_path / "tiny")
     judged = judge_adherence(
-        str(bundle.path), seeds=1, seconds=None, settings={}, captions=None, prompts="evaluation", every=50, steers=3,
-        walks=2, threads=0, output=tmp_path / "report", progress=lambda done, total: None,
+        str(bundle.path), seeds=1, seconds=None, settings={}, captions=None, prompts="evaluation", every=50, steers=2,
+        walks=1, threads=0, output=tmp_path / "report", progress=lambda done, total: None,
     )  # fmt: skip
     found = json.loads((tmp_path / "report" / "report.json").read_text())
     assert len(found["trials"]) == 4
-    assert [len(sessions) for sessions in found["live"].values()] == [3, 2]
+    assert [len(sessions) for sessions in found["live"].values()] == [2, 1]
     assert "new prompt followed within 2 s of a steer" in judged.markdown

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import pickle
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from transformers import BertConfig, BertModel
@@ -73,8 +75,6 @@ def tarred(folder: Path) -> Path:
 def reference_frame(archive: Path, bert: Path) -> Frame:
     """Result of the archive's own forward pass for WORDS, written out by hand: probabilities, best legal path by
     force."""
-    import itertools
-
     weights = torch.load(archive / "weights.th", weights_only=True)
     model = BertModel(BertConfig(**json.loads((bert / "config.json").read_text()))).eval()
     model.load_state_dict(
@@ -91,12 +91,14 @@ def reference_frame(archive: Path, bert: Path) -> Frame:
         logits = hidden @ weights["tag_projection_layer.weight"].T + weights["tag_projection_layer.bias"]
         probabilities = logits.softmax(-1)
 
-    def legal(path: tuple[int, ...]) -> bool:
-        tags = ["O", *(LABELS[i] for i in path)]
-        return all(not b.startswith("I-") or a[1:] == b[1:] for a, b in itertools.pairwise(tags))
-
-    paths = (p for p in itertools.product(range(len(LABELS)), repeat=len(ids)) if legal(p))
-    best = max(paths, key=lambda p: float(probabilities[range(len(ids)), list(p)].sum()))
+    tags = ["O", *LABELS]
+    allowed = np.array([[not b.startswith("I-") or a[1:] == b[1:] for b in LABELS] for a in tags])
+    paths = np.indices((len(LABELS),) * len(ids), dtype=np.int8).reshape(len(ids), -1)
+    legal = allowed[0][paths[0]]
+    for before, after in itertools.pairwise(paths):
+        legal &= allowed[1 + before, after]
+    scores = sum(row[tag] for row, tag in zip(probabilities.double().numpy(), paths, strict=True))
+    best = paths[:, np.where(legal, scores, -1.0).argmax()]
     from marey.text.roles import spans_to_arguments
 
     tags = [LABELS[best[i]] for i in (1, 2, 3, 5)]
