@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from uuid import UUID
 
+import pytest
 import sqlalchemy as sa
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
@@ -179,7 +180,8 @@ class Jobs(RuleBasedStateMachine):
         assert sorted(done.items + done.lost) == sorted(asked)
 
 
-def test_no_order_of_events_breaks_the_tables(engine: sa.Engine) -> None:
+@pytest.mark.parametrize("walks", [12, pytest.param(60, marks=pytest.mark.slow)])
+def test_no_order_of_events_breaks_the_tables(engine: sa.Engine, walks: int) -> None:
     class OnThisDatabase(Jobs):
         pass
 
@@ -187,7 +189,7 @@ def test_no_order_of_events_breaks_the_tables(engine: sa.Engine) -> None:
     run_state_machine_as_test(
         OnThisDatabase,
         settings=settings(
-            max_examples=25,
+            max_examples=walks,
             stateful_step_count=30,
             deadline=None,
             suppress_health_check=[HealthCheck.too_slow],
