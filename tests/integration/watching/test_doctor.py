@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import socket
 import threading
 import time
@@ -25,6 +26,7 @@ from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
 from tests.servers.jobs import claim_some, parse_texts, submit_items
 from tests.support.live_api import BUNDLE, write_bundle
+from tests.support.models import TEXT_BUNDLES, add_text_bundles
 
 
 def bad(check: Check, *said: str, state: str = "bad") -> None:
@@ -169,16 +171,23 @@ def test_a_store_without_its_keys_or_server_is_bad(tmp_path: Path) -> None:
 
 def test_a_bundle_that_was_changed_is_bad_and_one_whose_encoder_is_another_too(tmp_path: Path) -> None:
     write_bundle(tmp_path / "models")
+    add_text_bundles(tmp_path / "models")
     config = Settings(home=tmp_path, models=tmp_path / "models")
-    whole, reads = models(config)
-    assert whole.state == "ok"
+    whole, reads, *others = models(config)
+    assert {check.state for check in (whole, *others)} == {"ok"}
+    assert len(others) == len(TEXT_BUNDLES)
     bad(reads, "other weights", "minilm")  # it names an encoder of noughts
     shard = next((tmp_path / "models" / BUNDLE).glob("*.safetensors"))
     content = bytearray(shard.read_bytes())
     content[-1] ^= 1
     shard.write_bytes(content)
-    (broken,) = models(config)
+    broken, *_ = models(config)
     bad(broken, "sha256", "again")
+    shutil.rmtree(tmp_path / "models" / BUNDLE)
+    shutil.rmtree(tmp_path / "models" / "minilm-l6")
+    write_bundle(tmp_path / "models")
+    _, unread, *_ = models(config)
+    bad(unread, "minilm-l6", "marey-bundles-open")
 
 
 def test_a_bundle_that_cannot_be_read_is_bad_and_hides_no_other(tmp_path: Path) -> None:
