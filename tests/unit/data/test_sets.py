@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.build import LAYOUT
 from marey.data.dataset import DATASET, INDEX, SETS, known_set, known_sets
-from marey.data.floor import on_floor
+from marey.data.floor import levelled, on_floor
 from marey.data.index import parse_index, read_index
 from marey.data.licences import Terms, Tier, check_mix, tier_of
 from marey.data.prepare import CaptureSet, pack_set
@@ -148,3 +148,21 @@ def test_a_leap_that_never_lands_keeps_the_floor_of_its_file() -> None:
     joints = on_floor(walker(2.0), "support") + np.array([0.0, 0.5, 0.0])
     np.testing.assert_array_equal(on_floor(joints, "file"), joints)
     assert clearance(on_floor(joints - [0.0, 0.45, 0.0], "file")).min() < 0.01
+
+
+@pytest.mark.parametrize("slope", [(0.02, 0.0), (0.0, -0.018)])
+def test_a_floor_that_clearly_tilts_is_made_level(slope: tuple[float, float]) -> None:
+    walk = on_floor(walker(5.0), "support")
+    turned = rotate(about("y", np.full((len(walk), 1), 0.7)), walk)
+    tilted = turned.copy()
+    tilted[..., 1] += turned[..., [0, 2]] @ np.array(slope)
+    assert np.abs(on_floor(tilted, "feet")[..., 1] - turned[..., 1]).max() > 0.03
+    assert np.abs(on_floor(tilted, "support")[..., 1] - turned[..., 1]).max() < 0.015
+
+
+def test_a_level_floor_and_a_slope_that_is_walked_on_are_left_as_they_are() -> None:
+    walk = walker(5.0)
+    assert levelled(walk) is walk
+    uphill = walk.copy()
+    uphill[..., 1] += 0.1 * walk[..., 2]
+    assert levelled(uphill) is uphill

@@ -32,8 +32,8 @@ class Dataset(BaseModel):
         title, url: for the manifest and the model card.
         licence, credit, tier: its terms; a row of the index may have its own.
         unit, up: of the files' lengths, and the axis that points up.
-        floor: where a clip's floor is: `support`: under whatever part of the body supports it; `feet`: under the feet;
-            `file`: at height 0 of the file.
+        floor: where a clip's floor is: `support`: level, and under whatever part of the body supports it; `feet`: under
+            the feet; `file`: at height 0 of the file.
         largest_error_cm: clips with a larger `error_cm` are left out.
         index_fps: frames a second at which the index counts `start` and `end`; 1 counts seconds.
         columns: how each of our columns is made of those of the index: a template such as `{actor} {class}`.
