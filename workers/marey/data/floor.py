@@ -73,9 +73,9 @@ def on_floor(joints: Array, rule: Literal["support", "feet", "file"]) -> Array:
     """The clip (T, 22, 3) with its floor at height 0.
 
     `support`: level (`levelled`), and no part of the body but for the lowest 2 % of the frames is lower than its radius
-    over the floor, so that people lie, crawl and stand on their hands upon it; `feet`: the same for the
-    joints of the feet alone; `file`: under the lowest part of the body where that is near height 0 of the file; else the
-    floor is there, as under a leap that never lands.
+    over the floor, so that people lie, crawl and stand on their hands upon it; `feet`: the same for the joints of the
+    feet alone; `file`: under the lowest part of the body where that is near height 0 of the file; else the floor is
+    there, as under a leap that never lands.
     """
     out = np.array(joints, np.float64)
     if rule == "support":
