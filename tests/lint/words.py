@@ -26,11 +26,8 @@ SKIPPED: tuple[str, ...] = ()
 DIARY = "docs/research/"
 """Records of past work: dated reports, and a log that quotes old names. Their words are not checked."""
 
-OTHER_NAMES = ("tests/", "benchmarks/", "services/marey/cli/", "services/marey/client/")
+OTHER_NAMES = ("tests/", "benchmarks/", "services/marey/client/types/")
 """Folders whose class names are their own: the client's types mirror those of the API."""
-
-TO_TELL_APART = {"Body", "Gait", "Row"}
-"""Class names with two meanings that wait for a better one: in viz, referee, checks, data and the report."""
 
 FIRST_WORDS = ("Whether", "What", "Nothing", "Who", "Whoever", "Whose")
 
@@ -291,7 +288,7 @@ def check_meanings(sources: Mapping[Path, str]) -> list[Finding]:
     return [
         Finding(path, line, f"class {name!r} exists in {others[0][0]}: name their difference")
         for name, others in sorted(defined.items())
-        if name not in ONE_CONCEPT | TO_TELL_APART
+        if name not in ONE_CONCEPT
         for path, line in others[1:]
     ]
 

@@ -17,10 +17,10 @@ from marey.evaluator.report import (
     GenerationSpeed,
     HeatCell,
     Metric,
+    MetricRow,
     MotionScore,
     Repeats,
     Report,
-    Row,
     TrendPoint,
     Value,
     sentence_of,
@@ -60,7 +60,7 @@ def _values(*numbers: tuple[str, float, float | None]) -> dict[str, Value]:
     return {key: Value(mean, half, 337, dimensions=256 if key == "fid" else None) for key, mean, half in numbers}
 
 
-def _rows() -> tuple[Row, ...]:
+def _rows() -> tuple[MetricRow, ...]:
     truth = (("r1", 0.571, 0.004), ("r3", 0.842, 0.003), ("match", 0.412, 0.001), ("fid", 0.0021, 0.0004))
     truth += (("kid", 0.0, 0.0002), ("diversity", 1.213, 0.011), ("r1c", 0.488, 0.006), ("obeyed", 97.9, None))
     truth += (("skate", 4.1, None), ("jerk", 131.0, None), ("floor", 3.2, None))
@@ -73,21 +73,21 @@ def _rows() -> tuple[Row, ...]:
     made += (("kid", 0.0091, 0.0005), ("diversity", 1.139, 0.013), ("r1c", 0.294, 0.01), ("obeyed", 88.1, 0.9))
     made += (("skate", 5.7, 0.2), ("jerk", 127.0, 1.2), ("floor", 3.9, 0.1))
     return (
-        Row("ground_truth", "ground truth", "captured clips", _values(*truth)),
-        Row(
+        MetricRow("ground_truth", "ground truth", "captured clips", _values(*truth)),
+        MetricRow(
             "reconstruction",
             "reconstruction",
             "through the tokenizer",
             {**_values(*coded), "r1c": Value.missing(UNMEASURED)},
         ),
-        Row(
+        MetricRow(
             "ceiling",
             "label-level ceiling",
             "a perfect model of labels",
             _values(("r1", 0.8, None), ("r1c", 0.79, None)),
         ),
-        Row("raw", "raw", "features of the network", _values(*raw)),
-        Row("exported", "exported", "joints after clean-up", _values(*made)),
+        MetricRow("raw", "raw", "features of the network", _values(*raw)),
+        MetricRow("exported", "exported", "joints after clean-up", _values(*made)),
     )
 
 

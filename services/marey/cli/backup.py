@@ -42,7 +42,7 @@ class Entry(BaseModel):
     size: int = Field(ge=0, le=MOST_BYTES)
 
 
-class Manifest(BaseModel):
+class BackupManifest(BaseModel):
     """The manifest of a backup."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -59,7 +59,7 @@ class Manifest(BaseModel):
 
 def export_tenant(
     engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
-) -> tuple[Manifest, int]:
+) -> tuple[BackupManifest, int]:
     """Back up the ended jobs of a tenant; return the manifest, and the number of jobs that have not ended.
 
     Raises:
@@ -86,7 +86,7 @@ def export_tenant(
         entries[job] = Entry(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
         items += len(backup.items)
         done(job)
-    manifest = Manifest(
+    manifest = BackupManifest(
         tenant=tenant, created=datetime.now(UTC), items=items, files=len(files), bytes=sum(files.values()), jobs=entries
     )
     write_atomically(folder / MANIFEST, (manifest.model_dump_json(indent=1) + "\n").encode())
@@ -95,7 +95,7 @@ def export_tenant(
 
 def import_tenant(
     engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
-) -> tuple[Manifest, int]:
+) -> tuple[BackupManifest, int]:
     """Verify a whole backup, then restore the jobs that do not exist; return its manifest, and the number of jobs.
 
     Each job is one transaction: an import that broke off continues when it is run again.
@@ -118,11 +118,11 @@ def import_tenant(
     return manifest, written
 
 
-def read_manifest(folder: Path) -> Manifest:
+def read_manifest(folder: Path) -> BackupManifest:
     """Read the manifest of a backup; raises as `import_tenant`."""
     path = folder / MANIFEST
     try:
-        return Manifest.model_validate_json(_plain(path).read_bytes())
+        return BackupManifest.model_validate_json(_plain(path).read_bytes())
     except FileNotFoundError:
         raise NotFound(
             "there is no whole backup", where=str(path), hint="The manifest is written last; was it broken off?"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.cli.database import engine_of, settings_here
-from marey.cli.findings import Check, broken, free_space
+from marey.cli.findings import Finding, broken, free_space
 from marey.cli.ports import try_port
 from marey.client.place import read_server
 from marey.core.errors import MareyError, Unreachable
@@ -28,7 +28,7 @@ UNSWEPT = 30.0
 """Seconds after which a lease that ran out should have been taken back many times over."""
 
 
-def check_backing() -> Iterator[Check]:
+def check_backing() -> Iterator[Finding]:
     """Run each check by itself; only that of the port if no server is named and none runs here."""
     from marey.core.settings import settings
 
@@ -53,22 +53,22 @@ def check_backing() -> Iterator[Check]:
     yield from store(config)
 
 
-def _guarded(name: str, check: Callable[[], Check]) -> Iterator[Check]:
+def _guarded(name: str, check: Callable[[], Finding]) -> Iterator[Finding]:
     try:
         yield check()
     except MareyError as error:
         yield broken(name, error)
 
 
-def _port(config: Settings) -> Check:
+def _port(config: Settings) -> Finding:
     try:
         try_port(config.host, config.port)
     except MareyError as error:
-        return Check("port", "warn", error.message, error.hint)
-    return Check("port", "ok", f"{config.port} of {config.host} is free for `marey serve`")
+        return Finding("port", "warn", error.message, error.hint)
+    return Finding("port", "ok", f"{config.port} of {config.host} is free for `marey serve`")
 
 
-def database(engine: sa.Engine) -> Check:
+def database(engine: sa.Engine) -> Finding:
     """Check that the database answers and has the tables of this version."""
     from marey.db import check_revision, transaction
     from marey.jobs import server_version
@@ -79,10 +79,10 @@ def database(engine: sa.Engine) -> Check:
         check_revision(engine)
     except MareyError as error:
         return broken("database", error)
-    return Check("database", "ok", f"PostgreSQL {version}, with all that this version needs")
+    return Finding("database", "ok", f"PostgreSQL {version}, with all that this version needs")
 
 
-def _clock(engine: sa.Engine) -> Check:
+def _clock(engine: sa.Engine) -> Finding:
     from marey.db import transaction
     from marey.jobs import database_now
 
@@ -93,15 +93,15 @@ def _clock(engine: sa.Engine) -> Check:
     return clock_check(there, before, after)
 
 
-def clock_check(there: datetime, before: datetime, after: datetime) -> Check:
+def clock_check(there: datetime, before: datetime, after: datetime) -> Finding:
     """Compare the database's clock with this machine's, which was read before and after it."""
     skew = max(before - there, there - after, timedelta()).total_seconds()
     state = "bad" if skew > SKEW_BAD else "warn" if skew > SKEW_WARN else "ok"
     hint = None if state == "ok" else "Let both machines take the time from one source (NTP)."
-    return Check("clock", state, f"{skew:.1f} s between this machine and the database", hint)
+    return Finding("clock", state, f"{skew:.1f} s between this machine and the database", hint)
 
 
-def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
+def workers(engine: sa.Engine, logs: Path | None = None) -> Finding:
     """Check that every queue with waiting items has a worker, and that every worker reports.
 
     Args:
@@ -115,21 +115,23 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
     live = sorted({worker.queue for worker in known if worker.live})
     if not live and logs is not None:
         hint = f"Wait while it loads its model; if that takes minutes, see {logs}."
-        return Check("workers", "warn", "none is ready yet; the server that runs here starts its own", hint)
+        return Finding("workers", "warn", "none is ready yet; the server that runs here starts its own", hint)
     alone = sorted({row.queue for row in depths if row.waiting} - set(live))
     if alone:
         message = f"items wait in {', '.join(alone)}, and no worker serves that"
-        return Check("workers", "bad", message, f"Start one: `marey worker {'+'.join(alone)}`; `marey models list`.")
+        return Finding("workers", "bad", message, f"Start one: `marey worker {'+'.join(alone)}`; `marey models list`.")
     if not live:
-        return Check("workers", "warn", "none was heard of lately", "`marey serve` or `marey worker hgm3` starts one.")
+        return Finding(
+            "workers", "warn", "none was heard of lately", "`marey serve` or `marey worker hgm3` starts one."
+        )
     silent = [f"{worker.id} on {worker.host}" for worker in known if not worker.live]
     if silent:
         message = f"{', '.join(silent[:3])} fell silent, last heard of {known[-1].seen:%H:%M} UTC"
-        return Check("workers", "warn", message, "See its log; what it held goes to others by itself.")
-    return Check("workers", "ok", f"{len([w for w in known if w.live])} live, for {', '.join(live)}")
+        return Finding("workers", "warn", message, "See its log; what it held goes to others by itself.")
+    return Finding("workers", "ok", f"{len([w for w in known if w.live])} live, for {', '.join(live)}")
 
 
-def scheduler(engine: sa.Engine) -> Check:
+def scheduler(engine: sa.Engine) -> Finding:
     """Check that a scheduler has reported lately and takes back expired leases."""
     from marey.db import transaction
     from marey.jobs import list_schedulers, overdue_leases
@@ -138,15 +140,17 @@ def scheduler(engine: sa.Engine) -> Check:
         unswept, known = overdue_leases(conn, UNSWEPT), list_schedulers(conn)
     if known and not known[0].live:
         message = f"no scheduler works: {_silence_of(known[0])}"
-        return Check("scheduler", "bad", message, f"See its log. {STALLED_HINT}")
+        return Finding("scheduler", "bad", message, f"See its log. {STALLED_HINT}")
     if unswept:
         message = f"{unswept} leases ran out over {UNSWEPT:g} s ago, and nobody took them back"
-        return Check("scheduler", "bad", message, "Start `marey scheduler`, or see its log.")
+        return Finding("scheduler", "bad", message, "Start `marey scheduler`, or see its log.")
     if not known:
-        return Check("scheduler", "warn", "none was heard of lately", "`marey serve` or `marey scheduler` starts one.")
+        return Finding(
+            "scheduler", "warn", "none was heard of lately", "`marey serve` or `marey scheduler` starts one."
+        )
     if silent := [row for row in known if not row.live]:
-        return Check("scheduler", "warn", f"another works, but {_silence_of(silent[0])}", STALLED_HINT)
-    return Check("scheduler", "ok", f"{len(known)} at work, no lease is overdue")
+        return Finding("scheduler", "warn", f"another works, but {_silence_of(silent[0])}", STALLED_HINT)
+    return Finding("scheduler", "ok", f"{len(known)} at work, no lease is overdue")
 
 
 STALLED_HINT = (
@@ -161,7 +165,7 @@ def _silence_of(row: SchedulerRow) -> str:
     )
 
 
-def _queues(config: Settings) -> Iterator[Check]:
+def _queues(config: Settings) -> Iterator[Finding]:
     from marey.embedded import valkey_url
 
     named = config.queue_url
@@ -171,7 +175,7 @@ def _queues(config: Settings) -> Iterator[Check]:
         yield queue("streams", config.streams_url.get_secret_value())
 
 
-def queue(name: str, url: str) -> Check:
+def queue(name: str, url: str) -> Finding:
     """Check that Redis answers and evicts no keys."""
     import redis
 
@@ -185,14 +189,14 @@ def queue(name: str, url: str) -> Check:
         return broken(name, error)
     except (redis.RedisError, ValueError) as error:
         hint = "Is it running, and is MAREY_QUEUE_URL (MAREY_STREAMS_URL) right? Embedded: `marey serve` starts it."
-        return Check(name, "bad", f"it does not answer ({type(error).__name__})", hint)
+        return Finding(name, "bad", f"it does not answer ({type(error).__name__})", hint)
     if policy is None:
         message = f"Redis {version}; it does not tell its maxmemory-policy"
-        return Check(name, "warn", message, "See that it is noeviction.")
+        return Finding(name, "warn", message, "See that it is noeviction.")
     if policy != "noeviction":
         message = f"Redis {version}, maxmemory-policy {policy}: it may throw away hints and frames"
-        return Check(name, "bad", message, "Set maxmemory-policy noeviction.")
-    return Check(name, "ok", f"Redis {version}, noeviction")
+        return Finding(name, "bad", message, "Set maxmemory-policy noeviction.")
+    return Finding(name, "ok", f"Redis {version}, noeviction")
 
 
 def _memory_policy(client: object) -> str | None:
@@ -205,7 +209,7 @@ def _memory_policy(client: object) -> str | None:
         return None
 
 
-def store(config: Settings) -> Iterator[Check]:
+def store(config: Settings) -> Iterator[Finding]:
     """Check that the store writes, reads and deletes."""
     from marey.storage import FolderStore, open_store
 
@@ -216,7 +220,7 @@ def store(config: Settings) -> Iterator[Check]:
     except MareyError as error:
         yield broken("store", error)
         return
-    yield Check("store", "ok", f"{config.store or config.home / 'assets'} takes, gives and deletes objects")
+    yield Finding("store", "ok", f"{config.store or config.home / 'assets'} takes, gives and deletes objects")
     if isinstance(assets, FolderStore):
         yield free_space("store", assets.root)
 

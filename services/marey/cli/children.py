@@ -34,7 +34,7 @@ STOP_SECONDS = 35.0
 
 
 @dataclass
-class Child:
+class SupervisedProcess:
     """A child process, started again when it ends.
 
     Attributes:
@@ -123,7 +123,7 @@ def metrics_port(config: Settings, place: int) -> dict[str, str]:
     return {} if config.metrics_port is None else {"MAREY_METRICS_PORT": str(config.metrics_port + place)}
 
 
-def keep_all(children: Sequence[Child]) -> None:
+def keep_all(children: Sequence[SupervisedProcess]) -> None:
     """Keep children running until SIGTERM or SIGINT."""
     stopping: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -139,7 +139,7 @@ def keep_all(children: Sequence[Child]) -> None:
         stop_all(children)
 
 
-def stop_all(children: Sequence[Child]) -> None:
+def stop_all(children: Sequence[SupervisedProcess]) -> None:
     """Ask all children to end, and wait until they have."""
     for child in children:
         child.terminate()

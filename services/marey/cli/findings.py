@@ -15,7 +15,7 @@ State = Literal["ok", "warn", "bad"]
 
 
 @dataclass(frozen=True)
-class Check:
+class Finding:
     """One finding. `warn`: it works, or only some commands need it; `bad`: it has to be repaired."""
 
     name: str
@@ -25,14 +25,14 @@ class Check:
     """The advice to the user; None where none is needed."""
 
 
-def broken(name: str, error: MareyError) -> Check:
+def broken(name: str, error: MareyError) -> Finding:
     """Return the finding of a check that ended with an expected error."""
-    return Check(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
+    return Finding(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
 
 
-def free_space(name: str, folder: os.PathLike[str]) -> Check:
+def free_space(name: str, folder: os.PathLike[str]) -> Finding:
     """Check the free space of a folder's disk."""
     free = shutil.disk_usage(folder).free
     state = "bad" if free < SMALLEST_FREE else "warn" if free < LITTLE_FREE else "ok"
     hint = None if state == "ok" else "Make room: `marey admin gc` removes what nothing refers to."
-    return Check(name, state, f"{os.fspath(folder)}, {free / 2**30:.1f} GiB free", hint)
+    return Finding(name, state, f"{os.fspath(folder)}, {free / 2**30:.1f} GiB free", hint)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from marey.cli import console
-from marey.cli.children import Child, marey, metrics_port, stop_all
+from marey.cli.children import SupervisedProcess, marey, metrics_port, stop_all
 from marey.cli.ports import try_port
 from marey.cli.roles.serving import PLATFORM, check_device, live_models, role_of, threads_of
 from marey.client.health import is_healthy
@@ -70,7 +70,7 @@ class Supervisor:
         self.roles = roles
         self.home = config.home.expanduser().absolute()
         self._stopping = False
-        self._children: list[Child] = []
+        self._children: list[SupervisedProcess] = []
         self._backings: list[Backing] = []
 
     def run(self) -> None:
@@ -166,11 +166,11 @@ class Supervisor:
             "MAREY_THREADS": str(threads_of(self.config, computing)),
         }
 
-    def _child(self, name: str, arguments: Sequence[str], environment: dict[str, str]) -> Child:
+    def _child(self, name: str, arguments: Sequence[str], environment: dict[str, str]) -> SupervisedProcess:
         log = self.home / "logs" / f"{name}.log"
         if log.exists() and log.stat().st_size > LOG_LIMIT:
             log.replace(log.with_suffix(".log.1"))
-        return Child(name, marey(*arguments), environment, log)
+        return SupervisedProcess(name, marey(*arguments), environment, log)
 
     def _watch(self) -> None:
         url, announced, ready = self._server.url, False, False

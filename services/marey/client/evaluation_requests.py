@@ -62,14 +62,14 @@ class EvaluationOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class Request:
+class EvaluationBody:
     """The body of a request, and its prompts; None = those of a split."""
 
     body: dict[str, Any]
     prompts: PromptSet | None
 
 
-def request_body(bundle: str, options: EvaluationOptions) -> Request:
+def request_body(bundle: str, options: EvaluationOptions) -> EvaluationBody:
     """Build the body of a request from its options.
 
     Raises:
@@ -92,7 +92,7 @@ def request_body(bundle: str, options: EvaluationOptions) -> Request:
         "baseline": None if baseline is None else identifier(baseline),
         **subject,
     }
-    return Request({name: value for name, value in wanted.items() if value is not None}, prompts)
+    return EvaluationBody({name: value for name, value in wanted.items() if value is not None}, prompts)
 
 
 def read_prompt_set(
@@ -113,7 +113,7 @@ def read_prompt_set(
 
 
 @contextmanager
-def naming_lines(request: Request) -> Generator[None]:
+def naming_lines(request: EvaluationBody) -> Generator[None]:
     """Let a server's `InvalidItems` about the prompts name their source and its lines."""
     try:
         yield

@@ -50,7 +50,7 @@ class LimbShape:
 
 
 @dataclass(frozen=True)
-class Body:
+class BodyShape:
     """The limbs of one skeleton; the height of the standing figure, and the depth of its soles below the lowest
     joint."""
 
@@ -77,12 +77,12 @@ class Body:
         return np.array([(limb.start_radius, limb.end_radius) for limb in self.limbs], np.float32)
 
 
-def dress(skeleton: Skeleton) -> Body:
+def dress(skeleton: Skeleton) -> BodyShape:
     """Build the body of a skeleton that stands in its rest pose, facing +Z."""
     return _BodyBuilder(skeleton, skeleton.rest, np.broadcast_to(np.eye(3), (len(skeleton), 3, 3))).body()
 
 
-def dress_clip(clip: MotionClip) -> Body:
+def dress_clip(clip: MotionClip) -> BodyShape:
     """Build the body of a clip's skeleton, whatever its rest pose is."""
     if clip.skeleton.facing:
         return dress(clip.skeleton)
@@ -150,10 +150,10 @@ class _BodyBuilder:
             if self.top[j] == j and self.part[j] != "middle" and not self._is_detail(j):
                 self.trunk.update(self._ancestors(j))
 
-    def body(self) -> Body:
+    def body(self) -> BodyShape:
         limbs = [self.bone(j) for j in range(1, len(self.skeleton)) if self.length(j) > 1e-4]
         limbs += [*self.head(), *self.hands(), *self.feet()]
-        return Body(tuple(limbs), height=self.height + 0.2 * self.unit, sole=SOLE * self.unit)
+        return BodyShape(tuple(limbs), height=self.height + 0.2 * self.unit, sole=SOLE * self.unit)
 
     def _fixed_to(self, joint: int, vector: NDArray[np.floating]) -> Vector:
         """Return a world vector of the standing pose in the joint's own axes."""

@@ -16,7 +16,7 @@ from importlib import resources
 
 from marey.core.characters import escape
 from marey.motion.skeleton import Skeleton
-from marey.viz.body import Body
+from marey.viz.body import BodyShape
 
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _POLICY = '\n<meta http-equiv="Content-Security-Policy" content="{policy}">'
@@ -90,7 +90,7 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
 
 
-def body_document(skeleton: Skeleton, body: Body) -> dict[str, object]:
+def body_document(skeleton: Skeleton, body: BodyShape) -> dict[str, object]:
     """Return a skeleton and its body in the form that scene.js reads."""
     return {
         "parents": list(skeleton.parents),

@@ -18,7 +18,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import global_rotations
 from marey.motion.rotations import to_matrix
-from marey.viz.body import Body, dress_clip
+from marey.viz.body import BodyShape, dress_clip
 from marey.viz.paper import Paper, Theme, blend
 from marey.viz.raster import Camera, shade
 
@@ -46,7 +46,7 @@ class Strip:
     clip: MotionClip
     frames: NDArray[np.intp]
     cell: Size
-    body: Body
+    body: BodyShape
     limbs: NDArray[np.float32]
     root: NDArray[np.float32]
     scale: float

@@ -12,7 +12,7 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.cli.backup import Manifest, export_tenant, import_tenant
+from marey.cli.backup import BackupManifest, export_tenant, import_tenant
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
 from marey.db import transaction
 from marey.jobs import (
@@ -135,7 +135,7 @@ def edit_manifest(folder: Path, **changes: object) -> None:
 
 def edit_job(folder: Path, change: Callable[[bytes], bytes]) -> None:
     """Change the records of the first job, and its hash with them: a forger's work."""
-    manifest = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
+    manifest = BackupManifest.model_validate_json((folder / "manifest.json").read_bytes())
     first = next(iter(manifest.jobs))
     path = folder / "jobs" / f"{first}.jsonl"
     data = change(path.read_bytes())

@@ -18,7 +18,7 @@ from marey.api.health.metrics import render
 from marey.cli import checkup
 from marey.cli import checkup_backing as backing
 from marey.cli.checkup import models
-from marey.cli.findings import Check
+from marey.cli.findings import Finding
 from marey.core.settings import Settings
 from marey.db import downgrade, transaction
 from marey.jobs import WorkerHeartbeat, beat, record_scheduler_heartbeat
@@ -29,7 +29,7 @@ from tests.support.live_api import BUNDLE, write_bundle
 from tests.support.models import TEXT_BUNDLES, add_text_bundles
 
 
-def bad(check: Check, *said: str, state: str = "bad") -> None:
+def bad(check: Finding, *said: str, state: str = "bad") -> None:
     """It is bad, and its words hold all of `said`, with something to do."""
     assert check.state == state, check
     assert check.hint
@@ -51,7 +51,7 @@ def test_items_that_nobody_serves_are_told_with_the_worker_to_start(engine: sa.E
     bad(backing.workers(engine), "items wait in hgm3", "marey worker hgm3")
     with transaction(engine) as conn:
         beat(conn, WorkerHeartbeat("one", "hgm3", "here", 1, "cpu"))
-    assert backing.workers(engine) == Check("workers", "ok", "1 live, for hgm3")
+    assert backing.workers(engine) == Finding("workers", "ok", "1 live, for hgm3")
     with transaction(engine) as conn:
         beat(conn, WorkerHeartbeat("two", "hgm3", "there", 2, "cpu"))
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 hour' WHERE id = 'two'"))

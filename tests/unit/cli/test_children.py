@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from marey.cli.children import Child
+from marey.cli.children import SupervisedProcess
 
 BEFORE = "marey: an error of the process before it\n"
 
 
 def said_of(script: str, log: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """Report on a child that runs the script to its end."""
-    child = Child("child", [sys.executable, "-c", script], dict(os.environ), log)
+    child = SupervisedProcess("child", [sys.executable, "-c", script], dict(os.environ), log)
     child.start(time.monotonic())
     assert child.process is not None
     child.process.wait(60)

@@ -95,7 +95,7 @@ def test_a_run_that_is_not_done_exits_6(state: str) -> None:
 def commands(monkeypatch: pytest.MonkeyPatch) -> tuple[typer.Typer, list[list[str]]]:
     """The real group around commands that only note what they were called with."""
     called: list[list[str]] = []
-    app = typer.Typer(cls=schedules.Schedules)
+    app = typer.Typer(cls=schedules.ScheduleGroup)
 
     @app.command()
     def add(cron: str, bundle: str = typer.Option(...)) -> None:

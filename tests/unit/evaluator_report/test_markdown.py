@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from marey.evaluator.report import ArtifactReference, HeatCell, Report, Row, to_markdown
+from marey.evaluator.report import ArtifactReference, HeatCell, MetricRow, Report, to_markdown
 from tests.support.reports import sample_report
 
 HOSTILE = (
@@ -17,7 +17,7 @@ HOSTILE = (
 
 def hostile_report(report: Report) -> Report:
     exhibit = dataclasses.replace(report.worst[0], prompt=HOSTILE, reason=HOSTILE)
-    rows = (*report.rows[:-1], Row("exported", HOSTILE, HOSTILE, report.rows[-1].values))
+    rows = (*report.rows[:-1], MetricRow("exported", HOSTILE, HOSTILE, report.rows[-1].values))
     return dataclasses.replace(
         report,
         title=HOSTILE,

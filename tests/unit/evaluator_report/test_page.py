@@ -19,8 +19,8 @@ from marey.evaluator.report import (
     Exhibit,
     HeatCell,
     Metric,
+    MetricRow,
     Report,
-    Row,
     TrendPoint,
     Value,
     from_json,
@@ -105,7 +105,7 @@ def hostile(report: Report) -> Report:
         source=ArtifactReference(HOSTILE, HOSTILE),
         comparability=HOSTILE,
         metrics=metrics,
-        rows=tuple(Row(r.key, HOSTILE, HOSTILE, r.values) for r in report.rows),
+        rows=tuple(MetricRow(r.key, HOSTILE, HOSTILE, r.values) for r in report.rows),
         baselines=tuple(Baseline(b.against, HOSTILE, HOSTILE, b.finished) for b in report.baselines),
         alarms=(HOSTILE,) * len(report.alarms),
         trend=tuple(TrendPoint(t.finished, HOSTILE, f"{HOSTILE}{t.bundle}", t.values) for t in report.trend),
@@ -257,7 +257,11 @@ def test_parts_without_content_are_left_out() -> None:
 
 def test_a_report_of_joints_alone_names_no_evaluator() -> None:
     metric = Metric("skate", "Foot skate", "%", "lower", 1)
-    rows = (Row("ground_truth", "ground truth"), Row("reconstruction", "reconstruction"), Row("exported", "exported"))
+    rows = (
+        MetricRow("ground_truth", "ground truth"),
+        MetricRow("reconstruction", "reconstruction"),
+        MetricRow("exported", "exported"),
+    )
     bare = sample_report(
         metrics=(metric,), rows=rows, changes=(), trend=(), baselines=(), regressed=None, alarms=(), evaluator=None
     )

@@ -60,7 +60,7 @@ def body_frame(vectors: Array, heading_degrees: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Gait:
+class GaitMeasures:
     """Travel of the body.
 
     Attributes:
@@ -89,7 +89,7 @@ class Gait:
     airborne: float
 
 
-def gait(joints: Array, fps: float) -> Gait:
+def gait(joints: Array, fps: float) -> GaitMeasures:
     """Measure the travel of a motion (T, 22, 3)."""
     joints = np.asarray(joints, np.float64)
     angle = heading(joints, fps)
@@ -100,7 +100,7 @@ def gait(joints: Array, fps: float) -> Gait:
     travelled = np.hypot(flow[:, 0], flow[:, 2])
     moving = travelled * fps > 0.25
     path = float(travelled[moving].sum())
-    return Gait(
+    return GaitMeasures(
         duration=len(joints) / fps,
         path=path,
         forward=float(forward),

@@ -14,7 +14,7 @@ from marey.checks.kinematics import (
     TOES,
     WRISTS,
     Array,
-    Gait,
+    GaitMeasures,
     body_frame,
     gait,
     heading,
@@ -83,7 +83,7 @@ class Stretch:
         return heading(self.joints, self.fps)
 
     @cached_property
-    def gait(self) -> Gait:
+    def gait(self) -> GaitMeasures:
         """Travel, turn, steps."""
         return gait(self.joints, self.fps)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import Gait, Hand, gait, hand, lean
+from marey.checks.kinematics import GaitMeasures, Hand, gait, hand, lean
 from marey.checks.strikes import is_lively, kicks, punches, slashes
 
 LEFT, RIGHT = 0, 1
@@ -65,14 +65,14 @@ class Facts:
     act: str
     style: str
     side: str
-    gait: Gait
+    gait: GaitMeasures
     hands: tuple[Hand, Hand]
     lean: float
     repeats: int = 1
     text: tuple[tuple[str, ...], ...] = ()
 
 
-def measure(joints: NDArray[np.floating], fps: float) -> tuple[Gait, tuple[Hand, Hand], float]:
+def measure(joints: NDArray[np.floating], fps: float) -> tuple[GaitMeasures, tuple[Hand, Hand], float]:
     """Gait, both hands and the deepest lean of a motion (T, 22, 3)."""
     bend = lean(np.asarray(joints, np.float64), fps)
     return gait(joints, fps), (hand(joints, fps, LEFT), hand(joints, fps, RIGHT)), float(bend.max() - np.median(bend))

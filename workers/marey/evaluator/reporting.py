@@ -25,10 +25,10 @@ from marey.evaluator.report import (
     GenerationSpeed,
     HeatCell,
     Metric,
+    MetricRow,
     MotionScore,
     Repeats,
     Report,
-    Row,
     TrendPoint,
     from_json,
 )
@@ -141,7 +141,7 @@ def _scores(
     )
 
 
-def _reconstruction(found: Reconstruction | None, ruler: Ruler, metrics: Sequence[Metric]) -> Row:
+def _reconstruction(found: Reconstruction | None, ruler: Ruler, metrics: Sequence[Metric]) -> MetricRow:
     source = "+".join(ruler.splits)
     if found is None or source not in found.values:
         return reconstruction_row(None, "real motion through the tokenizer")
@@ -164,7 +164,7 @@ def _earlier(source: ScoreInput) -> tuple[Earlier, ...]:
     return tuple(found)
 
 
-def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...]:
+def _trend(source: ScoreInput, row: MetricRow, now: datetime) -> tuple[TrendPoint, ...]:
     here = {key: value.mean for key, value in row.values.items() if value.mean is not None}
     points = [(run.finished, str(run.id), run.request.bundle, run.summary) for run in source.history]
     points.append((now, str(source.evaluation), source.request.bundle, here))

@@ -13,7 +13,7 @@ from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.measuring import EvaluatedMotions, embed_prompts
 from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
 from marey.evaluator.reference import RealClips, ReferenceSplit
-from marey.evaluator.report import Row, Value
+from marey.evaluator.report import MetricRow, Value
 from marey.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
 from marey.evaluator.scoring import (
     POOLS,
@@ -86,7 +86,7 @@ class Ruler:
         return values | on_joints(found, embeddings.variants)
 
 
-def truth_row(ruler: Ruler) -> Row:
+def truth_row(ruler: Ruler) -> MetricRow:
     """Return the row of real motion with its own captions, measured by the same network and checker."""
     split = ruler.real.joined(ruler.splits)
     rows = np.arange(len(split.clips))
@@ -101,19 +101,21 @@ def truth_row(ruler: Ruler) -> Row:
         values |= {
             key: replace(value, note=value.note or note) for key, value in values.items() if key in keys_of(pool)
         }
-    return Row(
+    return MetricRow(
         GROUND_TRUTH, "Real motion", f"{len(split.clips)} clips of {_named(ruler.splits)} with their captions", values
     )
 
 
-def reconstruction_row(values: Mapping[str, Value] | None, note: str) -> Row:
+def reconstruction_row(values: Mapping[str, Value] | None, note: str) -> MetricRow:
     """Return the row of real motion through the generator's tokenizer: the upper bound of the generator."""
     if values is None:
         values = {key: Value.missing(UNMEASURED) for key in (OBEYED, RETRIEVED, "fid")}
-    return Row(RECONSTRUCTION, "Reconstruction", note, values)
+    return MetricRow(RECONSTRUCTION, "Reconstruction", note, values)
 
 
-def generated_rows(measured: EvaluatedMotions, sets: tuple[EmbeddedSet, EmbeddedSet], ruler: Ruler) -> tuple[Row, Row]:
+def generated_rows(
+    measured: EvaluatedMotions, sets: tuple[EmbeddedSet, EmbeddedSet], ruler: Ruler
+) -> tuple[MetricRow, MetricRow]:
     """Return the rows `raw` and `exported` of measured motions, from their two embedded sets."""
     raw, exported = (
         ruler.values(embeddings, found, measured.indices, distances=True)
@@ -127,8 +129,8 @@ def generated_rows(measured: EvaluatedMotions, sets: tuple[EmbeddedSet, Embedded
         )
     )
     return (
-        Row("raw", "Generated", "features as the network made them", raw),
-        Row(
+        MetricRow("raw", "Generated", "features as the network made them", raw),
+        MetricRow(
             "exported",
             "Exported",
             "as users get them: feet locked, rotations solved",

@@ -13,7 +13,7 @@ from marey.cli.database import engine_of, operator, settings_here
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from marey.cli.backup import Manifest
+    from marey.cli.backup import BackupManifest
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the backup.")]
 Tenant = Annotated[str, typer.Option("--tenant", help="Tenant of the jobs.")]
@@ -45,7 +45,7 @@ def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = 
     _tell(manifest, as_json, written=written)
 
 
-def _note(engine: sa.Engine, tenant: str, verb: str, manifest: Manifest, jobs: int) -> None:
+def _note(engine: sa.Engine, tenant: str, verb: str, manifest: BackupManifest, jobs: int) -> None:
     from marey.db import transaction
     from marey.tenants import audit
 
@@ -54,7 +54,7 @@ def _note(engine: sa.Engine, tenant: str, verb: str, manifest: Manifest, jobs: i
     engine.dispose()
 
 
-def _tell(manifest: Manifest, as_json: bool, *, written: int) -> None:
+def _tell(manifest: BackupManifest, as_json: bool, *, written: int) -> None:
     if as_json:
         document = manifest.model_dump(mode="json", exclude={"jobs"})
         console.result_json({**document, "jobs": len(manifest.jobs), "written": written})

@@ -23,7 +23,7 @@ Run = Annotated[str, typer.Argument(metavar="RUN", help=f"The evaluation: {FORMS
 Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help=f"Evaluations: of each {FORMS}.")]
 
 
-class State(StrEnum):
+class EvaluationStateOption(StrEnum):
     """States of evaluations."""
 
     PLANNED = "planned"
@@ -91,7 +91,7 @@ def wait_for(
 
 @app.command("list")
 def list_runs(
-    state: Annotated[State | None, typer.Option("--state", help="Only runs in this state.")] = None,
+    state: Annotated[EvaluationStateOption | None, typer.Option("--state", help="Only runs in this state.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,

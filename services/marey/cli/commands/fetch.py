@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from marey.client import Client, FetchedItem
 
 
-class Review(StrEnum):
+class FetchReviewOption(StrEnum):
     """Reviews of a motion."""
 
     KEPT = "kept"
@@ -32,7 +32,7 @@ def fetch(
     output: options.Folder = Path(),
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
-    only: Annotated[Review | None, typer.Option("--only", help="Only motions with this review.")] = None,
+    only: Annotated[FetchReviewOption | None, typer.Option("--only", help="Only motions with this review.")] = None,
     prune: Annotated[
         bool,
         typer.Option("--prune", help="Remove files of earlier fetches that are no longer part of the job's selection."),
@@ -64,7 +64,7 @@ def write_job(
     formats: Sequence[str] | None,
     *,
     template: str = options.TEMPLATE,
-    only: Review | None = None,
+    only: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
     as_json: bool = False,
@@ -91,7 +91,7 @@ def fetch_job(
     formats: Sequence[str] | None = None,
     *,
     template: str = options.TEMPLATE,
-    only: Review | None = None,
+    only: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
 ) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console, options
-from marey.cli.commands.submit import read_prompts
+from marey.cli.commands.submit import read_prompts, row_defaults
 from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
@@ -61,15 +61,7 @@ def generate(
 
     check_template(name_template)
     kinds = _exporters(formats)
-    defaults = rows.defaults_of(
-        model=model,
-        seconds=seconds,
-        seed=seed,
-        variants=variants,
-        fps=fps,
-        tags=tags,
-        settings=options.settings_of(sampling or ()),
-    )
+    defaults = row_defaults(sampling, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)

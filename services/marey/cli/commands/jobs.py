@@ -34,7 +34,7 @@ COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
-class State(StrEnum):
+class JobStateOption(StrEnum):
     """States of jobs."""
 
     QUEUED = "queued"
@@ -48,7 +48,7 @@ class State(StrEnum):
 
 @app.command("list")
 def list_jobs(
-    state: Annotated[State | None, typer.Option("--state", help="Only jobs in this state.")] = None,
+    state: Annotated[JobStateOption | None, typer.Option("--state", help="Only jobs in this state.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,

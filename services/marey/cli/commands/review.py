@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console
-from marey.cli.commands.takes import Review
+from marey.cli.commands.takes import ReviewOption
 from marey.cli.references import FORMS, find
 from marey.core.errors import Conflict, InvalidInput, NotFound
 
@@ -41,7 +41,7 @@ def review(
         typer.Option("-o", "--output", help="A .html (3D players) or .png (contact sheet); several get -1, -2, …"),
     ] = Path("review.html"),
     reviews: Annotated[
-        list[Review] | None, typer.Option("--review", help="Only motions with this review; may be repeated.")
+        list[ReviewOption] | None, typer.Option("--review", help="Only motions with this review; may be repeated.")
     ] = None,
     tags: Annotated[list[str] | None, typer.Option("--tag", help="Only motions with this tag.")] = None,
     per_page: Annotated[
@@ -138,14 +138,14 @@ def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
 
 
 def _motions(
-    client: Client, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
+    client: Client, job: str, reviews: list[ReviewOption] | None, tags: list[str] | None, skip: int, limit: int
 ) -> tuple[list[Motion], bool]:
     """Return the motions to show, in the order of the job's items, and True if there are more.
 
     Raises:
         NotFound: none.
     """
-    wanted, of_each = {review.value for review in reviews or Review}, set(tags or ())
+    wanted, of_each = {review.value for review in reviews or ReviewOption}, set(tags or ())
     motions = (item.motion for item in client.jobs.items(job, state="succeeded") if item.motion)
     chosen = (motion for motion in motions if of_each <= set(motion.tags) and _verdict(motion) in wanted)
     found = list(islice(chosen, skip, skip + limit + 1))
@@ -213,7 +213,7 @@ def _facts(motion: Motion) -> str:
 
 
 def _verdict(motion: Motion) -> str:
-    return motion.review.verdict if motion.review else Review.NEW.value
+    return motion.review.verdict if motion.review else ReviewOption.NEW.value
 
 
 def _review_text(motion: Motion) -> str:

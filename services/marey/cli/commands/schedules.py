@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
 
 
-class Schedules(TyperGroup):
+class ScheduleGroup(TyperGroup):
     """Commands, and cron expressions in the place of one: these hold a blank, and mean `add`."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -28,7 +28,7 @@ class Schedules(TyperGroup):
 
 
 app = typer.Typer(
-    cls=Schedules,
+    cls=ScheduleGroup,
     help='Evaluations that come again: `marey eval schedule "0 3 * * 1" --bundle hgm3` is every Monday at 03:00.',
     no_args_is_help=True,
 )

@@ -46,7 +46,7 @@ def serve(
     Supervisor(config, parse_roles(roles or default_roles(config))).run()
 
 
-class Part(StrEnum):
+class WorkerPart(StrEnum):
     """The role of a worker."""
 
     QUEUE = "queue"
@@ -64,7 +64,7 @@ def worker(
         ),
     ] = None,
     only: Annotated[
-        Part | None,
+        WorkerPart | None,
         typer.Option(
             "--only", help="A model that streams has two processes, its queue and its live streams: one of them."
         ),
@@ -76,7 +76,7 @@ def worker(
     from marey.core.extras import needs_extra
 
     try:
-        from marey.cli.children import Child, keep_all, marey, metrics_port
+        from marey.cli.children import SupervisedProcess, keep_all, marey, metrics_port
         from marey.core.settings import settings
         from marey.runtime.worker import worker_main
     except ImportError as error:
@@ -90,7 +90,7 @@ def worker(
     model = expand(model.replace(",", "+"), settings())
     queues = parse_roles(model, where)[0]
     shown = live_models(queues)
-    if only is Part.LIVE:
+    if only is WorkerPart.LIVE:
         from marey.runtime.live.main import live_main
 
         if len(shown) != 1:
@@ -100,12 +100,14 @@ def worker(
         (factory,) = shown.values()
         raise typer.Exit(live_main(factory, settings()))
     role = role_of(queues, settings())
-    if only is Part.QUEUE or not shown or not settings().live_slots:
+    if only is WorkerPart.QUEUE or not shown or not settings().live_slots:
         raise typer.Exit(worker_main(role, settings()))
     parts = [(f"{model} queue", [model, "--only", "queue"])]
     parts += [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
     places = [{**os.environ, **metrics_port(settings(), place)} for place in range(len(parts))]
-    keep_all([Child(n, marey("worker", *rest), place) for (n, rest), place in zip(parts, places, strict=True)])
+    keep_all(
+        [SupervisedProcess(n, marey("worker", *rest), place) for (n, rest), place in zip(parts, places, strict=True)]
+    )
 
 
 def scheduler() -> None:

@@ -15,9 +15,10 @@ from marey.items.item import InvalidItems
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import Unpack
 
     from marey.client import CheckedJob, Client
-    from marey.client.jobs import JobOptions
+    from marey.client.jobs import Defaults, JobOptions
     from marey.client.lines import Lines
 
 
@@ -65,15 +66,8 @@ def submit(
         from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
-    defaults = rows.defaults_of(
-        model=model,
-        bundle=bundle,
-        seconds=seconds,
-        seed=seed,
-        variants=variants,
-        fps=fps,
-        tags=tags,
-        settings=options.settings_of(sampling or ()),
+    defaults = row_defaults(
+        sampling, model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     with Lines(item.as_json() for item in reader) as lines:
@@ -132,6 +126,19 @@ def _show_check(checked: CheckedJob) -> None:
     console.say(estimate.basis)
 
 
+def row_defaults(sampling: list[str] | None, **given: Unpack[Defaults]) -> Mapping[str, object]:
+    """Return the fields of rows that do not set them, from the options of a command.
+
+    Args:
+        sampling: the values of `--set`.
+
+    Raises:
+        InvalidInput: an option is out of range, or a `--set` is not NAME=VALUE.
+    """
+    given["settings"] = options.settings_of(sampling or ())
+    return rows.defaults_of(**given)
+
+
 def read_prompts(
     prompts: list[str] | None,
     file: str | None,
@@ -142,7 +149,7 @@ def read_prompts(
     """The items of PROMPT… or of -f.
 
     Args:
-        defaults: `rows.defaults_of` the options of the command.
+        defaults: `row_defaults` of the options of the command.
         extra_columns: of a CSV.
 
     Raises:

@@ -26,7 +26,7 @@ Motions = Annotated[list[str], typer.Argument(metavar="ID…", help=f"Motions: o
 Comment = Annotated[str | None, typer.Option("--comment", help="A comment on the review.")]
 
 
-class Review(StrEnum):
+class ReviewOption(StrEnum):
     """Reviews of motions; new = not reviewed."""
 
     NEW = "new"
@@ -46,7 +46,8 @@ def list_motions(
         str | None, typer.Option("--text", help='Words of the prompt in any form; "a phrase", or, -not.')
     ] = None,
     reviews: Annotated[
-        list[Review] | None, typer.Option("--review", help="Only motions with this review; repeated: any of them.")
+        list[ReviewOption] | None,
+        typer.Option("--review", help="Only motions with this review; repeated: any of them."),
     ] = None,
     job: Annotated[str | None, typer.Option("--job", help=f"Of a job ({FORMS}), in the order they were made.")] = None,
     limit: console.Limit = None,
@@ -115,7 +116,7 @@ def _review(
                 if as_json:
                     console.result_json(motion.raw)
                 else:
-                    console.say(f"{motion.id} {motion.review.verdict if motion.review else Review.NEW.value}")
+                    console.say(f"{motion.id} {motion.review.verdict if motion.review else ReviewOption.NEW.value}")
 
 
 def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:

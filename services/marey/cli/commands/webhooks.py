@@ -30,7 +30,7 @@ Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help=f"The webhook: {FORMS
 Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help=f"Webhooks: of each {FORMS}.")]
 
 
-class State(StrEnum):
+class DeliveryStateOption(StrEnum):
     """State of a delivery."""
 
     PENDING = "pending"
@@ -132,7 +132,7 @@ def deliveries(
     event: Annotated[
         str | None, typer.Argument(metavar="[EVENT]", help="Show every attempt of this delivery.", show_default=False)
     ] = None,
-    state: Annotated[State | None, typer.Option("--state", help="Only deliveries in this state.")] = None,
+    state: Annotated[DeliveryStateOption | None, typer.Option("--state", help="Only deliveries in this state.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
@@ -171,7 +171,9 @@ def replay(
     with Client() as client:
         webhook = find(client, "webhook", webhook).id
         given = [each.id for each in find_all(client, "delivery", events or (), webhook=webhook)]
-        wanted = given or [each.event for each in client.webhooks.deliveries(webhook, state=State.FAILED.value)]
+        wanted = given or [
+            each.event for each in client.webhooks.deliveries(webhook, state=DeliveryStateOption.FAILED.value)
+        ]
         for event in wanted:
             found = client.webhooks.replay(webhook, event)
             if as_json:
@@ -202,9 +204,9 @@ def send_test(
         console.result_json(found.raw)
     else:
         console.result(found.event)
-    if found.state == State.FAILED:
+    if found.state == DeliveryStateOption.FAILED:
         raise ItemsFailed(f"it did not arrive: {found.error}", where=f"webhook {webhook}")
-    if found.state == State.DELIVERED:
+    if found.state == DeliveryStateOption.DELIVERED:
         console.say(f"it arrived: {found.status}")
 
 

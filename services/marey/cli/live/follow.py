@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from marey.cli import console
 from marey.cli.live.pace import Pace
 from marey.cli.live.screen import Screen
-from marey.cli.live.steering import HELP, Command, Interrupts, Lines, command_of
+from marey.cli.live.steering import HELP, Command, Interrupts, StdinLines, command_of
 from marey.client import Frame, FramesMissing, StreamChanged, StreamProblem
 from marey.core.errors import InvalidInput, MareyError
 
@@ -44,7 +44,7 @@ class Follower:
         self._interrupts = interrupts
         self._as_json = as_json
         self._screen = Screen()
-        self._lines = Lines()
+        self._lines = StdinLines()
         self._pace = Pace(live.stream.fps or DEFAULT_FPS)
         self._outbox: deque[Command] = deque()
         self._sent = 0.0

@@ -42,7 +42,7 @@ def command_of(line: str) -> Command | None:
     return Command("steer", check_prompt(text))
 
 
-class Lines:
+class StdinLines:
     """The lines of stdin as they arrive; the end of stdin has no effect.
 
     They are read from the descriptor: a thread that waits in Python's own `stdin` at exit crashes the program.

@@ -18,8 +18,8 @@ from marey.evaluator.report.parts import (
     GenerationSpeed,
     HeatCell,
     Metric,
+    MetricRow,
     Repeats,
-    Row,
     TrendPoint,
     aware,
     distinct,
@@ -139,7 +139,7 @@ class Report:
     failed: int = 0
     repeats: Repeats
     metrics: tuple[Metric, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[MetricRow, ...]
     judged: str = "exported"
     baselines: tuple[Baseline, ...] = ()
     changes: tuple[Change, ...] = ()
@@ -178,7 +178,7 @@ class Report:
         """Return a column by its key."""
         return next(metric for metric in self.metrics if metric.key == key)
 
-    def row(self, key: str) -> Row:
+    def row(self, key: str) -> MetricRow:
         """Return a row by its key."""
         return next(row for row in self.rows if row.key == key)
 

@@ -92,7 +92,7 @@ class Metric:
 
 
 @dataclass(frozen=True)
-class Row:
+class MetricRow:
     """One row: ground truth, reconstruction, raw, exported, a ceiling.
 
     Attributes:

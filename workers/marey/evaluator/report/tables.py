@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from marey.evaluator.report.model import ALWAYS, Baseline, Report
-from marey.evaluator.report.parts import HeatCell, Metric, Row, TrendPoint
+from marey.evaluator.report.parts import HeatCell, Metric, MetricRow, TrendPoint
 from marey.evaluator.report.words import (
     SUBJECTS,
     arrow,
@@ -117,7 +117,7 @@ def _lines(report: Report, metrics: Sequence[Metric], footnotes: _Footnotes) -> 
     return lines
 
 
-def _value(row: Row, metric: Metric, footnotes: _Footnotes) -> Cell:
+def _value(row: MetricRow, metric: Metric, footnotes: _Footnotes) -> Cell:
     value = row.values.get(metric.key)
     if value is None:
         return Cell("blank")
