@@ -22,6 +22,7 @@ from marey.data.pack import JointsPack, PackClip
 from marey.data.prepared import PreparedData
 from marey.data.retime import held_longer
 from marey.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
+from marey.motion.rotations import about, rotate
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
 
 MOTIONS = {
@@ -319,3 +320,10 @@ def test_a_failed_build_leaves_no_folder(tmp_path, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         build([synthetic_pack()], tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_features_do_not_know_which_way_a_clip_faces_or_where_it_is():
+    here = walker(4.0, turn=60.0).astype(np.float64)
+    there = rotate(about("y", np.full((len(here), 1), 2.1)), here) + np.array([3.0, 0.0, -2.0])
+    encoded = [LAYOUT.encode(LAYOUT.canonicalize(joints)) for joints in (here, there)]
+    assert np.abs(encoded[0] - encoded[1]).max() < 1e-6  # so turning clips about would add nothing to training

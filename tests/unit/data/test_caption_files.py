@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, InvalidInput
 from marey.core.hashing import sha256_of
 from marey.data.build import build
 from marey.data.caption_files import read_caption_files
@@ -77,3 +77,25 @@ def test_every_clip_of_a_known_set_that_is_used_is_captioned(name: str) -> None:
     files = read_caption_files(SETS / name, rows)
     captioned = {clip for file in files for clip in file.captions}
     assert {row.id for row in rows if row.action != UNUSED} - captioned == set()
+
+
+def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder: Path) -> None:
+    (folder / INDEX).write_text(
+        "file,start,end,action,captions,split\n"
+        "a.bvh,0,90,walk,walks 2 seconds|walks,train\na.bvh,90,100,none,,\na.bvh,10,70,walk,walks,test\n"
+    )
+    pack = pack_set(CaptureSet.own(folder), processes=1)
+    build([pack], folder / "out", speed=0.2)
+    data = PreparedData.open(folder / "out")
+    found = {clip.id: clip for clip in data.clips}
+    assert sorted(found) == sorted(f"{m}{n}" for m in ("", "M") for n in ("a@0", "a@0*0.8", "a@0*1.2", "a@10"))
+    assert (found["a@0*0.8"].speed, found["a@0*1.2"].speed) == (0.8, 1.2)
+    frames = found["a@0"].length
+    assert found["a@0*0.8"].length == pytest.approx(frames / 0.8, abs=1)
+    assert found["a@0*1.2"].length == pytest.approx(frames / 1.2, abs=1)
+    assert found["a@0*1.2"].measured.speed == pytest.approx(1.2 * found["a@0"].measured.speed, rel=0.05)
+    assert "walks 2 seconds" in found["a@0"].captions
+    assert "walks 2 seconds" not in found["a@0*1.2"].captions
+    assert data.manifest.kinds == {"captured": 2, "mirrored": 2, "retimed": 4}
+    with pytest.raises(InvalidInput, match="a share of 0"):
+        build([pack], folder / "more", speed=0.9)

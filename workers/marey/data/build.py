@@ -25,6 +25,7 @@ from marey.data.licences import check_mix
 from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
+from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
 from marey.data.splits import Sourced, actions_of, splits_by_source
 from marey.motion.features import HUMANML3D_263
@@ -34,6 +35,7 @@ Array = NDArray[np.floating]
 # shoulders count alike; frame 0 has no jump; it is held where a body has none. Decoding is that of HumanML3D.
 LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed", held=True)
 COMPOSITIONAL_SPLIT = "compositional"
+LARGEST_SPEED = 0.5
 
 Progress = Callable[[int, int], None]
 
@@ -84,34 +86,51 @@ def with_splits(packs: Sequence[JointsPack], left_out: dict[str, str]) -> list[J
     ]
 
 
-def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[Part]:
+def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str], speed: float = 0.0) -> Iterator[Part]:
     """Windows of each captured clip and its mirror image, with their facts; rejected clips are counted in
-    `left_out`."""
+    `left_out`. With `speed`, training clips are followed by themselves slower and faster by that share."""
     held_out = held_out_pairs(packs)
     idles = _idles(packs)
     for pack in packs:
         for captured in pack.clips:
             clip, whole = _lengthened(captured, pack.joints(captured), idles)
-            pieces = windows(len(whole))
-            for mirrored in (False, True):
-                content = swap_sides(clip.content) if mirrored else clip.content
-                if mirrored and (content, clip.style) in held_out and clip.split != COMPOSITIONAL_SPLIT:
-                    left_out[f"M{clip.id}"] = "its mirror image shows a held-out pair"
-                    continue
-                for k, piece in enumerate(pieces):
-                    joints = LAYOUT.mirror_joints(whole[piece]) if mirrored else whole[piece]
-                    name = ("M" if mirrored else "") + clip.id + (f"@{k}" if len(pieces) > 1 else "")
-                    facts = _facts(clip, content, joints, mirrored=mirrored)
-                    if len(joints) <= MIN_FRAMES:
-                        left_out[name] = "shorter than a second"
-                    elif is_broken(joints, FPS):
-                        left_out[name] = "broken capture: joints bend or jump as no body does"
-                    elif _jumps(joints):
-                        left_out[name] = "the body has no clear heading"
-                    elif facts is None:
-                        left_out[name] = "label and motion contradict each other"
-                    else:
-                        yield Part(name, clip, content, mirrored, joints, facts)
+            yield from _windows_of(clip, whole, 1.0, held_out, left_out)
+            if speed and clip.split == "train":
+                told = _said(clip, wording.retimed)
+                for factor in (1 - speed, 1 + speed):
+                    retimed = resample_points(whole.astype(np.float64), FPS * factor, FPS).astype(np.float32)
+                    yield from _windows_of(told, retimed, factor, held_out, left_out)
+
+
+def _windows_of(
+    clip: PackClip,
+    whole: NDArray[np.float32],
+    speed: float,
+    held_out: frozenset[tuple[str, str]],
+    left_out: dict[str, str],
+) -> Iterator[Part]:
+    """Windows of a clip (T, 22, 3) and its mirror image."""
+    pieces = windows(len(whole))
+    pace = "" if speed == 1 else f"*{speed:g}"
+    for mirrored in (False, True):
+        content = swap_sides(clip.content) if mirrored else clip.content
+        if mirrored and (content, clip.style) in held_out and clip.split != COMPOSITIONAL_SPLIT:
+            left_out[f"M{clip.id}{pace}"] = "its mirror image shows a held-out pair"
+            continue
+        for k, piece in enumerate(pieces):
+            joints = LAYOUT.mirror_joints(whole[piece]) if mirrored else whole[piece]
+            name = ("M" if mirrored else "") + clip.id + pace + (f"@{k}" if len(pieces) > 1 else "")
+            facts = _facts(clip, content, joints, mirrored=mirrored)
+            if len(joints) <= MIN_FRAMES:
+                left_out[name] = "shorter than a second"
+            elif is_broken(joints, FPS):
+                left_out[name] = "broken capture: joints bend or jump as no body does"
+            elif _jumps(joints):
+                left_out[name] = "the body has no clear heading"
+            elif facts is None:
+                left_out[name] = "label and motion contradict each other"
+            else:
+                yield Part(name, clip, content, mirrored, joints, facts, speed)
 
 
 IDLE = "idle"
@@ -227,6 +246,7 @@ class FolderWriter:
                 content=part.content,
                 style=part.source.style,
                 mirrored=part.mirrored,
+                speed=part.speed,
                 spliced=spliced,
                 acts=tuple(facts.act for facts in acts),
                 sides=tuple(facts.side for facts in acts),
@@ -326,6 +346,8 @@ class FolderWriter:
 def _kind(clip: Clip) -> str:
     if clip.spliced:
         return "spliced" if len(clip.acts) > 1 else "looped"
+    if clip.speed != 1:
+        return "retimed"
     return "mirrored" if clip.mirrored else "captured"
 
 
@@ -337,26 +359,32 @@ def _raw_to_npy(raw: Path, path: Path, shape: tuple[int, ...], dtype: str) -> No
     raw.unlink()
 
 
-def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None = None) -> Manifest:
+def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progress: Progress | None = None) -> Manifest:
     """Write a prepared folder.
 
     Args:
         packs: one a source.
         out: a folder that is empty or not there; it appears only when it is complete.
+        speed: share by which training clips are made slower and faster, beside themselves; 0: not at all.
         progress: called with clips done and clips in all.
 
     Raises:
         Conflict: the folder is not empty.
-        InvalidInput: no training clip is left, or the licences of the packs exclude each other.
+        InvalidInput: no training clip is left, the licences of the packs exclude each other, or a speed that is not
+            0 … 0.5.
     """
+    if not 0 <= speed <= LARGEST_SPEED:
+        raise InvalidInput(f"a speed of {speed:g}; it is a share of 0 to {LARGEST_SPEED:g}")
     check_mix({pack.terms_of(clip) for pack in packs for clip in pack.clips})
     left_out = {name: why for pack in packs for name, why in pack.left_out.items()}
     packs = with_splits(packs, left_out)
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
-    total = 2 * sum(len(pack.clips) for pack in packs) + sum(sum(vars(counts).values()) for counts in COUNTS.values())
+    total = (6 if speed else 2) * sum(len(pack.clips) for pack in packs)
+    total += sum(sum(vars(counts).values()) for counts in COUNTS.values())
     with FolderWriter(out) as writer:
-        for part in parts_of(packs, left_out):
-            by_split[part.source.split].append(part)
+        for part in parts_of(packs, left_out, speed):
+            if part.speed == 1:
+                by_split[part.source.split].append(part)
             writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
             if progress:
                 progress(len(writer.clips), total)

@@ -17,7 +17,7 @@ class Summary(BaseModel):
     Attributes:
         splits: clips by split.
         hours: of all clips, mirrored and spliced ones included.
-        kinds: captured, mirrored, looped (another length of one action), spliced (several actions).
+        kinds: captured, mirrored, retimed, looped (another length of one action), spliced (several actions).
         actions: captured and mirrored clips by action and side, then by split.
         sequences: spliced clips by their actions, the most frequent ones.
         styles: captured and mirrored clips by style, then by split.

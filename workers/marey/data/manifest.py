@@ -63,7 +63,7 @@ class Manifest(BaseModel):
     lengths: dict[str, dict[str, int]]
     """By split, how many clips have so many seconds (`0-1`, `1-2`, …)."""
     kinds: dict[str, int]
-    """captured, mirrored, looped, spliced."""
+    """captured, mirrored, retimed, looped, spliced."""
     captions: int
     caption_files: dict[str, str] = {}
     """Files with captions by people, as `set/captions-author.csv`, with the sha256 of each."""
@@ -95,10 +95,10 @@ class Clip(BaseModel):
     """One line of `clips.jsonl`.
 
     `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
-    its first part. `acts` are the actions in order, as the caption grammar calls them, `sides` the measured side of
-    each: left, right, both, or empty. Where several actions were joined, `seams` are the first frames of all but the
-    first action, and `act_captions` say each action alone. `authors` counts the captions of each author, in their
-    order; empty: all by one.
+    its first part. `speed` is how much faster it is than captured. `acts` are the actions in order, as the caption
+    grammar calls them, `sides` the measured side of each: left, right, both, or empty. Where several actions were
+    joined, `seams` are the first frames of all but the first action, and `act_captions` say each action alone.
+    `authors` counts the captions of each author, in their order; empty: all by one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -112,6 +112,7 @@ class Clip(BaseModel):
     content: str
     style: str
     mirrored: bool
+    speed: float = 1.0
     spliced: tuple[str, ...]
     acts: tuple[str, ...]
     sides: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ class Part:
         content: its label, sides exchanged when mirrored.
         joints: (T, 22, 3) float32 metres at 20 fps.
         facts: what it shows.
+        speed: how much faster it is than captured.
     """
 
     id: str
@@ -33,3 +34,4 @@ class Part:
     mirrored: bool
     joints: NDArray[np.float32]
     facts: Facts
+    speed: float = 1.0

@@ -1,4 +1,4 @@
-"""Captions by people, made true of a changed clip: mirrored, made to travel, or repeated."""
+"""Captions by people, made true of a changed clip: mirrored, made to travel, repeated, or retimed."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ _CYCLE = re.compile(
     r",? ?\b(?:for |through |just )?(?:one|a|a single|a full|one full|one whole) cycle\b(?! of)", re.IGNORECASE
 )
 _STILL_CYCLE = re.compile(r"\bcycle|\b(?:one|single) (?:stroke|breaststroke|stride|step)\b", re.IGNORECASE)
+_PACE = re.compile(r"\b(?:seconds?|m/s|speed of|metres? a second|meters? (?:a|per) second)\b", re.IGNORECASE)
 _PARTED = re.compile(r"^[\s,;]+|[\s,;]+$")
 
 
@@ -60,6 +61,11 @@ def travelling(text: str) -> str | None:
 def repeated(text: str) -> str | None:
     """A caption of one cycle, said of several of them; None where it counts the cycle in its own words."""
     return _without(text, _CYCLE, _STILL_CYCLE)
+
+
+def retimed(text: str) -> str | None:
+    """A caption of a slower or faster clip: the same, but for one that says how long or how fast in numbers."""
+    return None if _PACE.search(text) else text
 
 
 def _without(text: str, phrase: re.Pattern[str], rest: re.Pattern[str]) -> str | None:

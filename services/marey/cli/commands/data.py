@@ -49,13 +49,22 @@ def prepare(
     pairs: Sources,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],
     processes: Processes = 2,
+    speed: Annotated[
+        float,
+        typer.Option(
+            "--speed",
+            min=0.0,
+            max=0.5,
+            help="Add each training clip slower and faster by this share, such as 0.15.",
+        ),
+    ] = 0.0,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
     from marey.cli.roles import data
 
     sources = data.CaptureSources(_named(pairs), processes)
     with _progress() as progress:
-        manifest = data.prepare_data(sources, output, progress)
+        manifest = data.prepare_data(sources, output, speed, progress)
     console.say(f"{output}: {manifest}")
     console.result(str(output))
 

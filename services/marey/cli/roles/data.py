@@ -74,8 +74,10 @@ def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, in
     return paths
 
 
-def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> str:
-    """Prepare training data, and return a line that describes it.
+def prepare_data(
+    sources: CaptureSources, output: Path, speed: float, progress: Callable[[str, int, int | None], None]
+) -> str:
+    """Prepare training data, with clips slower and faster by the share `speed`, and return a line that describes it.
 
     Raises:
         InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
@@ -84,7 +86,7 @@ def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str,
     packs = read_captures(sources, progress)
     from marey.data.build import build
 
-    manifest = build(packs, output, progress=partial(progress, "building"))
+    manifest = build(packs, output, speed=speed, progress=partial(progress, "building"))
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
 
 
