@@ -38,6 +38,7 @@ from marey.jobs import (
     commit_texts,
     fail_items,
 )
+from marey.quality.record import Flag, MotionQuality
 from marey.storage import AssetStore, open_store
 from marey.tenants import DEFAULT_TENANT, create_key
 from marey.text_service.server import create_text_app
@@ -46,6 +47,14 @@ from tests.servers.receiver import LOOPBACK
 from tests.support.webhooks import KEY
 
 BUNDLE = "hgm3-paperclip"
+
+
+QUALITY = MotionQuality(
+    support=["feet"], float_s=0.9, skate=0.1, penetration_mm=2.0, pops=3, range_deg=0.0, self_contact=11.5,
+    flags=[Flag.FLOATING, Flag.POPPING], ok=False,
+)  # fmt: skip
+"""Of every motion."""
+METADATA = {"quality": QUALITY.model_dump(mode="json")}
 
 
 @dataclass
@@ -94,7 +103,9 @@ class LiveApi:
             problem = FailureReason("invalid-input", "this cannot be danced", None, "Walk.")
             failures = [ItemFailure(item.id, problem, False) for item in found.items if item.prompt in fail]
             motions = [
-                NewMotion(item.id, {"npz": digest, "bvh": digest}, 40, 20.0, "MIT", 0.5, {"prompt": item.prompt})
+                NewMotion(
+                    item.id, {"npz": digest, "bvh": digest}, 40, 20.0, "MIT", 0.5, METADATA | {"prompt": item.prompt}
+                )
                 for item in found.items
                 if item.prompt not in fail
             ]

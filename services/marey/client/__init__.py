@@ -59,7 +59,7 @@ if TYPE_CHECKING:
         SamplingSetting,
         TrainingData,
     )
-    from marey.client.types.motions import Motion, MotionDetail, Reroll, Review
+    from marey.client.types.motions import Motion, MotionDetail, MotionQuality, Reroll, Review
     from marey.client.types.references import ReferenceMatch
     from marey.client.types.schedules import Schedule
     from marey.client.types.streams import Stream, StreamDetail, StreamPrompt, StreamSkeleton
@@ -110,7 +110,7 @@ __getattr__ = lazy_names(
             "CheckedJob Counters Erasure Estimate Job JobEvent JobItem QueuePosition Quota Speed"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
-        "marey.client.types.motions": "Motion MotionDetail Reroll Review",
+        "marey.client.types.motions": "Motion MotionDetail MotionQuality Reroll Review",
         "marey.client.types.references": "ReferenceMatch",
         "marey.client.types.schedules": "Schedule",
         "marey.client.types.streams": "Stream StreamDetail StreamPrompt StreamSkeleton",
@@ -173,6 +173,7 @@ __all__ = [
     "ModelCatalogue",
     "Motion",
     "MotionDetail",
+    "MotionQuality",
     "NotFound",
     "Overloaded",
     "Problem",

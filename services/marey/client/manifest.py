@@ -26,9 +26,10 @@ RAW_COLUMNS = (
     *("bundle", "frames", "fps", "error", "comment", "replaces", "motion", "item", "job"),
 )
 """Of files of earlier releases, whose cells hold the text as it is."""
-COLUMNS = (*RAW_COLUMNS, "seconds")
+COLUMNS = (*RAW_COLUMNS, "seconds", "quality")
 """Of the file, whose cells are those of `csv_cells`. `npz` and `bvh` are paths of files from its folder; `comment` is
-the review's; `seconds` is the length that was asked for. Other formats have columns behind these: `OTHER`."""
+the review's; `seconds` is the length that was asked for; `quality` is `ok` or what is wrong with the motion. Other
+formats have columns behind these: `OTHER`."""
 NUMBERS = frozenset({"index", "seed", "variant", "frames", "fps", "seconds"})
 Row = dict[str, str]
 FORMATS = ("npz", "bvh")
@@ -58,6 +59,7 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
         **paths,
         "tags": join_tags(item["tags"]),
+        "quality": _quality(motion),
         "review": review.get("verdict"),
         "comment": review.get("comment"),
         "error": item["error"] and item["error"].get("message"),
@@ -67,6 +69,11 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         "job": item["job"],
     }
     return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(paths))}
+
+
+def _quality(motion: Mapping[str, Any]) -> str | None:
+    quality: Mapping[str, Any] | None = motion.get("quality")
+    return None if quality is None else "; ".join(quality["flags"]) or "ok"
 
 
 def write_manifest(

@@ -12,7 +12,7 @@ import pytest
 
 from marey.client.manifest import COLUMNS
 from tests.support.command import Command
-from tests.support.live_api import LiveApi
+from tests.support.live_api import QUALITY, LiveApi
 
 TABLE = """prompt,name,tags,seed
 a person walks,walk,show=nox; shot=010,5
@@ -88,6 +88,19 @@ def test_a_reroll_keeps_everything_but_the_seed(api: LiveApi, marey: Command, jo
     assert [(row["seed"], row["replaces"]) for row in manifest(tmp_path)] == [
         ("5", ""), ("6", ""), ("7", ""), ("6", old["id"]),
     ]  # fmt: skip
+
+
+def test_the_quality_of_a_motion_arrives_everywhere(
+    marey: Command, job: str, http: httpx2.Client, tmp_path: Path
+) -> None:
+    (item, *_) = http.get(f"/v1/jobs/{job}/items").json()["items"]
+    quality = item["motion"]["quality"]
+    assert quality == QUALITY.model_dump(mode="json")
+    found = http.get(f"/v1/motions/{item['motion']['id']}").json()
+    assert quality == found["quality"] == found["metadata"]["quality"]
+    marey("fetch", job, "-o", tmp_path).ok()
+    assert [row["quality"] for row in manifest(tmp_path)] == ["floating; popping"] * 3
+    assert motions(marey, job)[0]["quality"] == quality
 
 
 def test_a_motion_whose_bundle_is_gone_is_not_rolled_again(api: LiveApi, http: httpx2.Client, job: str) -> None:

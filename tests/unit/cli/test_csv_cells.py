@@ -94,6 +94,15 @@ def test_a_manifest_submitted_again_asks_for_the_same(
     assert list(items_from_file(str(folder / NAME))) == wanted
 
 
+@pytest.mark.parametrize(
+    ("flags", "cell"), [(None, ""), ([], "ok"), (["floating", "skating"], "floating; skating")], ids=str
+)
+def test_the_quality_of_a_motion_is_a_cell(flags: list[str] | None, cell: str) -> None:
+    quality = None if flags is None else {"flags": flags}
+    assert row_of(item(0, motion={"id": "m0", "quality": quality}), {})["quality"] == cell
+    assert row_of(item(0), {})["quality"] == ""
+
+
 BEFORE = (
     "index,name,tags,prompt,seed,state,review,npz,bvh,licence,variant,model,bundle,frames,fps,error,comment,replaces,"
     "motion,item,job\r\n"

@@ -37,6 +37,7 @@ NAMES = {
     motions.Review: "ReviewView",
     motions.Motion: "MotionView",
     motions.MotionDetail: "MotionDetailView",
+    motions.MotionQuality: "MotionQuality",
     motions.Reroll: "RerollView",
     streams.StreamPrompt: "PromptView",
     streams.StreamSkeleton: "SkeletonView",

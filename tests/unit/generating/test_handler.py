@@ -20,6 +20,8 @@ from marey.generation.handler import GeneratorHandler
 from marey.jobs import Claim, ClaimedItem, ItemStage
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.io.bvh import parse_bvh
+from marey.quality.limits import assess, expected_by_prompts
+from marey.quality.record import read_quality
 from marey.registry import get_model, model_names, resolve
 from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
 from marey.text.features import TextFeatures
@@ -138,6 +140,7 @@ def test_the_files_hold_the_motion_and_where_it_comes_from(handler: GeneratorHan
     assert manifest["licence"] == export.licence == "MIT"
     assert bundle.endswith(manifest["weights_sha256"][:12])
     assert manifest == export.manifest
+    assert read_quality(manifest) == assess(clip.joints, clip.fps, expected_by_prompts(["a person waves"]))
 
 
 def test_the_frame_rate_of_the_files_is_the_items(handler: GeneratorHandler[Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -13,6 +14,9 @@ from marey.generation.port import Generated, Generator, Request, S
 from marey.items.item import OUTPUT_FPS
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
+from marey.quality.clips import quality_of
+from marey.quality.limits import expected_by_prompts
+from marey.quality.record import KEY
 from marey.runtime.handler import Export, ExportedFile
 
 
@@ -62,14 +66,21 @@ def finish(
     fps: float | None = None,
     clean: bool = True,
 ) -> MotionClip:
-    """Finish a clip: decode, clean the feet, solve rotations, resample.
+    """Finish a clip: decode, clean the feet, solve rotations, resample, measure the quality.
 
     Args:
         fps: output rate; None = the model's.
         clean: lock feet in contact.
     """
     manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean}
-    return finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
+    clip = finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
+    prompts = (
+        [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
+    )
+    quality = quality_of(clip, expected_by_prompts(prompts))
+    if quality is None:
+        return clip
+    return replace(clip, manifest={**manifest, KEY: quality.model_dump(mode="json")})
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from marey.api.files import FileView
 from marey.http.schemas import Comment, View
 from marey.jobs import ItemState, MotionRow, Review
+from marey.quality.record import MotionQuality, read_quality
 from marey.takes import MAX_REVIEWED, Reroll
 
 
@@ -107,14 +108,19 @@ class MotionView(View):
     review: ReviewView | None
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
     replaced_by: UUID | None = Field(description="Item of its re-roll.")
+    quality: MotionQuality | None = Field(
+        description="Physical quality; null for motions of earlier releases and of skeletons other than that of 22 "
+        "joints."
+    )
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionView:
         """Convert a row."""
         files = [FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.files]
-        apart = {"files", "tags", "review"}
+        apart = {"files", "tags", "review", "quality"}
         own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
-        return cls(files=files, tags=list(row.tags), review=_review(row), **own)
+        quality = read_quality(row.metadata)
+        return cls(files=files, tags=list(row.tags), review=_review(row), quality=quality, **own)
 
 
 def _review(row: MotionRow) -> ReviewView | None:

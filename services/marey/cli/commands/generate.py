@@ -78,6 +78,7 @@ def generate(
             line = _write(plan, clip, elapsed, chosen, overwrite=overwrite)
             bar.advance(task)
             _report_rewrite(clip)
+            _report_quality(line)
             if as_json:
                 console.result_json(line)
             else:
@@ -91,6 +92,12 @@ def _report_rewrite(clip: MotionClip) -> None:
         console.say(f"{about['prompt']!r} was read as {about['rewritten']!r}.")
     elif "not_rewritten" in about:
         console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
+
+
+def _report_quality(line: dict[str, Any]) -> None:
+    quality = line["quality"]
+    if quality is not None and not quality["ok"]:
+        console.say(f"{line['prompt']!r}, seed {line['seed']}: the motion is {', '.join(quality['flags'])}.")
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:
@@ -243,5 +250,6 @@ def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, o
         "frames": clip.frames,
         "fps": clip.fps,
         "elapsed": elapsed,
+        "quality": clip.manifest.get("quality"),
         "files": {kind: str(path.absolute()) for kind, path in paths.items()},
     }

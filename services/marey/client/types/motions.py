@@ -23,6 +23,31 @@ class Review(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class MotionQuality(Result):
+    """Physical quality of a motion: measures of the whole clip, and what is wrong with it."""
+
+    version: int = 0
+    support: tuple[str, ...] = ()
+    """Parts of the body that the actions of the prompt rest on; they choose the limits."""
+    float_s: float = 0.0
+    """Longest time with every joint over 8 cm above its resting height, seconds."""
+    skate: float = 0.0
+    """Share of frames in which feet touch the floor and none of their joints is slower than 0.5 m/s."""
+    penetration_mm: float = 0.0
+    """Depth of the deepest joint under the floor."""
+    pops: int = 0
+    """Number of jumps of a joint within a twentieth of a second."""
+    range_deg: float = 0.0
+    """Farthest that a joint bends beyond the human range."""
+    self_contact: float = 0.0
+    """Deepest that limbs, trunk and head pass into each other, millimetres."""
+    flags: tuple[str, ...] = ()
+    """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact."""
+    ok: bool = False
+    """True without flags."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion(Result):
     """A motion."""
 
@@ -48,6 +73,8 @@ class Motion(Result):
     """The motion that it is another take of."""
     replaced_by: str | None = None
     """The item that is another take of it."""
+    quality: MotionQuality | None = None
+    """None for motions of earlier releases and of skeletons other than that of 22 joints."""
 
     @property
     def seconds(self) -> float:

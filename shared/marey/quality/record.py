@@ -1,0 +1,55 @@
+"""Schema of the quality record: one for the API, the files of a motion, reports and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from marey.vocabulary.entries import Support
+
+VERSION = 1
+KEY = "quality"
+"""Key of the record in a motion's manifest."""
+
+
+class Flag(StrEnum):
+    """A fault of a motion; see the measure of each in `MotionQuality`."""
+
+    FLOATING = "floating"
+    SKATING = "skating"
+    UNDER_FLOOR = "under-floor"
+    POPPING = "popping"
+    JOINT_RANGE = "joint-range"
+    SELF_CONTACT = "self-contact"
+
+
+class MotionQuality(BaseModel):
+    """Physical quality of a motion. Measures are those of the whole clip, on the floor y = 0."""
+
+    model_config = ConfigDict(frozen=True)
+
+    version: Literal[1] = Field(default=VERSION, description="Version of the measures and of their limits.")
+    support: list[Support] = Field(
+        description="Parts of the body that the actions of the prompt rest on; they choose the limits."
+    )
+    float_s: float = Field(description="Longest time with every joint over 8 cm above its resting height, seconds.")
+    skate: float = Field(
+        description="Share of frames in which feet touch the floor and none of their joints is slower than 0.5 m/s."
+    )
+    penetration_mm: float = Field(description="Depth of the deepest joint under the floor, millimetres.")
+    pops: int = Field(description="Number of jumps of a joint within a twentieth of a second.")
+    range_deg: float = Field(description="Farthest that a joint bends beyond the human range, degrees.")
+    self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
+    flags: list[Flag] = Field(description="Measures beyond their limits.")
+    ok: bool = Field(description="True without flags.")
+
+
+def read_quality(manifest: Mapping[str, Any]) -> MotionQuality | None:
+    """Return the record of a motion's manifest; None if it has none, or one of another version."""
+    try:
+        return MotionQuality.model_validate(manifest.get(KEY))
+    except ValidationError:
+        return None
