@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from marey.core.errors import InvalidFile, InvalidInput
@@ -15,6 +16,8 @@ from marey.data.index import UNUSED, Row, parse_index
 from marey.data.pack import JointsPack
 from marey.data.prepare import CaptureSet, pack_set
 from marey.data.prepared import PreparedData
+from marey.motion.kinematics import bone_lengths
+from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import bandai_bvh, walker
 
 STUDIO = (SETS / "bandai-namco" / DATASET).read_text().replace('"bandai-namco"', '"studio"', 1)
@@ -96,6 +99,10 @@ def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder:
     assert found["a@0*1.2"].measured.speed == pytest.approx(1.2 * found["a@0"].measured.speed, rel=0.05)
     assert "walks 2 seconds" in found["a@0"].captions
     assert "walks 2 seconds" not in found["a@0*1.2"].captions
+    captured, slower = (
+        bone_lengths(data.joints(found[name]).astype(np.float64), HUMANML3D) for name in ("a@0", "a@0*0.8")
+    )
+    assert np.abs(slower - captured.mean(axis=0)).max() < 0.003
     assert data.manifest.kinds == {"captured": 2, "mirrored": 2, "retimed": 4}
     with pytest.raises(InvalidInput, match="a share of 0"):
         build([pack], folder / "more", speed=0.9)

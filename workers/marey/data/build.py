@@ -27,6 +27,7 @@ from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
+from marey.data.splice import with_bones
 from marey.data.splits import Sourced, actions_of, splits_by_source
 from marey.motion.features import HUMANML3D_263
 
@@ -98,8 +99,8 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str], speed: float
             if speed and clip.split == "train":
                 told = _said(clip, wording.retimed)
                 for factor in (1 - speed, 1 + speed):
-                    retimed = resample_points(whole.astype(np.float64), FPS * factor, FPS).astype(np.float32)
-                    yield from _windows_of(told, retimed, factor, held_out, left_out)
+                    retimed = with_bones(resample_points(whole.astype(np.float64), FPS * factor, FPS))
+                    yield from _windows_of(told, retimed.astype(np.float32), factor, held_out, left_out)
 
 
 def _windows_of(
@@ -160,7 +161,7 @@ def _lengthened(
     if (cyclic or clip.content == IDLE) and closes(joints):
         return _said(clip, wording.repeated), repeated(joints).astype(np.float32)
     made = between_idles(joints, idles.get((clip.dataset, clip.split), ()), clip.id)
-    return clip, joints if made is None else made.astype(np.float32)
+    return clip, joints if made is None or is_broken(made, FPS) else made.astype(np.float32)
 
 
 _ONCE = re.compile(r"\b(once|twice|one (shot|blow))\b")

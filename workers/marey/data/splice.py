@@ -162,6 +162,11 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
     return joints
 
 
+def with_bones(joints: Array) -> Array:
+    """The same poses (T, 22, 3) with bones of the skeleton's lengths, the toes where they are."""
+    return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], _poles(joints))
+
+
 # -- where to cut --------------------------------------------------------------------------------------------------
 
 
