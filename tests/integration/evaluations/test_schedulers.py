@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -23,8 +20,8 @@ from tests.support.evaluations import (
     state_of,
     wait,
 )
-from tests.support.marey import REPOSITORY
 from tests.support.runtime import Loop
+from tests.support.scheduler_processes import Start, scheduler_processes
 from tests.support.schedules import (
     new_schedule,
     runs,
@@ -37,13 +34,9 @@ S = EvaluationState
 
 
 @pytest.fixture
-def start(
-    database_url: str, queue_url: str, config: Settings, tmp_path: Path
-) -> Iterator[Callable[[], subprocess.Popen[bytes]]]:
+def start(database_url: str, queue_url: str, config: Settings, tmp_path: Path) -> Iterator[Start]:
     """Starts `marey scheduler`s of this test."""
-    started: list[subprocess.Popen[bytes]] = []
-    environment = {
-        **{name: value for name, value in os.environ.items() if not name.startswith("MAREY_")},
+    settings = {
         "MAREY_HOME": str(config.home),
         "MAREY_MODELS": str(config.models),
         "MAREY_DATABASE_URL": database_url,
@@ -51,21 +44,12 @@ def start(
         "MAREY_EVALUATION_SECONDS": "0.05",
         "MAREY_LOG_JSON": "true",
     }
-
-    def run() -> subprocess.Popen[bytes]:
-        with (tmp_path / f"scheduler{len(started)}.log").open("wb") as log:
-            command = [sys.executable, "-m", "tests.chaos.process", "scheduler"]
-            started.append(subprocess.Popen(command, cwd=REPOSITORY, env=environment, stdout=log, stderr=log))
-        return started[-1]
-
-    yield run
-    for process in started:
-        process.kill()
-        process.wait()
+    with scheduler_processes(settings, tmp_path) as start:
+        yield start
 
 
 def test_a_scheduled_run_survives_a_scheduler_killed_in_each_state(
-    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
+    engine: sa.Engine, folder_store: FolderStore, start: Start, tmp_path: Path
 ) -> None:
     schedule = new_schedule(engine)
     time_passes(engine, schedule, missed=1)
@@ -93,7 +77,7 @@ def test_a_scheduled_run_survives_a_scheduler_killed_in_each_state(
 
 
 def test_two_schedulers_of_one_server_fire_once_and_take_each_step_once(
-    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]]
+    engine: sa.Engine, folder_store: FolderStore, start: Start
 ) -> None:
     schedules = [new_schedule(engine) for _ in range(3)]
     for schedule in schedules:

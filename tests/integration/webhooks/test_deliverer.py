@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -28,7 +25,7 @@ from marey.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.evaluations import wait
-from tests.support.marey import REPOSITORY
+from tests.support.scheduler_processes import Start, scheduler_processes
 from tests.support.toy_jobs import job_row
 from tests.support.webhooks import KEY, SECRET, VAULT, deliveries, errors, new_webhook, time_passes
 
@@ -217,11 +214,9 @@ def test_a_bug_costs_a_try_and_holds_up_nobody(engine: sa.Engine) -> None:
 
 
 @pytest.fixture
-def start(database_url: str, queue_url: str, tmp_path: Path) -> Iterator[Callable[[], subprocess.Popen[bytes]]]:
+def start(database_url: str, queue_url: str, tmp_path: Path) -> Iterator[Start]:
     """Starts `marey scheduler`s."""
-    started: list[subprocess.Popen[bytes]] = []
-    environment = {
-        **{name: value for name, value in os.environ.items() if not name.startswith("MAREY_")},
+    settings = {
         "MAREY_HOME": str(tmp_path),
         "MAREY_DATABASE_URL": database_url,
         "MAREY_QUEUE_URL": queue_url,
@@ -230,21 +225,12 @@ def start(database_url: str, queue_url: str, tmp_path: Path) -> Iterator[Callabl
         "MAREY_WEBHOOK_SECONDS": "0.05",
         "MAREY_SWEEP_SECONDS": "0.05",
     }
-
-    def run() -> subprocess.Popen[bytes]:
-        with (tmp_path / f"scheduler{len(started)}.log").open("wb") as log:
-            command = [sys.executable, "-m", "tests.chaos.process", "scheduler"]
-            started.append(subprocess.Popen(command, cwd=REPOSITORY, env=environment, stdout=log, stderr=log))
-        return started[-1]
-
-    yield run
-    for process in started:
-        process.kill()
-        process.wait()
+    with scheduler_processes(settings, tmp_path) as start:
+        yield start
 
 
 def test_a_scheduler_that_is_killed_loses_nothing_and_sweeps_while_receivers_hang(
-    engine: sa.Engine, receiver: Receiver, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
+    engine: sa.Engine, receiver: Receiver, start: Start, tmp_path: Path
 ) -> None:
     receiver.answer = hang
     webhook = new_webhook(engine, receiver.url("127.0.0.1", "/secret-path"))
@@ -280,7 +266,7 @@ def at_work(engine: sa.Engine) -> int:
 
 
 def test_two_scheduler_processes_tell_each_event_once_and_take_a_lease_back_once(
-    engine: sa.Engine, receiver: Receiver, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
+    engine: sa.Engine, receiver: Receiver, start: Start, tmp_path: Path
 ) -> None:
     webhook = new_webhook(engine, receiver.url())
     processes = [start(), start()]
