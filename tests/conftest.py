@@ -20,6 +20,8 @@ from pathlib import Path
 import psycopg
 import pytest
 import sqlalchemy as sa
+from xdist.remote import Producer
+from xdist.scheduler.loadfile import LoadFileScheduling
 
 from marey.db import create_engine, upgrade
 from marey.embedded import EmbeddedServer, start_postgres, start_valkey
@@ -49,6 +51,23 @@ def pytest_configure() -> None:
                 f"the installed package has no entry point {min(missing)!r} of {group!r}: run `make setup`, or "
                 "`.venv/bin/pip install --no-deps --no-build-isolation -e .`"
             )
+
+
+SERVED = "tests/acceptance/served/"
+"""The folder whose tests share a server."""
+
+
+class _ServerAtATime(LoadFileScheduling):
+    """A file of tests in one process, as by `--dist loadfile`, and all files of `SERVED` in the same."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return SERVED if nodeid.startswith(SERVED) else super()._split_scope(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling | None:
+    """Start the server of `SERVED` once, not in each process."""
+    return _ServerAtATime(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 TEMPLATE = "migrated"

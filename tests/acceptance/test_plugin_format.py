@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marey.core import defaults
 from marey.motion.clip import load_npz
 from tests.support.marey import TINY, Marey, serving
 from tests.support.plugin_wheels import install_plugin
@@ -26,14 +27,14 @@ def installed(models: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     """The command line with the plug-in."""
     home = Path(tempfile.mkdtemp(prefix="marey-"))
     environment = install_plugin("toy_format", tmp_path_factory.mktemp("plugin"))
-    yield Marey(home, models, {**environment, "MAREY_RETENTION_SECONDS": "1"})
+    yield Marey(home, models, {**environment, "MAREY_RETENTION_SECONDS": "1", "MAREY_LIVE_SLOTS": "0"})
     shutil.rmtree(home, ignore_errors=True)
 
 
 @pytest.fixture(scope="module")
 def serving_with(installed: Marey) -> Iterator[Marey]:
     """The same with a server, whose worker and scheduler have the plug-in."""
-    with serving(installed):
+    with serving(installed, "--with", f"{defaults.MODEL}+text"):
         yield installed
 
 

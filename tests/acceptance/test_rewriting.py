@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from marey.core import defaults
 from marey.motion.clip import load_npz
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.marey import Marey, serving
@@ -33,7 +34,12 @@ def model() -> Iterator[LanguageModel]:
 
 
 def rewriting(marey: Marey, model: LanguageModel) -> Marey:
-    own = {"MAREY_REWRITER": "openai", "MAREY_REWRITER_URL": model.url, "MAREY_REWRITER_MODEL": "any"}
+    own = {
+        "MAREY_REWRITER": "openai",
+        "MAREY_REWRITER_URL": model.url,
+        "MAREY_REWRITER_MODEL": "any",
+        "MAREY_LIVE_SLOTS": "0",
+    }
     return replace(marey, environment={**marey.environment, **own})
 
 
@@ -50,8 +56,8 @@ def test_a_one_shot_tells_what_it_read(offline: Marey, model: LanguageModel, tmp
 
 def test_a_motion_of_the_queue_keeps_both_prompts(models: Path, model: LanguageModel, tmp_path: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="marey-", ignore_cleanup_errors=True) as home:
-        marey = rewriting(Marey(Path(home), models), model)
-        with serving(marey):
+        marey = rewriting(Marey(Path(home), models, {"MAREY_LIVE_SLOTS": "0"}), model)
+        with serving(marey, "--with", f"{defaults.MODEL}+text"):
             made = marey("submit", STROLL, LOST, "--seconds", 1, "--fetch", tmp_path, "--json").ok().lines
             with marey.client() as client:
                 shown = client.get(f"/v1/motions/{made[0]['motion']}")

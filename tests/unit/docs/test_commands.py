@@ -1,8 +1,8 @@
 """Commands in the documents exist, with their arguments and options.
 
-Blocks that follow `<!-- run -->` are run by tests/acceptance/test_first_day.py. The others would need captures and
-hours (training), a deployment (containers, systemd, a proxy) or a job to work on; they are parsed by the real command
-line, which checks commands, options, arguments and the kinds of values.
+Blocks that follow `<!-- run -->` are run by tests/acceptance/served/test_first_day.py. The others would need captures
+and hours (training), a deployment (containers, systemd, a proxy) or a job to work on; they are parsed by the real
+command line, which checks commands, options, arguments and the kinds of values.
 """
 
 from __future__ import annotations

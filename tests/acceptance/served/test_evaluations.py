@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.marey import TINY, Marey
+from tests.support.marey import TINY, Marey, Serving
 
 PROMPTS = "prompt,seconds,expected\n" + "".join(f"a person walks {n} steps,1.5,walk\n" for n in range(1, 41))
 
@@ -20,15 +20,15 @@ def prompts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def first(judged: Marey, prompts: Path) -> str:
+def first(served: tuple[Marey, Serving], prompts: Path) -> str:
     """A run of the studio's own prompts that is done."""
-    ran = judged("eval", "run", "--bundle", TINY, "--split", prompts, "--name", "monday", "--wait").ok()
+    ran = served[0]("eval", "run", "--bundle", TINY, "--split", prompts, "--name", "monday", "--wait").ok()
     return ran.out.split()[0]
 
 
-def test_a_run_ends_in_a_report_in_three_formats(judged: Marey, first: str, tmp_path: Path) -> None:
+def test_a_run_ends_in_a_report_in_three_formats(marey: Marey, first: str, tmp_path: Path) -> None:
     for ending in ("html", "json", "md"):
-        judged("eval", "report", first, "-o", tmp_path / f"report.{ending}").ok()
+        marey("eval", "report", first, "-o", tmp_path / f"report.{ending}").ok()
     report = json.loads((tmp_path / "report.json").read_text())
     assert (report["prompts"], report["motions"], report["failed"]) == (40, 40, 0)
     assert report["generator"]["name"] == TINY
@@ -42,26 +42,26 @@ def test_a_run_ends_in_a_report_in_three_formats(judged: Marey, first: str, tmp_
 
 
 def test_the_same_run_again_is_compared_with_the_first_and_did_not_regress(
-    judged: Marey, first: str, prompts: Path, tmp_path: Path
+    marey: Marey, first: str, prompts: Path, tmp_path: Path
 ) -> None:
-    again = judged("eval", "run", "--bundle", TINY, "--split", prompts, "--wait", "--fail-on-regression").ok()
+    again = marey("eval", "run", "--bundle", TINY, "--split", prompts, "--wait", "--fail-on-regression").ok()
     second = again.out.split()[0]
-    judged("eval", "report", second, "-o", tmp_path / "second.json").ok()
+    marey("eval", "report", second, "-o", tmp_path / "second.json").ok()
     report = json.loads((tmp_path / "second.json").read_text())
     assert report["regressed"] is False
     assert [baseline["evaluation"] for baseline in report["baselines"]] == [first]
     assert {change["verdict"] for change in report["changes"]} == {"no difference found"}
     assert all(change["before"] == change["after"] for change in report["changes"])  # the same seeds, the same motions
     assert len(report["trend"]) == 2
-    (compared,) = judged("eval", "compare", first, second, "--json").ok().lines
+    (compared,) = marey("eval", "compare", first, second, "--json").ok().lines
     told = {change["metric"]: change["verdict"] for change in compared["changes"]}
     assert told == {change["metric"]: change["verdict"] for change in report["changes"]}
     assert {each["metric"] for each in compared["others"]} >= {"fid", "skate"}
 
 
-def test_a_file_without_prompts_is_refused_and_leaves_no_run(judged: Marey, tmp_path: Path) -> None:
-    before = judged("eval", "list", "--json").ok().lines
+def test_a_file_without_prompts_is_refused_and_leaves_no_run(marey: Marey, tmp_path: Path) -> None:
+    before = marey("eval", "list", "--json").ok().lines
     empty = tmp_path / "empty.csv"
     empty.write_text("prompt,seconds,expected\n")
-    judged("eval", "run", "--bundle", TINY, "--split", empty).refused(2)
-    assert judged("eval", "list", "--json").ok().lines == before
+    marey("eval", "run", "--bundle", TINY, "--split", empty).refused(2)
+    assert marey("eval", "list", "--json").ok().lines == before

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from uuid import uuid4
 
+import psutil
 import pytest
 
 from marey.client.place import Server
@@ -22,8 +23,9 @@ from tests.support.marey import Marey, Serving
 @pytest.fixture
 def paused(marey: Marey) -> str:
     """A job whose items wait: it is paused before a worker can take them all."""
-    job = marey.submit(*[f"a person walks {n} steps" for n in range(200)], "--seconds", 9, "--priority", -1000)
+    items = [{"prompt": f"a person walks {n} steps", "seconds": 9} for n in range(200)]
     with marey.client() as client:
+        job: str = client.post_once("/v1/jobs", {"items": items, "priority": -1000})["id"]
         client.post(f"/v1/jobs/{job}/pause")
     return job
 
@@ -58,10 +60,18 @@ def test_a_wrong_key_is_5(elsewhere: Marey) -> None:
     )
 
 
+def wait_for_connection(pid: int) -> None:
+    """Wait until a process asks a server."""
+    deadline = time.monotonic() + 60
+    while not psutil.Process(pid).net_connections("tcp"):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
 def test_cancelled_items_are_6_and_a_timeout_is_7_and_an_interrupt_130(marey: Marey, paused: str) -> None:
     marey("jobs", "wait", paused, "--timeout", 0.5).refused(7, paused, "the time allowed has passed")
     waiting = marey.start("jobs", "watch", paused)
-    time.sleep(3.0)  # until it watches
+    wait_for_connection(waiting.pid)
     waiting.send_signal(signal.SIGINT)
     assert waiting.wait(60) == 130
     marey("jobs", "cancel", paused).ok()
