@@ -48,9 +48,8 @@ def check(project: Path) -> list[str]:
 
 
 def test_the_examples_are_strictly_typed_and_mistakes_are_found(project: Path) -> None:
-    assert check(project) == []
     (project / "examples" / "wrong.py").write_text(WRONG)
     found = check(project)
-    assert {line.partition(":")[0] for line in found} == {"wrong.py"}
+    assert {line.partition(":")[0] for line in found} == {"wrong.py"}  # the examples have no mistake
     assert any('"seconds"' in line for line in found)
     assert any('"progress"' in line for line in found)

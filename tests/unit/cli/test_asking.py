@@ -6,11 +6,12 @@ import contextlib
 import os
 import pty
 import subprocess
+from pathlib import Path
 from uuid import uuid4
 
 import pytest
 
-from tests.support.marey import COMMAND, REPOSITORY, Ran
+from tests.support.marey import COMMAND, REPOSITORY, Marey, Ran
 
 ASKING = [("jobs", "delete"), ("jobs", "erase"), ("webhooks", "remove"), ("eval", "schedule", "delete")]
 NOWHERE = {"MAREY_SERVER": "http://127.0.0.1:9", "MAREY_KEY": "x"}
@@ -33,14 +34,11 @@ def at_a_terminal(answer: bytes, *arguments: str) -> Ran:
 
 @pytest.mark.parametrize("command", ASKING, ids=" ".join)
 @pytest.mark.parametrize("stdin", [b"", b"y\n"], ids=["nothing", "yes"])
-def test_without_a_terminal_it_is_a_wrong_use_and_y_is_named(command: tuple[str, ...], stdin: bytes) -> None:
-    done = subprocess.run(
-        [*COMMAND, *command, str(uuid4())], input=stdin, capture_output=True, timeout=120, check=False,
-        cwd=REPOSITORY, env={**os.environ, **NOWHERE},
-    )  # fmt: skip
-    Ran(done.returncode, done.stdout.decode(), done.stderr.decode()).refused(
-        2, "There is no terminal to ask this at", "-y"
-    )
+def test_without_a_terminal_it_is_a_wrong_use_and_y_is_named(
+    tmp_path: Path, command: tuple[str, ...], stdin: bytes
+) -> None:
+    marey = Marey(tmp_path / "home", tmp_path / "models", NOWHERE)
+    marey(*command, uuid4(), stdin=stdin).refused(2, "There is no terminal to ask this at", "-y")
 
 
 @pytest.mark.parametrize("typed", [b"n\n", b"\n", b"\x04"], ids=["n", "enter", "end"])
