@@ -40,6 +40,7 @@ def test_a_page_plays_its_motions_and_turns_clicks_into_commands(tab: Tab, tmp_p
             HOSTILE if k == 1 else "a person walks",
             f"0000{k} · seed {k}",
             ["shot=010"],
+            flags=["floating", "popping"] if k == 1 else (),
         )
         for k in range(3)
     ]
@@ -52,6 +53,9 @@ def test_a_page_plays_its_motions_and_turns_clicks_into_commands(tab: Tab, tmp_p
     assert tab.ask("[...document.querySelectorAll('.prompt')].map((p) => p.textContent)") == [
         "a person walks", HOSTILE, "a person walks",
     ]  # fmt: skip
+    assert tab.ask(
+        "[...document.querySelectorAll('.flags')].map((p) => [...p.children].map((s) => s.textContent))"
+    ) == [["floating", "popping"]]
     assert tab.ask("document.documentElement.dataset.taken ?? 'no'") == "no"
     assert tab.ask("document.getElementById('later').getAttribute('href')") == "./r%202.html"
     assert tab.ask("document.getElementById('wishes').hidden") is True

@@ -30,6 +30,7 @@ class Card:
         id: reference for the commands.
         facts: one line: number, name, seed, length.
         said: earlier review; empty = none.
+        flags: what is wrong with it, by `marey.quality`.
     """
 
     id: str
@@ -38,6 +39,7 @@ class Card:
     facts: str
     tags: Sequence[str] = ()
     said: str = ""
+    flags: Sequence[str] = ()
 
 
 def html_gallery(
@@ -79,6 +81,7 @@ def html_gallery(
                 "facts": one_line(card.facts),
                 "tags": [one_line(tag) for tag in card.tags],
                 "said": one_line(card.said),
+                "flags": [one_line(flag) for flag in card.flags],
             }
             for card in cards
         ],

@@ -202,6 +202,34 @@ def _follow(client: Client, run: str, timeout: float | None, *, fail_on_regressi
 
 
 @app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Motion files, such as .bvh or .npz.")],
+    expect: Annotated[
+        str | None, typer.Option("--expect", help='Actions of the vocabulary, in order: "jump; then sit".')
+    ] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure the quality of motion files, and whether they show actions. Needs no server; exit 6 on a fault."""
+    from marey.cli.roles.checking import check_file
+
+    faults = 0
+    for path in files:
+        found = check_file(path, expect)
+        quality = found["quality"]
+        faults += not quality["ok"] or found["shows"] is False
+        if as_json:
+            console.result_json(found)
+            continue
+        console.result(f"{console.home_relative(path)}: {', '.join(quality['flags']) or 'ok'}")
+        for name in ("float_s", "skate", "penetration_mm", "pops", "range_deg", "self_contact"):
+            _line(name, quality[name])
+        if found["shows"] is not None:
+            _line("shows", f"{'; '.join(found['expect'])}: {'yes' if found['shows'] else 'no'}")
+    if faults:
+        raise typer.Exit(6)
+
+
+@app.command()
 def adherence(
     bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")],
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")] = 3,

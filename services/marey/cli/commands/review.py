@@ -200,7 +200,15 @@ def _page(
     from marey.viz.gallery import Card, html_gallery
 
     cards = [
-        Card(motion.id, load_npz(file), motion.prompt, _facts(motion), motion.tags, _review_text(motion))
+        Card(
+            motion.id,
+            load_npz(file),
+            motion.prompt,
+            _facts(motion),
+            motion.tags,
+            _review_text(motion),
+            motion.quality.flags if motion.quality else (),
+        )
         for motion, file in zip(motions, files, strict=True)
     ]
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later)

@@ -55,6 +55,7 @@
     const caption = element("figcaption", {}, element("p", { class: "prompt" }, card.prompt || "(prompt erased)"));
     caption.append(element("p", { class: "remark" }, card.facts));
     if (card.tags.length) caption.append(element("div", { class: "tags" }, ...card.tags.map((tag) => element("span", {}, tag))));
+    if (card.flags.length) caption.append(element("div", { class: "tags flags" }, ...card.flags.map((flag) => element("span", {}, flag))));
     if (card.said) caption.append(element("p", { class: "said" }, card.said));
     caption.append(element("p", { class: "id" }, card.id));
     const figure = element("figure", { class: "clip" }, player(index, card.prompt), caption);
