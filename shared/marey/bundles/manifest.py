@@ -85,6 +85,8 @@ class BundleManifest(_Frozen):
     random: bool = False
     """True = weights were never trained; such a bundle is for tests and demos."""
     skeleton: str | None = None
+    offsets: tuple[tuple[float, float, float], ...] | None = None
+    """(J, 3) metres: the T-pose of the training data's body. None = that of Marey's skeleton of this name."""
     layout: str | None = None
     fps: float | None = None
     text: TextSpec | None = None

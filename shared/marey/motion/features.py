@@ -78,6 +78,10 @@ class FeatureLayout(Protocol):
         """Mirror a motion (..., J, 3): exchange left and right."""
         ...
 
+    def with_offsets(self, offsets: Array) -> FeatureLayout:
+        """Return the same layout of a body with other offsets (J, 3), metres."""
+        ...
+
 
 def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
     """Canonicalize a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
@@ -160,6 +164,10 @@ class HeadingLayout:
     ) -> HeadingLayout:
         """Return the same layout with another method to find the heading; decoding does not change."""
         return replace(self, facing_sigma=sigma, facing_hips=hips, facing_start=start, facing_held=held)
+
+    def with_offsets(self, offsets: Array) -> HeadingLayout:
+        """Return the same layout of a body with other offsets (J, 3), metres; features stay as they are."""
+        return replace(self, skeleton=self.skeleton.with_offsets(offsets))
 
     def canonicalize(self, joints: Array) -> Array:
         """Return the motion (T, J, 3) in the place that `encode` gives it: see `canonicalize` and `facing_start`."""

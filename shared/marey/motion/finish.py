@@ -1,4 +1,4 @@
-"""Turn a model's features into a finished clip: decode, solve, resample, clean the feet, solve again."""
+"""Turn a model's features into a finished clip: decode, solve onto the body, resample, clean the feet, solve again."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from marey.core.errors import InvalidInput
+from marey.motion.body import NamedBody, standard_body, travel_scale
+from marey.motion.bones import bone_fit
 from marey.motion.clip import MotionClip
 from marey.motion.features import FeatureLayout
-from marey.motion.feet import clean_feet, find_contacts
+from marey.motion.feet import clean_feet, find_contacts, need_feet
+from marey.motion.hands import join_hands, wrist_distance
 from marey.motion.kinematics import forward_kinematics
-from marey.motion.pose import solve_pose
+from marey.motion.pose import checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array
 
@@ -19,37 +22,50 @@ def finish_motion(
     features: Array,
     layout: FeatureLayout,
     *,
+    body: NamedBody | None = None,
     fps: float | None = None,
     clean: bool = True,
     manifest: Mapping[str, Any] | None = None,
 ) -> MotionClip:
-    """Finish a generated motion: fixed bone lengths, and joints that equal the forward kinematics of the rotations.
+    """Finish a generated motion: the bones of one body, and joints that equal the forward kinematics of the rotations.
 
-    Feet are cleaned at the rate of the output, after resampling, so that they stand still there too; bones have their
-    final lengths by then, so the second solution is exact.
+    The pose is solved on the skeleton of the training data, which the model learned, and turned to rotations; the body
+    takes those, and its travel is scaled by the length of its legs. Feet are cleaned at the rate of the output, after
+    resampling, so that they stand still there too; hands that meet are brought as near as they were decoded; the second
+    solution is exact.
 
     Args:
         features: (Tf, D) as generated, not normalized.
-        layout: layout of the features.
+        layout: layout of the features, with the skeleton of the training data.
+        body: skeleton of the clip; None = `standard_body` of the layout's.
         fps: rate of the clip; the layout's own by default.
-        clean: lock the feet.
+        clean: lock the feet, and correct hands that meet.
         manifest: provenance, for the clip's npz.
 
     Raises:
-        InvalidInput: features of another shape, or a rate out of bounds.
+        InvalidInput: features of another shape or with numbers that are not finite, a skeleton without feet, or a rate
+            out of bounds.
     """
     if features.ndim != 2:
         raise InvalidInput(f"features have shape {features.shape}, not (Tf, {layout.dim})", where=layout.name)
     rate = float(fps or layout.fps)
-    pose = solve_pose(layout.decode(features), layout.skeleton, fps=layout.fps)
-    skeleton, rotations, root, joints = pose.skeleton, pose.rotations, pose.root, pose.joints
+    training = layout.skeleton
+    need_feet(training)
+    body = body or standard_body(training)
+    skeleton = body.skeleton
+    decoded = checked_joints(layout.decode(features), training)
+    pose = solve_pose(bone_fit(training).fit(decoded), training, fps=layout.fps, measure=False)
+    scale = travel_scale(training, skeleton)
+    rotations, root = pose.rotations, scale * pose.root
+    hands = scale * wrist_distance(decoded, training)
     if rate != layout.fps:
         times = frame_times(len(root), layout.fps, rate)
         rotations, root = interpolate_rotations(rotations, times), interpolate(root, times)
-        joints = forward_kinematics(skeleton, rotations, root)
+        hands = interpolate(hands, times)
+    joints = forward_kinematics(skeleton, rotations, root)
     if clean:
         joints, contacts = clean_feet(joints, skeleton, rate)
-        pose = solve_pose(joints, skeleton, fps=rate, measure=False)
+        pose = solve_pose(join_hands(joints, hands, skeleton), skeleton, fps=rate, measure=False)
         rotations, root = pose.rotations, pose.root
     else:
         contacts = find_contacts(joints, skeleton, rate)

@@ -1,8 +1,8 @@
 """Finish live frames one by one: decode, fit the bones, lock the feet, solve.
 
-The live form of `finish.py`, at the layout's own rate. Bones of a decoder change a little from frame to frame; joints
-are first put where the solver would put them, on bones of the skeleton's lengths, and then the feet are locked: locked
-feet stay in place when the pose is solved.
+The live form of `finish.py`, at the layout's own rate, on the bundle's standard body. Bones of a decoder change a
+little from frame to frame; joints are first put where the solver would put them, on bones of the body's lengths, and
+then the feet are locked: locked feet stay in place when the pose is solved.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from marey.motion.body import standard_body, travel_scale
+from marey.motion.bones import bone_fit
 from marey.motion.features import Float32, HeadingLayout
-from marey.motion.feet import Bool
+from marey.motion.feet import Bool, need_feet
 from marey.motion.live_features import LiveDecoder, RootState
 from marey.motion.live_feet import FeetState, LiveFeet
 from marey.motion.live_poses import LivePoses, PoseState
+from marey.motion.pose import checked_joints
 from marey.motion.rotations import Array
 from marey.motion.rows import Rows
-from marey.motion.skeleton import Skeleton
 
 MEMORY = 40
 """Frames after which poses and feet no longer depend on their start."""
@@ -55,18 +57,23 @@ class LiveMotion:
 
     Args:
         layout: layout of the features.
-        skeleton: the layout's, with the bone lengths of the body; clients receive them once.
+
+    Attributes:
+        skeleton: of the standard body; clients receive it once.
 
     Raises:
         InvalidInput: the skeleton has no feet.
     """
 
-    def __init__(self, layout: HeadingLayout, skeleton: Skeleton) -> None:
+    def __init__(self, layout: HeadingLayout) -> None:
+        need_feet(layout.skeleton)
         self.layout = layout
-        self.skeleton = skeleton
+        self.skeleton = standard_body(layout.skeleton).skeleton
         self._decoder = LiveDecoder(layout)
-        self._poses = LivePoses(skeleton, layout.fps)
-        self._feet = LiveFeet(skeleton, layout.fps)
+        self._bones = bone_fit(layout.skeleton)
+        self._scale = travel_scale(layout.skeleton, self.skeleton)
+        self._poses = LivePoses(self.skeleton, layout.fps)
+        self._feet = LiveFeet(self.skeleton, layout.fps)
 
     def start(self, streams: int = 1) -> LiveState:
         """Return the state before the first frame."""
@@ -96,7 +103,8 @@ class LiveMotion:
             InvalidInput: wrong shape, numbers that are not finite, or a state of other streams.
         """
         decoded, root = self._decoder.step(features, state.root)
-        joints, contacts, feet = self._feet.step(self._poses.places(decoded), state.feet)
+        fitted = self._scale * self._bones.fit(checked_joints(decoded, self.skeleton))
+        joints, contacts, feet = self._feet.step(self._poses.places(fitted), state.feet)
         pose, poses = self._poses.step(joints, state.poses)
         rotations, place, places = (
             np.ascontiguousarray(values, np.float32) for values in (pose.rotations, pose.root, pose.joints)

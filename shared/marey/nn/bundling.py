@@ -63,6 +63,7 @@ def write_generator(
         overwrite: replace an existing bundle.
         manifest: licence, data, metrics, training, random, version.
     """
+    skeleton = layout(config.layout).skeleton  # of the prepared data, whose every clip has these bones
     with BundleWriter(path, overwrite=overwrite) as writer:
         for name, state in parts.items():
             writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if stored(k)})
@@ -75,7 +76,8 @@ def write_generator(
             model=model,
             config=config.name,
             parameters=config.to_dict(),
-            skeleton=layout(config.layout).skeleton.name,
+            skeleton=skeleton.name,
+            offsets=(skeleton.offsets.astype(np.float64).round(6) + 0.0).tolist(),
             layout=config.layout,
             fps=config.fps,
             text=text,

@@ -37,7 +37,7 @@ def test_frames_are_those_of_the_whole_clip_decoded_at_once(generator: Generator
     made = run(pool, pool.start(text_features(0), 3), 30)
     tokens = np.stack([frame.tokens for frame in made])
     features = generator.tokenizer.decode(generator.columns(tokens)[None])[0].numpy()
-    motion = LiveMotion(generator.layout, pool.skeleton)
+    motion = LiveMotion(generator.layout)
     state = motion.start()
     for number, frame in enumerate(made):
         shown, state = motion.step(features[number : number + 1], state)

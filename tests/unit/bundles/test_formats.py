@@ -45,6 +45,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "a parameter": ("parameters", {"inference": {"guidance": 5.0}}),
     "random": ("random", True),
     "skeleton": ("skeleton", "kit"),
+    "offsets": ("offsets", ((0.0, 1.0, 0.0),)),
     "layout": ("layout", "kit-251"),
     "fps": ("fps", 30),
     "text": ("text", TextSpec(in_order=True)),

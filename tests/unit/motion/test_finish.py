@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
 from marey.exporters.convert import convert
+from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip, load_npz
 from marey.motion.features import HUMANML3D_263, KIT_251
 from marey.motion.feet import skate
@@ -104,7 +105,7 @@ def test_a_finished_clip_is_what_the_contract_says(fps):
 
 def test_fixed_bones_are_near_to_what_the_features_say():
     features = generated(196)
-    clip = finish_motion(features, HUMANML3D_263, clean=False)
+    clip = finish_motion(features, HUMANML3D_263, body=NamedBody("training", HUMANML3D), clean=False)
     assert np.linalg.norm(clip.joints - HUMANML3D_263.decode(features), axis=-1).mean() < 0.005
 
 

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
+from marey.motion.body import standard_body
 from marey.motion.features import HUMANML3D_263
 from marey.motion.finish import finish_motion
 from marey.motion.kinematics import forward_kinematics
@@ -15,6 +16,8 @@ from marey.motion.rotations import angle_between
 from marey.motion.skeleton import HUMANML3D, Skeleton
 from tests.support.motions import drift
 from tests.support.stepping import TOES, sliding
+
+BODY = standard_body(HUMANML3D).skeleton
 
 
 def features_of(seed=0):
@@ -28,7 +31,7 @@ def features_of(seed=0):
 
 def run(motions):
     """Frames of several streams side by side: rotations, root, joints, contacts, each (T, S, ...)."""
-    live = LiveMotion(HUMANML3D_263, HUMANML3D)
+    live = LiveMotion(HUMANML3D_263)
     state, found = live.start(len(motions)), []
     for frame in np.stack(motions, axis=1):
         frames, state = live.step(frame, state)
@@ -38,13 +41,13 @@ def run(motions):
 
 def test_rotations_and_root_put_the_joints_of_a_fixed_skeleton_where_they_are_said_to_be():
     rotations, root, joints, _ = run([features_of()])
-    again = forward_kinematics(HUMANML3D, rotations[:, 0], root[:, 0])
+    again = forward_kinematics(BODY, rotations[:, 0], root[:, 0])
     assert np.linalg.norm(again - joints[:, 0], axis=-1).max() < 1e-4
 
 
 def test_feet_stand_still_in_what_a_client_draws():
     rotations, root, _, contacts = run([features_of()])
-    drawn = forward_kinematics(HUMANML3D, rotations[:, 0], root[:, 0])
+    drawn = forward_kinematics(BODY, rotations[:, 0], root[:, 0])
     both = contacts[1:, 0, 1::2] & contacts[:-1, 0, 1::2]
     assert both.mean() > 0.3
     assert np.linalg.norm(np.diff(drawn[:, TOES], axis=0)[..., [0, 2]], axis=-1)[both].max() < 2e-5  # float32
@@ -69,7 +72,7 @@ def test_no_joint_jumps():
 def test_streams_join_and_leave_without_a_trace_on_the_others():
     motions = [features_of(seed)[:40] for seed in range(3)]
     alone = [run([motion]) for motion in motions]
-    live = LiveMotion(HUMANML3D_263, HUMANML3D)
+    live = LiveMotion(HUMANML3D_263)
     state = live.start(2)
     for frame in range(20):
         frames, state = live.step(np.stack([motions[0][frame], motions[1][frame]]), state)
@@ -84,7 +87,7 @@ def test_streams_join_and_leave_without_a_trace_on_the_others():
 @pytest.mark.parametrize("streams", [2, 3, 5, 8])
 def test_no_bit_of_a_stream_depends_on_how_many_are_beside_it(streams):
     motions = [features_of(seed)[:40] for seed in range(streams)]
-    live = LiveMotion(HUMANML3D_263, HUMANML3D)
+    live = LiveMotion(HUMANML3D_263)
     together, alone = live.start(streams), [live.start() for _ in motions]
     for frame in np.stack(motions, axis=1):
         _, together = live.step(frame, together)
@@ -99,12 +102,12 @@ def test_no_bit_of_a_stream_depends_on_how_many_are_beside_it(streams):
 def test_a_skeleton_without_feet_is_refused():
     plain = Skeleton("x", ("a", "b"), (-1, 0), np.ones((2, 3), np.float32), (0, 1))
     with pytest.raises(InvalidInput, match="feet"):
-        LiveMotion(HUMANML3D_263, plain)
+        LiveMotion(replace(HUMANML3D_263, skeleton=plain))
 
 
 def test_a_stream_of_minutes_is_gone_on_with_without_posing_all_of_it(monkeypatch):
     posed = []
     step = LiveDecoder.step
     monkeypatch.setattr(LiveDecoder, "step", lambda self, *args: posed.append(1) or step(self, *args))
-    LiveMotion(HUMANML3D_263, HUMANML3D).after(np.tile(features_of(), (50, 1)))
+    LiveMotion(HUMANML3D_263).after(np.tile(features_of(), (50, 1)))
     assert len(posed) == MEMORY

@@ -20,6 +20,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.evaluations import MAX_MISSING, MadeItem
 from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
 from marey.items.expected import read_expected
+from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.features import FeatureLayout, layout
 from marey.motion.resample import resample
@@ -165,11 +166,11 @@ def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Che
 
 
 def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
-    """Encode a clip as features (T, D) at the layout's rate.
+    """Encode a clip as features (T, D) at the layout's rate, as a body of the size of the layout's skeleton.
 
     An encoder needs the step after the last frame: the previous step is repeated.
     """
-    joints = np.asarray(clip.joints, np.float64)
+    joints = travel_scale(clip.skeleton, space.skeleton) * np.asarray(clip.joints, np.float64)
     return space.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
 
 

@@ -12,6 +12,7 @@ import torch
 from marey.exporters import Coordinates, exporters
 from marey.generation.port import Generated, Generator, Request, S
 from marey.items.item import OUTPUT_FPS
+from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
 from marey.quality.clips import quality_of
@@ -63,17 +64,20 @@ def finish(
     generated: Generated,
     settings: S,
     *,
+    body: NamedBody | None = None,
     fps: float | None = None,
     clean: bool = True,
 ) -> MotionClip:
-    """Finish a clip: decode, clean the feet, solve rotations, resample, measure the quality.
+    """Finish a clip: decode, solve rotations on the body, resample, clean the feet, measure the quality.
 
     Args:
+        body: skeleton of the clip; None = the standard body of the bundle.
         fps: output rate; None = the model's.
         clean: lock feet in contact.
     """
-    manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean}
-    clip = finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
+    body = body or standard_body(generator.layout.skeleton)
+    manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean, "body": body.describe()}
+    clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
     prompts = (
         [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
     )

@@ -13,11 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.jobs.schemas import ErrorView
 from marey.bundles import Bundle
+from marey.bundles.body import body_of
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from marey.http.problems import ProblemBody
 from marey.http.schemas import View
 from marey.items.item import MAX_SEED
-from marey.motion.features import layout
 from marey.motion.skeleton import Skeleton
 from marey.streams import StreamPrompt, StreamRow, StreamState
 
@@ -60,7 +60,7 @@ class SkeletonView(View):
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> SkeletonView:
-        """Convert the skeleton of a layout."""
+        """Convert the skeleton of a body."""
         places = np.round(skeleton.offsets.astype(np.float64), DIGITS) + 0.0  # no -0.0
         offsets = [(x, y, z) for x, y, z in places.tolist()]
         return cls(names=list(skeleton.joint_names), parents=list(skeleton.parents), offsets=offsets)
@@ -78,7 +78,7 @@ class BundleFacts:
     def by(cls, bundle: Bundle) -> BundleFacts:
         """Read a bundle."""
         manifest = bundle.manifest
-        skeleton = None if manifest.layout is None else SkeletonView.of(layout(manifest.layout).skeleton)
+        skeleton = None if manifest.layout is None else SkeletonView.of(body_of(manifest).skeleton)
         return cls(licence=manifest.licence, fps=manifest.fps, skeleton=skeleton)
 
 

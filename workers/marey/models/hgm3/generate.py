@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
+from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
 from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
-from marey.motion.features import FeatureLayout, layout
+from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.sampling import uniform
 
@@ -100,7 +101,7 @@ class Generator:
         self.networks = networks
         self.device = device
         self.dtype = dtype
-        self.layout: FeatureLayout = layout(config.layout)
+        self.layout: FeatureLayout = layout_of(bundle.manifest)
         self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
         self.batch = MAX_ROWS
 

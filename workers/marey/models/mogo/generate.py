@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from marey.bundles import Bundle
+from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.mogo.bundle import load_networks
@@ -20,7 +21,7 @@ from marey.models.mogo.packed_model import PackedModel, sessions_of_product
 from marey.models.mogo.state import NEVER
 from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.tokenizer import Tokenizer
-from marey.motion.features import FeatureLayout, layout
+from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
 
 MAX_SESSIONS = 32
@@ -76,7 +77,7 @@ class Generator:
         self.bundle, self.config = bundle, config
         self.tokenizer, self.transformer = tokenizer, transformer
         self.device, self.dtype = transformer.head.weight.device, dtype
-        self.layout: FeatureLayout = layout(config.layout)
+        self.layout: FeatureLayout = layout_of(bundle.manifest)
         self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
         self._packed: dict[int, PackedModel] = {}

@@ -70,11 +70,11 @@ class LiveSessionPool:
             raise InvalidBundle(f"layout {generator.layout.name!r} has no live decoder", where=where)
         self.generator = generator
         inference = (settings or SamplingSettings()).inference(generator.config.inference)
-        self.skeleton = generator.layout.skeleton
         self.capacity = capacity
         self._streams = StreamBatch(generator.packed(capacity), capacity, inference)
         self._streams.prepare()
-        self._motion = LiveMotion(generator.layout, self.skeleton)
+        self._motion = LiveMotion(generator.layout)
+        self.skeleton = self._motion.skeleton
         self._rows: list[int] = []  # session of each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)
         self._body = self._motion.start(0)

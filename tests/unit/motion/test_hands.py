@@ -1,0 +1,46 @@
+"""Hands that meet."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from marey.motion.hands import APART, MEET, join_hands, wrist_distance
+from marey.motion.kinematics import bone_lengths, forward_kinematics
+from marey.motion.skeleton import HUMANML3D
+from tests.support.motions import dancer
+from tests.support.walker import walker
+
+HANDS = [18, 19, 20, 21]  # elbows and wrists
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 500), st.floats(0.05, MEET))
+def test_hands_that_meet_get_their_distance_and_bones_stay(seed, distance):
+    joints = forward_kinematics(HUMANML3D, *dancer(seed, 30))
+    now = wrist_distance(joints, HUMANML3D)
+    wanted = np.where(np.abs(now - distance) < 0.06, distance, now)  # as far as proportions move a hand
+    joined = join_hands(joints, wanted, HUMANML3D)
+    near = wanted <= MEET
+    assert np.abs(wrist_distance(joined, HUMANML3D) - wanted)[near].max(initial=0) < 0.02
+    assert np.abs(bone_lengths(joined, HUMANML3D) - bone_lengths(joints, HUMANML3D)).max() < 1e-9
+    others = [j for j in range(22) if j not in HANDS]
+    np.testing.assert_array_equal(joined[:, others], joints[:, others])
+
+
+def test_hands_that_are_3_cm_too_far_meet():
+    joints = np.array(walker(seconds=2).joints, np.float64)
+    wanted = wrist_distance(joints, HUMANML3D)
+    assert wanted.min() > APART  # a walker's hands are apart
+    middle = joints[:, [16, 17]].mean(axis=1) + np.array([0, -0.25, 0.3])
+    for side, wrist, elbow, shoulder in ((1, 20, 18, 16), (-1, 21, 19, 17)):
+        joints[:, wrist] = middle + np.array([side * 0.08, 0, 0])
+        joints[:, elbow] = (joints[:, shoulder] + joints[:, wrist]) / 2 + [side * 0.1, -0.1, -0.1]
+    joined = join_hands(joints, np.full(len(joints), 0.13), HUMANML3D)
+    np.testing.assert_allclose(wrist_distance(joined, HUMANML3D), 0.13, atol=1e-6)
+
+
+def test_hands_that_are_apart_are_left_alone_to_the_last_bit():
+    joints = forward_kinematics(HUMANML3D, *dancer(1, 30))
+    np.testing.assert_array_equal(join_hands(joints, np.full(30, APART), HUMANML3D), joints)
