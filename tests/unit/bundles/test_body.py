@@ -24,8 +24,8 @@ def manifest(**fields):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["hgm3-starter", "mogo-starter"])
-def test_shipped_generators_have_the_skeleton_of_their_training_data(name):
+@pytest.mark.parametrize("name", sorted(path.parent.name for path in MODELS.glob("*-starter/manifest.json")))
+def test_shipped_bundles_have_the_skeleton_of_their_training_data(name):
     skeleton = layout_of(Bundle.open(MODELS / name, verify=False).manifest).skeleton
     np.testing.assert_array_equal(skeleton.offsets, HUMANML3D.offsets)
 
