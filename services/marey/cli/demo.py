@@ -90,16 +90,13 @@ def _server(home: Path) -> Iterator[None]:
     (home / "server.json").unlink(missing_ok=True)
     log = home / "serve.log"
     log.touch(mode=0o600)
-    with log.open("wb") as output:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "marey.cli", "serve", "--port", "0"], stdout=output, stderr=output
-        )
-    try:
-        _wait_until_ready(process, log)
-        yield
-    finally:
-        process.terminate()
-        process.wait()
+    command = [sys.executable, "-m", "marey.cli", "serve", "--port", "0"]
+    with log.open("wb") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
+        try:
+            _wait_until_ready(process, log)
+            yield
+        finally:
+            process.terminate()
 
 
 def _wait_until_ready(process: subprocess.Popen[bytes], log: Path) -> None:
