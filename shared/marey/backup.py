@@ -19,6 +19,7 @@ from marey.jobs import tables
 from marey.jobs.leases import AssetDigest
 from marey.jobs.states import ENDED, ItemStage, JobControl, Review
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
+from marey.vocabulary.scope import ScopePolicy
 
 CHUNK = 1000  # rows per statement
 Row = TypeVar("Row")
@@ -79,6 +80,7 @@ class ItemRecord(_Record):
     created_at: AwareDatetime
     finished_at: AwareDatetime
     replaces: UUID | None
+    scope: dict[str, Any] | None = None
     motion: MotionRecord | None
 
 
@@ -106,6 +108,7 @@ class JobRecord(_Record):
     started_at: AwareDatetime | None
     finished_at: AwareDatetime
     erased_at: AwareDatetime | None
+    scope: ScopePolicy = "ignore"
 
 
 class JobBackup(_Record):

@@ -42,6 +42,7 @@ from marey.quality.record import Flag, MotionQuality
 from marey.storage import AssetStore, open_store
 from marey.tenants import DEFAULT_TENANT, create_key
 from marey.text_service.server import create_text_app
+from marey.vocabulary.scope import ActionLists
 from tests.servers.ports import free_ports
 from tests.servers.receiver import LOOPBACK
 from tests.support.webhooks import KEY
@@ -121,7 +122,7 @@ class LiveApi:
         return found is not None
 
 
-def write_bundle(models: Path, name: str = BUNDLE, model: str = "hgm3") -> None:
+def write_bundle(models: Path, name: str = BUNDLE, model: str = "hgm3", actions: ActionLists | None = None) -> None:
     """A generator's bundle that is only looked at."""
     with BundleWriter(models / name) as writer:
         writer.add_part("masked", {"w": np.zeros(3, np.float32)})
@@ -135,6 +136,7 @@ def write_bundle(models: Path, name: str = BUNDLE, model: str = "hgm3") -> None:
             fps=20.0,
             licence="MIT",
             text=TextSpec(labeller="none", encoder_sha256="0" * 64),
+            actions=actions,
         )
 
 

@@ -81,6 +81,12 @@ def say(text: str) -> None:
     print(escape(text), file=sys.stderr, flush=True)  # noqa: T201
 
 
+def warn_all(warnings: Iterable[str]) -> None:
+    """Print warnings on stderr."""
+    for warning in warnings:
+        say(f"Warning: {warning}")
+
+
 def result(text: str) -> None:
     """Print a result on stdout."""
     print(escape(text), flush=True)  # noqa: T201

@@ -42,6 +42,14 @@ class ExtraColumns(StrEnum):
     IGNORE = "ignore"
 
 
+class ScopeOption(StrEnum):
+    """Treatment of prompts with actions that the model does not know."""
+
+    WARN = "warn"
+    REFUSE = "refuse"
+    IGNORE = "ignore"
+
+
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
 PromptFile = Annotated[
     str | None,
@@ -87,6 +95,10 @@ Sampling = Annotated[
         help="A setting of sampling, such as temperature=1.2; may be repeated. `marey models show` lists them; a row's "
         "own come first.",
     ),
+]
+Scope = Annotated[
+    ScopeOption,
+    typer.Option("--scope", help="Prompts that the model does not know: a warning, an error, or not examined."),
 ]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]

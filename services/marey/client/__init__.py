@@ -47,9 +47,14 @@ if TYPE_CHECKING:
         Job,
         JobEvent,
         JobItem,
+        NamedAction,
         QueuePosition,
         Quota,
+        Scope,
+        ScopeExample,
+        ScopeReport,
         Speed,
+        SubmittedJob,
     )
     from marey.client.types.models import (
         BrokenModel,
@@ -85,7 +90,7 @@ if TYPE_CHECKING:
         Unreachable,
     )
     from marey.items.evaluation_prompts import EvaluationPrompt
-    from marey.items.item import InvalidItems, Item, Problem
+    from marey.items.item import InvalidItems, Item, OutOfScope, Problem
 
     __version__: str
 
@@ -107,7 +112,8 @@ __getattr__ = lazy_names(
             "EvaluationRequest MetricChange MetricPair"
         ),
         "marey.client.types.jobs": (
-            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem QueuePosition Quota Speed"
+            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem NamedAction QueuePosition Quota Scope "
+            "ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Motion MotionDetail MotionQuality Reroll Review",
@@ -122,7 +128,7 @@ __getattr__ = lazy_names(
             "Unreachable"
         ),
         "marey.items.evaluation_prompts": "EvaluationPrompt",
-        "marey.items.item": "InvalidItems Item Problem",
+        "marey.items.item": "InvalidItems Item OutOfScope Problem",
     },
 )
 
@@ -174,7 +180,9 @@ __all__ = [
     "Motion",
     "MotionDetail",
     "MotionQuality",
+    "NamedAction",
     "NotFound",
+    "OutOfScope",
     "Overloaded",
     "Problem",
     "Progress",
@@ -190,6 +198,9 @@ __all__ = [
     "SamplingSetting",
     "Schedule",
     "ScheduleChanges",
+    "Scope",
+    "ScopeExample",
+    "ScopeReport",
     "Server",
     "Speed",
     "Stream",
@@ -198,6 +209,7 @@ __all__ = [
     "StreamProblem",
     "StreamPrompt",
     "StreamSkeleton",
+    "SubmittedJob",
     "TimedOut",
     "TooLarge",
     "TooSlow",

@@ -14,10 +14,11 @@ from marey.client.names import DEFAULT_TEMPLATE, check_template
 from marey.client.resources import Resource, identifier
 from marey.client.rows import Format, PromptReader, defaults_of, read_file, read_rows
 from marey.client.tables import ExtraColumns
-from marey.client.types.jobs import CheckedJob, Counters, Erasure, Job, JobEvent, JobItem, QueuePosition
+from marey.client.types.jobs import CheckedJob, Counters, Erasure, Job, JobEvent, JobItem, QueuePosition, SubmittedJob
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
+from marey.vocabulary.scope import ScopePolicy
 
 Row = Item | Mapping[str, object] | str
 """A prompt, a dict with the columns of a file, or an `Item`."""
@@ -45,6 +46,7 @@ class JobOptions(TypedDict, total=False):
     priority: int
     fail_early: float | None
     keep_days: int | None
+    scope: ScopePolicy
 
 
 class JobChanges(TypedDict, total=False):
@@ -106,9 +108,10 @@ class Jobs(Resource):
         priority: int = 0,
         fail_early: float | None = None,
         keep_days: int | None = None,
+        scope: ScopePolicy = "warn",
         idempotency_key: str | None = None,
         **defaults: Unpack[Defaults],
-    ) -> Job:
+    ) -> SubmittedJob:
         """Submit prompts as a job. A retry after a lost answer submits nothing twice.
 
         Args:
@@ -117,6 +120,8 @@ class Jobs(Resource):
             priority: -1000 to 1000; higher runs first.
             fail_early: cancel open items once this share (0 to 1) has failed; None = never.
             keep_days: delete the job with its motions this many days after its end; None = the server's default.
+            scope: treatment of prompts with actions that the model does not know: accepted, with `warnings` of the job
+                (`warn`), refused (`refuse`), or not examined (`ignore`).
             idempotency_key: of all attempts; None = random. Give your own key to submit at most once even if your
                 program runs again.
             defaults: fields of rows that do not set them: model, bundle, seconds, seed, variants, fps, tags,
@@ -124,6 +129,7 @@ class Jobs(Resource):
 
         Raises:
             InvalidItems: with every problem of every row; nothing was submitted.
+            OutOfScope: scope `refuse`, with every prompt that the model does not know; nothing was submitted.
             InvalidInput: there is no row, or a default cannot be used.
             TooLarge, Busy, QuotaUsedUp, Refused, Unreachable: as the server says.
         """
@@ -135,6 +141,7 @@ class Jobs(Resource):
             priority=priority or None,
             fail_early=fail_early,
             keep_days=keep_days,
+            scope=_scope(scope),
         )
 
     def submit_file(
@@ -148,9 +155,10 @@ class Jobs(Resource):
         priority: int = 0,
         fail_early: float | None = None,
         keep_days: int | None = None,
+        scope: ScopePolicy = "warn",
         idempotency_key: str | None = None,
         **defaults: Unpack[Defaults],
-    ) -> Job:
+    ) -> SubmittedJob:
         """Submit a file of prompts as a job; see `submit`.
 
         Args:
@@ -172,16 +180,17 @@ class Jobs(Resource):
             priority=priority or None,
             fail_early=fail_early,
             keep_days=keep_days,
+            scope=_scope(scope),
         )
 
-    def submit_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> Job:
+    def submit_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> SubmittedJob:
         """Submit items that were read and checked before; see `submit`.
 
         Args:
             lines: one item a line, as JSON.
-            options: name, comment, priority, fail_early, keep_days.
+            options: name, comment, priority, fail_early, keep_days, scope.
         """
-        return Job.of(self._transport.submit(lines, **_given(options)))
+        return SubmittedJob.of(self._transport.submit(lines, **_given(options)))
 
     def check_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> CheckedJob:
         """Check what `submit_lines` would submit, and submit nothing."""
@@ -395,8 +404,8 @@ class Jobs(Resource):
             for item, files in planned
         ]
 
-    def _submit(self, reader: PromptReader, idempotency_key: str | None, **params: Any) -> Job:
-        return Job.of(self._send(reader, idempotency_key=idempotency_key, **params))
+    def _submit(self, reader: PromptReader, idempotency_key: str | None, **params: Any) -> SubmittedJob:
+        return SubmittedJob.of(self._send(reader, idempotency_key=idempotency_key, **params))
 
     def _send(self, reader: PromptReader, **params: Any) -> Any:
         with Lines(item.as_json() for item in reader) as lines:
@@ -428,8 +437,12 @@ class _Counting(FetchObserver):
 
 
 def _given(options: JobOptions) -> dict[str, Any]:
-    """Return the parameters of a request; priority 0 is the default and is not sent."""
-    return {**options, "priority": options.get("priority") or None}
+    """Return the parameters of a request; priority 0 and scope `warn` are the defaults and are not sent."""
+    return {**options, "priority": options.get("priority") or None, "scope": _scope(options.get("scope", "warn"))}
+
+
+def _scope(policy: ScopePolicy) -> ScopePolicy | None:
+    return None if policy == "warn" else policy
 
 
 def _raws(rows: Iterable[Row]) -> Iterator[object]:

@@ -24,6 +24,7 @@ from marey.items.item import (
     OUTPUT_FPS,
     InvalidItems,
     Item,
+    OutOfScope,
     Problem,
     check_count,
     names_model,
@@ -99,6 +100,9 @@ class PromptReader:
         """Let a server's `InvalidItems` in the block name the source and its lines, as `error` does."""
         try:
             yield
+        except OutOfScope as error:  # everything else was right
+            found = self.located(error.problems)
+            raise OutOfScope(found, where=self.where, total=error.total, hint=error.hint or "") from None
         except InvalidItems as error:
             if all(problem.line is None for problem in error.problems):
                 raise

@@ -34,7 +34,7 @@ from marey.core.errors import (
     Unreachable,
 )
 from marey.core.tls import trusting_context
-from marey.items.item import InvalidItems, Problem
+from marey.items.item import InvalidItems, OutOfScope, Problem
 
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
@@ -291,6 +291,9 @@ def error_of_problem(problem: Mapping[str, Any], status: int, retry_after: float
     if kind == InvalidItems.problem_type:
         found = [_problem(each) for each in problem.get("problems", [])]
         return InvalidItems(found, total=problem.get("total"))
+    if kind == OutOfScope.problem_type:
+        found = [_problem(each) for each in problem.get("problems", [])]
+        return OutOfScope(found, total=problem.get("total"), hint=hint or "")
     if kind == Overloaded.problem_type:
         return Overloaded(message, where=where, hint=hint, seconds=round(retry_after))
     if kind == QUOTA and (quota := problem.get("quota")) is not None:

@@ -139,6 +139,12 @@ class InvalidItems(InvalidInput):
         return "\n".join([head, *lines, f"  {self.hint}"])
 
 
+class OutOfScope(InvalidItems):
+    """Prompts with actions that the model does not know, refused as the caller asked; none of the input was used."""
+
+    problem_type = "out-of-scope"
+
+
 @dataclass(frozen=True)
 class Unreadable:
     """A line, or a part of it, that could not be parsed; `read_item` refuses it with this message."""

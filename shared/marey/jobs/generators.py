@@ -16,6 +16,8 @@ from marey.core.settings import Settings
 from marey.items.item import MAX_SEED, Item
 from marey.jobs import NewItem
 from marey.text.keys import as_served, feature_key, resolve
+from marey.vocabulary.report import ScopeReport
+from marey.vocabulary.scope import Scope
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,10 @@ class GeneratorCapabilities:
     def check_settings(self, values: Mapping[str, float]) -> dict[str, float]:
         """See `check_settings`."""
         return check_settings(self.bundle, values)
+
+    def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
+        """Return the scope of a prompt, and count it; None if the bundle lists no actions."""
+        return report.judge(prompt, self.bundle.manifest.name, self.bundle.manifest.actions)
 
 
 @dataclass(frozen=True)
@@ -77,8 +83,14 @@ def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
     return GeneratorCapabilities(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
 
 
-def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[NewItem]:
-    """Yield one row per motion: prompt times variant, with a drawn seed where none was given."""
+def new_items(
+    items: Iterable[tuple[Item, GeneratorCapabilities]], *, report: ScopeReport | None = None
+) -> Iterator[NewItem]:
+    """Yield one row per motion: prompt times variant, with a drawn seed where none was given.
+
+    Args:
+        report: examines and counts the scope of each prompt; None = scopes are not examined.
+    """
     batch_keys: dict[tuple[str, str], str] = {}
     for index, (item, generator) in enumerate(items):
         reference = generator.bundle.reference
@@ -86,6 +98,7 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
         settings = json.dumps(values, sort_keys=True)
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+        scope = None if report is None else generator.judge(item.prompt, report)
         for variant in range(item.variants):
             yield NewItem(
                 **item.spec(),
@@ -98,6 +111,7 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
                 seed=seed + variant,
                 variant=variant,
                 settings=dict(values),
+                scope=None if scope is None else scope.as_json(),
             )
 
 

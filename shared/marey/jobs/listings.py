@@ -121,6 +121,7 @@ def _jobs() -> sa.Select[*tuple[Any, ...]]:
         table.keep_days,
         (table.finished_at + sa.func.make_interval(0, 0, 0, table.keep_days)).label("expires"),
         table.erased_at.label("erased"),
+        table.scope,
     )
 
 
@@ -136,7 +137,7 @@ def _items() -> sa.Select[*tuple[Any, ...]]:
         *(table.id, table.job_id.label("job"), table.position, table.index, table.variant),
         *(table.model, table.bundle, table.seed, table.settings, table.stage, table.state),
         *(table[name] for name in SPEC_FIELDS),
-        *(table.attempts, table.solo, table.run_after, table.reason, table.problem, table.replaces),
+        *(table.attempts, table.solo, table.run_after, table.reason, table.problem, table.replaces, table.scope),
         table.created_at.label("created"),
         table.finished_at.label("finished"),
     )

@@ -41,7 +41,7 @@ TEXTS_LOCK = 0x6D617265
 
 COLUMNS = (
     *("id", "job_id", "position", "index", "variant", "model", "bundle", "seed", "settings", "text_key"),
-    *("generate_batch_key", "stage", "queue", "batch_key", "replaces"),
+    *("generate_batch_key", "stage", "queue", "batch_key", "replaces", "scope"),
     *SPEC_FIELDS,
 )
 _spec: Callable[[NewItem], tuple[object, ...]] = attrgetter(*SPEC_FIELDS)
@@ -82,6 +82,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
             fail_early=job.fail_early,
             keep_days=job.keep_days,
             traceparent=job.traceparent,
+            scope=job.scope,
         )
     )
     lanes = write_items(conn, identifier, job.items)
@@ -144,6 +145,7 @@ def _row(item: NewItem, job: UUID, position: int, stage: ItemStage, lane: Lane) 
     return (
         *(new_id(), job, position, item.index, item.variant, item.model, item.bundle, item.seed),
         *(json.dumps(dict(item.settings)), item.text_key, item.batch_key, str(stage), *lane, item.replaces),
+        None if item.scope is None else json.dumps(dict(item.scope)),
         *map(_as_column, _spec(item)),
     )
 

@@ -16,6 +16,7 @@ from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB, TSVECTOR
 
 from marey.db.tables import NOW, Id, Time, metadata, one_of, short_id
 from marey.jobs.states import ItemStage, ItemState, JobControl, Review
+from marey.vocabulary.scope import POLICIES
 
 # The rule of `states.job_state`.
 JOB_STATE = """CASE
@@ -53,6 +54,7 @@ job = sa.Table(
     sa.Column("keep_days", sa.Integer),  # deleted this long after it ended; null = only by hand
     sa.Column("erased_at", Time),  # its prompts were erased
     sa.Column("traceparent", sa.Text),  # `traceparent` of the submitting request
+    sa.Column("scope", sa.Text, nullable=False, server_default="ignore"),  # treatment of unknown prompts
     sa.CheckConstraint(one_of("control", list(JobControl)), name="control"),
     sa.CheckConstraint("priority BETWEEN -1000 AND 1000", name="priority"),
     sa.CheckConstraint("fail_early BETWEEN 0 AND 1", name="fail_early"),
@@ -62,6 +64,7 @@ job = sa.Table(
         name="counters",
     ),
     sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
+    sa.CheckConstraint(one_of("scope", POLICIES), name="scope"),
     sa.CheckConstraint("traceparent ~ '^00-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}$'", name="traceparent"),
     sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),  # the order of earlier releases
     sa.Index("ix_job_created", "tenant_id", "created_at", "id"),
@@ -88,6 +91,7 @@ item = sa.Table(
     sa.Column("seed", sa.Integer, nullable=False),
     sa.Column("seconds", sa.Double),
     sa.Column("settings", JSONB, nullable=False),
+    sa.Column("scope", JSONB),  # `marey.vocabulary.scope.Scope`; null = not examined
     sa.Column("tags", ARRAY(sa.Text), nullable=False),
     sa.Column("text_key", sa.Text, nullable=False),
     sa.Column("generate_batch_key", sa.Text, nullable=False),

@@ -12,6 +12,7 @@ from marey.core.errors import MareyError
 from marey.items.item import ItemSpec
 from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
 from marey.tenants.types import DEFAULT_TENANT
+from marey.vocabulary.scope import ScopePolicy
 
 TEXT_QUEUE = "text"
 EVALUATOR_QUEUE = "evaluator"
@@ -61,6 +62,7 @@ class NewItem(ItemSpec):
         seed: 0 … 2³¹ − 1.
         settings: the handler's settings (steps, guidance, fps, formats, …).
         replaces: replaced motion of a re-roll.
+        scope: of the prompt, as `marey.vocabulary.scope.Scope.as_json`; None = not examined.
     """
 
     index: int
@@ -73,6 +75,7 @@ class NewItem(ItemSpec):
     variant: int = 0
     settings: JsonObject = field(default_factory=dict[str, object])
     replaces: UUID | None = None
+    scope: JsonObject | None = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,8 @@ class NewJob:
     """Hex digest of the request's body; goes with `idempotency_key`."""
     traceparent: str | None = None
     """`traceparent` of the request (`marey.core.tracing`)."""
+    scope: ScopePolicy = "ignore"
+    """Treatment of prompts with unknown actions; the caller has applied it."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,7 @@ class JobRow:
     """Time of deletion; None = never, or not before it ends."""
     erased: datetime | None
     """Time when its prompts were erased."""
+    scope: ScopePolicy
 
 
 @dataclass(frozen=True)
@@ -212,6 +218,8 @@ class ItemRow(ItemSpec):
     finished: datetime | None
     replaces: UUID | None
     """Replaced motion of a re-roll."""
+    scope: JsonObject | None
+    """Scope of the prompt; None = not examined, or erased."""
     motion: MotionRow | None
 
 

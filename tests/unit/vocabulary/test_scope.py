@@ -2,10 +2,12 @@
 
 import pytest
 
+from marey.bundles import Bundle
 from marey.checks.scope_prompts import IN_SCOPE, ScopeRate, is_right, scope_prompts, scope_rates
 from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope, read_policy
+from tests.support.marey import REPOSITORY
 
 FEW = ActionLists(
     supported=("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow"),
@@ -23,6 +25,17 @@ def test_the_development_set_has_eight_classes() -> None:
 @pytest.mark.parametrize("rate", scope_rates(DEVELOPMENT, ALL), ids=lambda rate: rate.group)
 def test_rates_on_the_development_set(rate: ScopeRate) -> None:
     assert rate.share >= (0.97 if rate.group == IN_SCOPE else 0.9)
+
+
+def test_the_published_rates_are_those_of_the_test_set() -> None:
+    """The other author's prompts choose no words: a change of words changes the page, not the set."""
+    page = (REPOSITORY / "docs" / "reference" / "scope.md").read_text()
+    starter = Bundle.open(REPOSITORY / "models" / "hgm3-starter", verify=False).manifest.actions
+    assert starter is not None
+    prompts = scope_prompts("test")
+    for rate, few in zip(scope_rates(prompts, ALL), scope_rates(prompts, starter), strict=True):
+        last = "" if rate.group == IN_SCOPE else f" {few.right}"
+        assert f"| {rate.group} | {rate.prompts} | {rate.right} |{last} |" in page
 
 
 def test_the_action_of_an_in_scope_prompt_is_found() -> None:

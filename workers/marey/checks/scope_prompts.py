@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from marey.vocabulary.scope import ActionLists, Scope, match_scope
 
-ScopeSet = Literal["development"]
+ScopeSet = Literal["development", "test"]
 IN_SCOPE = "in-scope"
 OBJECTS = "objects"
 """Classes with rules of their own; the prompts of all others are out of scope."""

@@ -19,6 +19,7 @@ from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import KEY
 from marey.runtime.handler import Export, ExportedFile
+from marey.vocabulary.scope import match_scope
 
 
 def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
@@ -29,12 +30,14 @@ def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | N
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
     """Return the provenance of a motion: everything that decides it, nothing that differs between two equal runs."""
     bundle, text, recording = generator.bundle, request.text, request.recording
+    lists = bundle.manifest.actions
     streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
     return {
         "prompt": text.prompt,
         "rewritten": text.rewritten,
         **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
         "graph": text.graph.to_json(),
+        **({} if lists is None or recording else {"scope": match_scope(text.prompt, lists).as_json()}),
         "model": bundle.manifest.model,
         "bundle": bundle.reference,
         "weights_sha256": bundle.weights_sha256,

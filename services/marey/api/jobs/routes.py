@@ -17,6 +17,7 @@ from marey.api.jobs.estimates import EstimateView, QueueView
 from marey.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
 from marey.api.jobs.schemas import (
     MAX_PRIORITY,
+    SCOPE,
     CheckedView,
     ErasureView,
     EventsView,
@@ -26,6 +27,8 @@ from marey.api.jobs.schemas import (
     JobView,
     NewItemBody,
     NewJobBody,
+    SubmittedView,
+    report_fields,
 )
 from marey.api.takes.routes import Found
 from marey.api.takes.schemas import MotionView
@@ -37,6 +40,7 @@ from marey.http.problems import RESPONSES, QuotaBody
 from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from marey.jobs.states import ENDED
 from marey.runtime.logs import logger
+from marey.vocabulary.scope import ScopePolicy
 
 log = logger(__name__)
 
@@ -53,7 +57,7 @@ Reason = Annotated[schemas.Reason | None, Query(description="Reason, recorded in
 @router.post(
     "",
     status_code=202,
-    response_model=JobView,
+    response_model=SubmittedView,
     responses={200: {"model": CheckedView, "description": "`validate_only`: nothing was written"}},
     openapi_extra={
         "requestBody": {
@@ -74,6 +78,7 @@ async def submit_job(
     priority: Annotated[int, Query(ge=-MAX_PRIORITY, le=MAX_PRIORITY)] = 0,
     fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
     keep_days: Annotated[int | None, Query(ge=1, le=jobs.MAX_KEEP_DAYS)] = None,
+    scope: Annotated[ScopePolicy, Query(description=SCOPE)] = "warn",
     validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,
     idempotency_key: IdempotencyKey = None,
 ) -> Response:
@@ -89,6 +94,7 @@ async def submit_job(
         "priority": priority,
         "fail_early": fail_early,
         "keep_days": keep_days,
+        "scope": scope,
     }
     async with kept_body(request, shared, key.tenant) as body:
         submission = await body.run(_read, kind, body.file, fields, shared)
@@ -123,6 +129,8 @@ def _check(shared: Context, key: tenants.ApiKey, submission: service.Submission)
         estimate=EstimateView.of(estimate),
         quotas=[QuotaBody.of(room) for room in rooms],
         waiting=sum(waiting.get(queue, 0) for queue in {jobs.TEXT_QUEUE, *(model for model, _ in by_bundle)}),
+        scope=submission.fields.scope,
+        **report_fields(submission.examine()),
     )
     return JSONResponse(checked.model_dump(mode="json"))
 
@@ -134,8 +142,9 @@ def _write(
     idempotency_key: str | None,
     sha256: str | None,
 ) -> JSONResponse:
+    report = submission.new_report()
     new = jobs.NewJob(
-        items=submission.new_items(),
+        items=submission.new_items(report),
         tenant=key.tenant,
         count=submission.count,
         traceparent=tracing.current(),
@@ -153,7 +162,8 @@ def _write(
     headers = {"Location": f"/v1/jobs/{submitted.id}"}
     if submitted.replayed:
         headers["Idempotency-Replayed"] = "true"
-    return JSONResponse(JobView.of(row).model_dump(mode="json"), 202, headers=headers)
+        report = submission.examine()
+    return JSONResponse(SubmittedView.with_report(row, report).model_dump(mode="json"), 202, headers=headers)
 
 
 @router.get("")

@@ -25,8 +25,11 @@ from marey.jobs import (
     JobRow,
     JobState,
 )
+from marey.vocabulary.report import ScopeReport
+from marey.vocabulary.scope import ScopePolicy, Verdict
 
 MAX_PRIORITY = 1000
+SCOPE = "Prompts with actions that the model does not know: accepted with a warning, refused, or not examined."
 
 
 class NewItemBody(BaseModel):
@@ -64,6 +67,7 @@ class JobFields(BaseModel):
     keep_days: int | None = Field(
         None, ge=1, le=MAX_KEEP_DAYS, description="Days after its end when the job is deleted, with motions and files."
     )
+    scope: ScopePolicy = Field("warn", description=SCOPE)
 
 
 class NewJobBody(JobFields):
@@ -84,6 +88,60 @@ class JobPatch(BaseModel):
     )
 
 
+class NamedActionView(View):
+    """One action that a prompt names."""
+
+    text: str
+    """The words for it."""
+    verdict: Verdict
+    action: str | None = None
+    """Id in the vocabulary."""
+    read_as: str | None = None
+    """Supported action that a `close` one is read as."""
+
+
+class ScopeView(View):
+    """Scope of a prompt: what it names, compared with what the bundle supports."""
+
+    version: int
+    by: str
+    """`words`: judged by the words of the prompt alone."""
+    verdict: Verdict
+    """The worst of its actions."""
+    actions: list[NamedActionView]
+    flags: list[str]
+
+
+class ScopeExampleView(View):
+    """One of the first prompts of a verdict or with a flag."""
+
+    kind: str
+    """The verdict or the flag."""
+    index: int
+    """Place of the prompt in the input, from 0."""
+    prompt: str
+    """Its first characters."""
+    actions: list[str]
+
+
+class ScopeReportView(View):
+    """Scopes of the prompts of a submit."""
+
+    by: str
+    known: int
+    """Prompts of this verdict, as the next three."""
+    close: int
+    tried: int
+    unknown: int
+    unlisted: int
+    """Prompts for bundles that list no actions."""
+    flags: dict[str, int]
+    """Prompts with each flag."""
+    examples: list[ScopeExampleView]
+    actions: dict[str, list[str]]
+    """Actions that bundles know to which an `unknown` prompt went."""
+
+
 class CheckedView(View):
     """The answer to `validate_only`."""
 
@@ -96,6 +154,9 @@ class CheckedView(View):
         description="The tenant's quotas of queued items and of bytes, with the capacity left."
     )
     waiting: int = Field(description="Items of all tenants that wait for the same models, or to be parsed.")
+    scope: ScopePolicy
+    scope_report: ScopeReportView | None = Field(description="Null with scope `ignore`.")
+    warnings: list[str]
 
 
 class CountersView(View):
@@ -128,6 +189,7 @@ class JobView(View):
     keep_days: int | None
     expires: datetime | None = Field(description="Time of deletion; null = never, or not before it ends.")
     erased: datetime | None = Field(description="Time when its prompts were erased.")
+    scope: ScopePolicy
 
     @classmethod
     def of(cls, row: JobRow) -> JobView:
@@ -135,6 +197,25 @@ class JobView(View):
         counters = CountersView(**{name: getattr(row, name) for name in CountersView.model_fields})
         own = {name: getattr(row, name) for name in cls.model_fields if name != "counters"}
         return cls(counters=counters, **own)
+
+
+class SubmittedView(JobView):
+    """A job that was just submitted."""
+
+    scope_report: ScopeReportView | None = Field(description="Null with scope `ignore`.")
+    warnings: list[str]
+
+    @classmethod
+    def with_report(cls, row: JobRow, report: ScopeReport | None) -> SubmittedView:
+        """Convert a row and the scopes of its prompts."""
+        return cls(**JobView.of(row).model_dump(), **report_fields(report))
+
+
+def report_fields(report: ScopeReport | None) -> dict[str, Any]:
+    """Return the fields of an answer that tell the scopes of prompts; None = they were not examined."""
+    if report is None:
+        return {"scope_report": None, "warnings": []}
+    return {"scope_report": report.as_json(), "warnings": report.warnings()}
 
 
 class ErasureView(View):
@@ -183,13 +264,15 @@ class ItemView(View):
     created: datetime
     finished: datetime | None
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
+    scope: ScopeView | None = Field(description="Null: not examined, erased, or the bundle lists no actions.")
     motion: MotionView | None
 
     @classmethod
     def of(cls, row: ItemRow) -> ItemView:
         """Convert a row."""
-        apart = {"settings", "tags", "error", "motion"}
+        apart = {"settings", "tags", "error", "scope", "motion"}
         return cls(
+            scope=None if row.scope is None else ScopeView.model_validate(row.scope),
             settings=dict(row.settings),
             tags=list(row.tags),
             error=None if row.problem is None else ErrorView.of(row.problem),

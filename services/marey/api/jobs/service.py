@@ -13,10 +13,13 @@ from pydantic import BaseModel, ValidationError
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
 from marey.api.jobs.schemas import JobFields
+from marey.bundles import Bundle
+from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
-from marey.items.item import InvalidItems, Problem, read_items, read_json
+from marey.items.item import InvalidItems, Item, Problem, read_item, read_items, read_json
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items
+from marey.vocabulary.report import ScopeReport
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100
@@ -45,10 +48,32 @@ class Submission:
         """Exact bundles, without duplicates."""
         return sorted({reference for _, reference in self.by_bundle})
 
-    def new_items(self) -> Iterator[NewItem]:
-        """Yield one row per motion: the body is read a second time, so that it is never in memory as a whole."""
-        items = read_items(self._raws())
-        return new_items((item, self._generators[item.model]) for item in items)
+    def new_report(self) -> ScopeReport | None:
+        """Return an empty report on the scopes of its prompts; None if they are not to be examined."""
+        return None if self.fields.scope == "ignore" else ScopeReport()
+
+    def new_items(self, report: ScopeReport | None) -> Iterator[NewItem]:
+        """Yield one row per motion, and report the scopes of prompts: the body is read a second time, so that it is
+        never in memory as a whole."""
+        return new_items(self._items(), report=report)
+
+    def examine(self) -> ScopeReport | None:
+        """Return the report on the scopes of all prompts, which are read again."""
+        report = self.new_report()
+        if report is not None:
+            for item, generator in self._items():
+                generator.judge(item.prompt, report)
+        return report
+
+    def prompts(self) -> Iterator[tuple[int | None, str, Bundle]]:
+        """Yield the prompts with their lines and bundles; the body is read again."""
+        for line, raw in self._raws():
+            item, _ = read_item(raw, line)
+            if item is not None:
+                yield line, item.prompt, self._generators[item.model].bundle
+
+    def _items(self) -> Iterator[tuple[Item, GeneratorCapabilities]]:
+        return ((item, self._generators[item.model]) for item in read_items(self._raws()))
 
 
 def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Submission:
@@ -56,6 +81,7 @@ def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Subm
 
     Raises:
         InvalidItems: with the problems of all lines.
+        OutOfScope: scope `refuse`, and prompts name actions that the model does not know.
         InvalidInput: there are no items.
         TooLarge: more than 100,000 items, or a line of more than `MAX_VALUE` bytes.
     """
@@ -81,6 +107,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 
     Raises:
         InvalidItems: with the problems of all items.
+        OutOfScope: as `read_ndjson`.
         InvalidInput: the object itself is invalid.
         TooLarge: more than 100,000 items, or one of more than `MAX_VALUE` characters.
     """
@@ -136,7 +163,10 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     for item in read_items(counted(), check=check):
         bundle = generators[item.model].bundle
         by_bundle[bundle.manifest.model, bundle.reference] += item.variants
-    return Submission(fields, by_bundle.total(), by_bundle, raws, generators)
+    submission = Submission(fields, by_bundle.total(), by_bundle, raws, generators)
+    if fields.scope == "refuse":
+        refuse_unknown(submission.prompts())
+    return submission
 
 
 def _problem(error: MareyError, line: int | None, field: str) -> Problem:

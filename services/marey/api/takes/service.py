@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from marey.api.catalogue import Catalogue
 from marey.core.errors import Conflict, MareyError
@@ -23,7 +24,7 @@ def file_stem(row: MotionRow) -> str:
 
 
 def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
-    """Return the item as a new one, by the same exact bundle with the same settings.
+    """Return the item as a new one, by the same exact bundle with the same settings, and of the same scope.
 
     Raises:
         Conflict: this server no longer has the bundle, or the bundle no longer accepts the item's settings.
@@ -46,4 +47,4 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
             where=f"item {row.id}",
             hint=error.hint or "Submit the prompt as a new job.",
         ) from error
-    return next(new_items([(item, generator)]))
+    return replace(next(new_items([(item, generator)])), scope=row.scope)

@@ -49,6 +49,7 @@ def generate(
     fps: options.Fps = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
+    scope: options.Scope = options.ScopeOption.WARN,
     formats: options.Formats = None,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
@@ -65,6 +66,7 @@ def generate(
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)
+    _examine(reader, items, chosen, scope)
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
@@ -152,6 +154,26 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
             except InvalidInput as error:
                 problems.append(Problem(number, field, error.message))
     return reader.located(problems)
+
+
+def _examine(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, policy: options.ScopeOption) -> None:
+    """Refuse prompts that the bundle does not know, or warn of them.
+
+    Raises:
+        OutOfScope: with every such prompt, under `refuse`.
+        InvalidInput: the bundle lists no actions, under `refuse`.
+    """
+    from marey.bundles.scope import refuse_unknown
+    from marey.vocabulary.report import ScopeReport
+
+    if policy is options.ScopeOption.REFUSE:
+        lines = zip(reader.lines, items, strict=True)
+        refuse_unknown(((line, item.prompt, bundle) for line, item in lines), where=reader.where)
+    if policy is not options.ScopeOption.IGNORE:
+        report = ScopeReport()
+        for item in items:
+            report.judge(item.prompt, bundle.manifest.name, bundle.manifest.actions)
+        console.warn_all(report.warnings())
 
 
 def _one_model(items: Iterable[Item], default: str) -> str:
@@ -251,5 +273,6 @@ def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, o
         "fps": clip.fps,
         "elapsed": elapsed,
         "quality": clip.manifest.get("quality"),
+        "scope": clip.manifest.get("scope"),
         "files": {kind: str(path.absolute()) for kind, path in paths.items()},
     }

@@ -45,6 +45,7 @@ def submit(
     fps: options.Fps = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
+    scope: options.Scope = options.ScopeOption.WARN,
     watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
     fetch: Annotated[
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
@@ -76,6 +77,7 @@ def submit(
         with Client() as client:
             wanted: JobOptions = {
                 "name": name, "priority": priority, "fail_early": fail_early, "keep_days": keep_days,
+                "scope": scope.value,
             }  # fmt: skip
             if dry_run:
                 with reader.in_source():
@@ -86,6 +88,7 @@ def submit(
                 return
             with reader.in_source():
                 job = client.jobs.submit_lines(lines, **wanted)
+            console.warn_all(job.warnings)
             if as_json and fetch is None:
                 console.result_json(job.raw)
             elif not as_json:
@@ -124,6 +127,20 @@ def _show_check(checked: CheckedJob) -> None:
         behind = f", behind {checked.waiting} that wait now" if checked.waiting else ""
         console.say(f"That takes about {console.length_of_time(estimate.seconds)}{behind}.")
     console.say(estimate.basis)
+    _show_scope(checked)
+
+
+def _show_scope(checked: CheckedJob) -> None:
+    report = checked.scope_report
+    if report is None:
+        return
+    if report.unlisted:
+        console.say(f"{report.unlisted} prompts have no scope: their bundle lists no actions.")
+    console.say(
+        f"Prompts by words only: {report.known} known, {report.close} close, {report.tried} tried, "
+        f"{report.unknown} unknown."
+    )
+    console.warn_all(checked.warnings)
 
 
 def row_defaults(sampling: list[str] | None, **given: Unpack[Defaults]) -> Mapping[str, object]:

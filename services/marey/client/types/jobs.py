@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -24,6 +24,79 @@ class Counters(Result):
     failed: int = 0
     dead: int = 0
     cancelled: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedAction(Result):
+    """One action that a prompt names.
+
+    Attributes:
+        text: the words for it.
+        verdict: known, close, tried or unknown.
+        action: its id in the vocabulary.
+        read_as: the supported action that a `close` one is read as.
+    """
+
+    text: str = ""
+    verdict: str = ""
+    action: str | None = None
+    read_as: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scope(Result):
+    """The scope of a prompt: what it names, compared with what the bundle supports.
+
+    Attributes:
+        by: `words`: judged by the words of the prompt alone.
+        verdict: the worst of its actions.
+        flags: such as negation, objects, counts, other-language.
+    """
+
+    version: int = 0
+    by: str = ""
+    verdict: str = ""
+    actions: tuple[NamedAction, ...] = ()
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScopeExample(Result):
+    """One of the first prompts of a verdict or with a flag.
+
+    Attributes:
+        kind: the verdict or the flag.
+        index: place of the prompt in the input, from 0.
+        prompt: its first characters.
+        actions: actions that make it so.
+    """
+
+    kind: str = ""
+    index: int = 0
+    prompt: str = ""
+    actions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScopeReport(Result):
+    """The scopes of the prompts of a submit.
+
+    Attributes:
+        known, close, tried, unknown: prompts of each verdict.
+        unlisted: prompts for bundles that list no actions.
+        flags: prompts with each flag.
+        actions: actions of the bundles to which an unknown prompt went.
+    """
+
+    by: str = ""
+    known: int = 0
+    close: int = 0
+    tried: int = 0
+    unknown: int = 0
+    unlisted: int = 0
+    flags: Mapping[str, int] = field(default_factory=dict[str, int])
+    examples: tuple[ScopeExample, ...] = ()
+    actions: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +124,23 @@ class Job(Result):
     """When it is deleted; None = never, or not before it ends."""
     erased: datetime | None = None
     """When its prompts were erased."""
+    scope: str = ""
+    """Treatment of prompts with unknown actions: warn, refuse or ignore."""
 
     @property
     def has_ended(self) -> bool:
         """True once no item is open any more."""
         return self.state in ENDED_JOB
+
+
+@dataclass(frozen=True, kw_only=True)
+class SubmittedJob(Job):
+    """A job that was just submitted."""
+
+    scope_report: ScopeReport | None = None
+    """None with scope `ignore`."""
+    warnings: tuple[str, ...] = ()
+    """Sentences on what the model does not know or may not do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +169,8 @@ class JobItem(Result):
     finished: datetime | None = None
     replaces: str | None = None
     """The motion that it is another take of."""
+    scope: Scope | None = None
+    """None = not examined, erased, or the bundle lists no actions."""
     motion: Motion | None = None
 
 
@@ -152,6 +239,10 @@ class CheckedJob(Result):
     """Those the tenant has, of queued items and of bytes; with room for it."""
     waiting: int = 0
     """Items of all tenants that wait for the same models now, or to be read."""
+    scope: str = ""
+    scope_report: ScopeReport | None = None
+    """None with scope `ignore`."""
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

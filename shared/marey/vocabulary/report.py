@@ -1,0 +1,157 @@
+"""Report on the scope of many prompts: counts, the first examples, and warnings in words. Bounded, whatever is read."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, get_args
+
+from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope
+
+MAX_EXAMPLES = 3
+"""Of each verdict and flag."""
+MAX_SHOWN = 60
+"""Characters of a prompt in a message."""
+MAX_NAMED = 20
+"""Actions that a message names."""
+MAX_BUNDLES = 3
+"""Bundles whose actions a message names."""
+
+NOTES = {
+    "tried": "named actions are unreliable with this model",
+    "close": "read as another action",
+    "negation": "what is not to be done may be done",
+    "objects": "objects are mimed",
+    "counts": "may be done another number of times",
+    "several-people": "one person is shown",
+}
+"""Expectation for prompts of a verdict or with a flag; the flags that are not here come with `unknown`."""
+
+
+@dataclass(frozen=True)
+class ScopeExample:
+    """One of the first prompts of a verdict or with a flag.
+
+    Attributes:
+        kind: the verdict or the flag.
+        index: place of the prompt in the input, from 0.
+        prompt: its first characters.
+        actions: actions that make it so; of `close`, what they are read as.
+    """
+
+    kind: str
+    index: int
+    prompt: str
+    actions: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields."""
+        return {"kind": self.kind, "index": self.index, "prompt": self.prompt, "actions": list(self.actions)}
+
+
+@dataclass
+class ScopeReport:
+    """Scopes of the prompts of one input, by words alone.
+
+    Attributes:
+        total: prompts.
+        counts: prompts of each verdict.
+        flags: prompts with each flag.
+        unlisted: prompts for bundles that list no actions; they have no verdict.
+        known: actions that each bundle knows which got an `unknown` prompt.
+    """
+
+    total: int = 0
+    counts: Counter[str] = field(default_factory=Counter[str])
+    flags: Counter[str] = field(default_factory=Counter[str])
+    unlisted: int = 0
+    known: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    _noted: Counter[str] = field(default_factory=Counter[str])
+    """Prompts with each flag that are not `unknown` anyway."""
+    _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
+
+    def judge(self, prompt: str, bundle: str, lists: ActionLists | None) -> Scope | None:
+        """Return the scope of the next prompt, and count it.
+
+        Args:
+            prompt: as `check_prompt` returns it.
+            bundle: name of the bundle that will read it.
+            lists: actions of the bundle; None = it lists none, and the prompt has no scope.
+        """
+        index, self.total = self.total, self.total + 1
+        if lists is None:
+            self.unlisted += 1
+            return None
+        scope = match_scope(prompt, lists)
+        verdict = scope.verdict
+        self.counts[verdict] += 1
+        if verdict == "unknown" and len(self.known) < MAX_BUNDLES:
+            self.known[bundle] = lists.known
+        if verdict != "known":
+            self._add(verdict, index, prompt, scope)
+        for flag in scope.flags:
+            self.flags[flag] += 1
+            if verdict != "unknown":
+                self._noted[flag] += 1
+                self._add(flag, index, prompt, scope)
+        return scope
+
+    def _add(self, kind: str, index: int, prompt: str, scope: Scope) -> None:
+        examples = self._examples.setdefault(kind, [])
+        if len(examples) < MAX_EXAMPLES:
+            named = (each for each in scope.actions if each.verdict == kind)
+            actions = tuple(action for each in named if (action := each.read_as or each.action) is not None)
+            examples.append(ScopeExample(kind, index, _cut(prompt), actions))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the report as the API answers it."""
+        return {
+            "by": "words",
+            **{verdict: self.counts[verdict] for verdict in get_args(Verdict)},
+            "unlisted": self.unlisted,
+            "flags": dict(self.flags),
+            "examples": [each.as_json() for examples in self._examples.values() for each in examples],
+            "actions": {bundle: list(names) for bundle, names in self.known.items()},
+        }
+
+    def warnings(self) -> list[str]:
+        """Return what a person has to know, in sentences; none for prompts that are known and have no flag."""
+        found: list[str] = []
+        if self.counts["unknown"]:
+            knows = " ".join(says_known(bundle, names) for bundle, names in self.known.items())
+            found.append(
+                f"{self._subject('unknown')}: no action that the model knows; the motion is arbitrary. {knows}"
+            )
+        found += [f"{self._subject(kind)}: {note}" for kind, note in NOTES.items() if kind in self._examples]
+        return found
+
+    def _subject(self, kind: str) -> str:
+        """Return the prompts of a verdict or with a flag: the only one, or their number with the first."""
+        first = self._examples[kind][0]
+        what = f" ({', '.join(first.actions)})" if first.actions else ""
+        if self.total == 1:
+            return f"{first.prompt!r}{what}"
+        count = self.counts[kind] or self._noted[kind]
+        return f"{count} of {self.total} prompts, first number {first.index + 1}, {first.prompt!r}{what}"
+
+
+def says_known(bundle: str, actions: Sequence[str]) -> str:
+    """Return a sentence with the actions that a bundle knows, the first ones if they are many."""
+    shown = ", ".join(name.replace("-", " ") for name in actions[:MAX_NAMED])
+    more = len(actions) - MAX_NAMED
+    rest = f" and {more} more (`marey models show {bundle}`)" if more > 0 else ""
+    return f"{bundle} knows: {shown or 'no action'}{rest}."
+
+
+def refusal(scope: Scope) -> str | None:
+    """Return the message about a prompt that is refused; None if nothing in it is `unknown`."""
+    if scope.verdict != "unknown":
+        return None
+    unknown = ", ".join(repr(_cut(each.text)) for each in scope.actions if each.verdict == "unknown")
+    why = f" ({', '.join(scope.flags)})" if scope.flags else ""
+    return f"names an action that the model does not know: {unknown}{why}"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 1]}…"

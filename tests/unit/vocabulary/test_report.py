@@ -1,0 +1,71 @@
+"""Report on the scope of many prompts."""
+
+from marey.vocabulary.report import MAX_EXAMPLES, MAX_NAMED, MAX_SHOWN, ScopeReport, refusal, says_known
+from marey.vocabulary.scope import ActionLists, match_scope
+
+LISTS = ActionLists(supported=("walk", "run", "walk-backward"), tried=("kick",))
+
+
+def report_of(*prompts: str) -> ScopeReport:
+    report = ScopeReport()
+    for prompt in prompts:
+        report.judge(prompt, "tiny", LISTS)
+    return report
+
+
+def test_nonsense_is_answered_with_what_the_model_knows() -> None:
+    (warning,) = report_of("asdf qwer zxcv").warnings()
+    assert warning == (
+        "'asdf qwer zxcv': no action that the model knows; the motion is arbitrary. "
+        "tiny knows: walk, run, walk backward."
+    )
+
+
+def test_known_prompts_are_counted_without_a_warning() -> None:
+    report = report_of("a person walks", "she runs")
+    assert report.warnings() == []
+    assert report.as_json() == {
+        "by": "words", "known": 2, "close": 0, "tried": 0, "unknown": 0, "unlisted": 0, "flags": {}, "examples": [],
+        "actions": {},
+    }  # fmt: skip
+
+
+def test_every_verdict_and_flag_has_its_sentence() -> None:
+    found = report_of("a person walks", "he kicks", "she sprints", "he does not run", "kicks twice").warnings()
+    assert found == [
+        "2 of 5 prompts, first number 2, 'he kicks' (kick): named actions are unreliable with this model",
+        "1 of 5 prompts, first number 3, 'she sprints' (run): read as another action",
+        "1 of 5 prompts, first number 4, 'he does not run': what is not to be done may be done",
+        "1 of 5 prompts, first number 5, 'kicks twice': may be done another number of times",
+    ]
+
+
+def test_the_report_is_bounded() -> None:
+    report = report_of(*["qqqqqq " * 100] * 50)
+    examples = report.as_json()["examples"]
+    assert [example["kind"] for example in examples] == ["unknown"] * MAX_EXAMPLES
+    assert max(len(example["prompt"]) for example in examples) == MAX_SHOWN
+    assert [example["index"] for example in examples] == [0, 1, 2]
+    assert (report.as_json()["unknown"], report.as_json()["flags"]) == (50, {"gibberish": 50})
+
+
+def test_a_bundle_without_lists_has_no_verdicts() -> None:
+    report = ScopeReport()
+    assert report.judge("asdf", "tiny", None) is None
+    assert (report.unlisted, report.warnings()) == (1, [])
+
+
+def test_many_actions_are_named_in_part() -> None:
+    said = says_known("tiny", [f"action-{number}" for number in range(MAX_NAMED + 2)])
+    assert "action 19 and 2 more (`marey models show tiny`)." in said
+    assert "action 20" not in said
+
+
+def test_a_refusal_quotes_what_is_unknown() -> None:
+    assert refusal(match_scope("he walks and juggles", LISTS)) == (
+        "names an action that the model does not know: 'juggles'"
+    )
+    assert refusal(match_scope("the dog barks", LISTS)) == (
+        "names an action that the model does not know: 'the dog barks' (objects, other-subject)"
+    )
+    assert refusal(match_scope("he kicks, then sprints", LISTS)) is None
