@@ -1,6 +1,7 @@
 """The platform names no model but its default: a model is a folder, a line, its tests and its bundle.
 
-`docs/extending.md` says where a model's own things lie. `tests/integration/test_without_a_model.py` deletes one.
+`docs/extending.md` says where a model's own things lie. `tests/integration/packaging/test_without_a_model.py` deletes
+one.
 """
 
 from __future__ import annotations

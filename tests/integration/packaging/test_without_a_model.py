@@ -1,5 +1,7 @@
-"""A checkout without MOGO: its lint passes, and so do the unit tests of the platform. No file but MOGO's own, the lines
-that register it and those of documents that name its files are taken out."""
+"""A checkout without a model: its lint passes, and so do the unit tests of the platform.
+
+No file but the model's own, the lines that register it and those of documents that name its files are taken out.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from marey.registry import model_names
+from tests.support.models import OTHERS
 from tests.support.without_model import copy_without
 
-MODEL = "mogo"
 SECONDS = 1200.0
 IMPORT_LINTER = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 LINT = (
@@ -30,11 +32,17 @@ PLATFORM = (
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(scope="module", params=OTHERS)
+def model(request: pytest.FixtureRequest) -> str:
+    """A model that is not the default."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tree(model: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The checkout without the model."""
     tree = tmp_path_factory.mktemp("without") / "tree"
-    copy_without(MODEL, tree)
+    copy_without(model, tree)
     return tree
 
 
@@ -50,8 +58,8 @@ def run(tree: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def test_the_copy_does_not_know_the_model(tree: Path) -> None:
-    others = [name for name in model_names() if name != MODEL]
+def test_the_copy_does_not_know_the_model(model: str, tree: Path) -> None:
+    others = [name for name in model_names() if name != model]
     assert len(others) < len(model_names())
     code = "from marey.registry import model_names; print(*model_names())"
     assert run(tree, "-c", code).split() == others
