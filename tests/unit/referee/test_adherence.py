@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from marey.referee import Body
 from marey.referee.adherence import ActionTrial, document, interval, judge_trial, markdown, rates
-from marey.referee.prompts import ActionPrompt, action_prompts
+from marey.referee.prompts import ActionPrompt, action_prompts, studio_prompts
+from marey.referee.studio import StudioRates, judge_studio, studio_markdown, studio_rates
 from marey.vocabulary.entries import load_vocabulary
 from tests.unit.referee.bodies import FPS, standing, walking
 
@@ -77,3 +78,32 @@ def test_every_action_has_prompts_of_two_authors_and_no_prompt_is_asked_twice() 
         assert min(asked[(action,), 1], asked[(action,), 2]) >= 5, action
     texts = [prompt.text.casefold() for prompt in prompts]
     assert len(set(texts)) == len(texts)
+
+
+def test_motions_of_a_list_are_counted_with_what_a_user_is_told_of_them() -> None:
+    walks, bows = ActionPrompt("walk_01", ("walk",), "", 3), ActionPrompt("take a bow", ("bow",), "", 3)
+    flies = ActionPrompt("she flies away", (), "", 3)
+    way, still = Body(walking(3.0, 1.2), FPS), Body(standing(3.0), FPS)
+    known = {"scope": {"verdict": "known", "flags": []}, "quality": {"flags": []}}
+    skates = {**known, "quality": {"flags": ["skating"]}}
+    doubtful = {**known, "scope": {"verdict": "unknown", "flags": ["no-action"]}}
+    trials = [
+        judge_studio(walks, 0, way, known),
+        judge_studio(walks, 1, way, skates),
+        judge_studio(bows, 0, still, doubtful),
+        judge_studio(bows, 0, still, known),
+        judge_studio(flies, 0, still, doubtful),
+    ]
+    assert [trial.passed for trial in trials] == [True, True, False, False, None]
+    assert [trial.reasons for trial in trials[1:3]] == [("skating",), ("unknown", "no-action")]
+    found = studio_rates(trials)
+    assert found == StudioRates(2, 1, 2, 1, 1, 1)
+    assert "| do not | 2 | 50% |" in studio_markdown("toy@1", found)
+
+
+def test_the_list_of_a_studio_asks_for_every_action_and_for_some_beyond_the_vocabulary() -> None:
+    prompts = studio_prompts()
+    assert len(prompts) == 300
+    assert {action for prompt in prompts for action in prompt.actions} == set(load_vocabulary().actions)
+    assert 0.1 < sum(not prompt.actions for prompt in prompts) / len(prompts) < 0.2
+    assert len({prompt.text.casefold() for prompt in prompts}) == 300

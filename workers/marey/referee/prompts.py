@@ -1,16 +1,19 @@
-"""Held-out prompts for single actions, by two authors who saw the definitions of the vocabulary and nothing else.
+"""Held-out prompts by authors who saw the definitions of the vocabulary and nothing else.
 
-The supported actions of a bundle are published by these prompts: nothing is trained on them or chosen by them.
+Two authors ask for single actions, by which the supported actions of a bundle are published; a third wrote a list of
+300 prompts as a games studio would send it. Nothing is trained on them or chosen by them.
 """
 
 from __future__ import annotations
 
+import csv
 import tomllib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 AUTHORS = (1, 2)
+STUDIO_AUTHOR = 3
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class ActionPrompt:
 
     Attributes:
         text: as a user types it.
-        actions: ids of the vocabulary, in the order in which a motion shows them.
+        actions: ids of the vocabulary, in the order in which a motion shows them; none where no definition covers it.
         side: left, right or both where the prompt names a side; else empty.
         author: number of its author.
     """
@@ -39,3 +42,13 @@ def action_prompts() -> tuple[ActionPrompt, ...]:
         for group in tomllib.loads(Path(__file__).with_name(f"prompts_{author}.toml").read_text("utf-8"))["group"]
         for text in group["prompts"]
     )
+
+
+@lru_cache(maxsize=1)
+def studio_prompts() -> tuple[ActionPrompt, ...]:
+    """Return the list of a studio: of all kinds of actions, sequences, and 15 % that the vocabulary does not cover."""
+    with Path(__file__).with_name("prompts_studio.csv").open(encoding="utf-8", newline="") as file:
+        return tuple(
+            ActionPrompt(row["prompt"], tuple(filter(None, row["actions"].split("; "))), "", STUDIO_AUTHOR)
+            for row in csv.DictReader(file)
+        )

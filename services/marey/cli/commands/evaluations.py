@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,7 @@ from marey.cli.evaluating import EvaluationArguments
 from marey.cli.references import FORMS, find, of_view
 
 if TYPE_CHECKING:
+    from marey.cli.roles.actions import Measured, MeasureOptions
     from marey.client import Client, Evaluation
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
@@ -21,6 +23,11 @@ app.add_typer(schedules.app, name="schedule")
 
 Run = Annotated[str, typer.Argument(metavar="RUN", help=f"The evaluation: {FORMS}.")]
 Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help=f"Evaluations: of each {FORMS}.")]
+
+Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")]
+Threads = Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")]
+ReportFolder = Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")]
+JudgedBundle = Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")]
 
 
 class EvaluationStateOption(StrEnum):
@@ -231,8 +238,8 @@ def check(
 
 @app.command()
 def adherence(
-    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")],
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")] = 3,
+    bundle: JudgedBundle,
+    seeds: Seeds = 3,
     seconds: Annotated[
         float | None, typer.Option("--seconds", help="Length of every motion; none given = the model decides.")
     ] = None,
@@ -246,8 +253,8 @@ def adherence(
     every: Annotated[int, typer.Option("--every", min=1, help="Only each K-th prompt, for a quick look.")] = 1,
     steers: Annotated[int, typer.Option("--steers", min=0, help="Live sessions that are steered.")] = 0,
     walks: Annotated[int, typer.Option("--walks", min=0, help="Live sessions of 2,000 frames.")] = 0,
-    threads: Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")] = 0,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")] = None,
+    threads: Threads = 0,
+    output: ReportFolder = None,
     as_json: console.Json = False,
 ) -> None:
     """Check whether the motions of a bundle do what their prompts say. Needs no server and no evaluator."""
@@ -270,25 +277,55 @@ def adherence(
 
 @app.command()
 def actions(
-    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")],
+    bundle: JudgedBundle,
     chosen: Annotated[
         list[str] | None, typer.Option("--action", help="An action of the vocabulary; may be repeated. Default: all.")
     ] = None,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")] = 4,
+    seeds: Seeds = 4,
     settings: evaluating.Settings = None,
-    threads: Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")] = 0,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")] = None,
+    threads: Threads = 0,
+    output: ReportFolder = None,
     as_json: console.Json = False,
 ) -> None:
     """Measure which actions of the vocabulary a bundle supports, by held-out prompts. Needs no server."""
     from marey.cli.roles.actions import measure_actions
 
+    _measure(lambda how: measure_actions(bundle, chosen or (), how), seeds, settings, threads, output, as_json)
+
+
+@app.command()
+def studio(
+    bundle: JudgedBundle,
+    seeds: Seeds = 1,
+    settings: evaluating.Settings = None,
+    threads: Threads = 0,
+    output: ReportFolder = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure a bundle on a studio's list of 300 prompts: what it obeys, and what it flags. Needs no server."""
+    from marey.cli.roles.actions import measure_studio
+
+    _measure(lambda how: measure_studio(bundle, how), seeds, settings, threads, output, as_json)
+
+
+def _measure(
+    measure: Callable[[MeasureOptions], Measured],
+    seeds: int,
+    settings: list[str] | None,
+    threads: int,
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    from marey.cli.roles.actions import MeasureOptions
+
     with console.bar() as bar:
         task = bar.add_task("judging", total=None)
-        found = measure_actions(
-            bundle, actions=chosen or (), seeds=seeds, settings=options.settings_of(settings or ()), threads=threads,
-            output=output, progress=lambda done, total: bar.update(task, completed=done, total=total),
-        )  # fmt: skip
+        values = options.settings_of(settings or ())
+        found = measure(
+            MeasureOptions(
+                seeds, values, threads, output, lambda done, total: bar.update(task, completed=done, total=total)
+            )
+        )
     if as_json:
         console.result_json(found.document)
     else:

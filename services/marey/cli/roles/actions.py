@@ -1,9 +1,9 @@
-"""Adherence per action, measured in this process, for `marey eval actions`."""
+"""Adherence by the referee, measured in this process, for `marey eval actions` and `marey eval studio`."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,65 +13,78 @@ from marey.core.extras import needs_extra
 from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:
-    from marey.referee.adherence import ActionTrial
+    from marey.motion.clip import MotionClip
     from marey.referee.prompts import ActionPrompt
 
 
 @dataclass(frozen=True)
-class ActionsMeasured:
+class Measured:
     """The report of a bundle: its table, and all of it as JSON values."""
 
     markdown: str
     document: Mapping[str, Any]
 
 
-def measure_actions(
-    bundle: str,
-    *,
-    actions: Sequence[str],
-    seeds: int,
-    settings: Mapping[str, float],
-    threads: int,
-    output: Path | None,
-    progress: Callable[[int, int], None],
-) -> ActionsMeasured:
+@dataclass(frozen=True)
+class MeasureOptions:
+    """How a bundle is measured.
+
+    Attributes:
+        seeds: motions of each prompt, with the seeds from 0 on.
+        settings: sampling settings by name.
+        threads: of torch; 0 = its own choice.
+        output: folder for report.json and report.md.
+        progress: called with motions done and wanted.
+    """
+
+    seeds: int
+    settings: Mapping[str, float]
+    threads: int
+    output: Path | None
+    progress: Callable[[int, int], None]
+
+
+def measure_actions(bundle: str, actions: Sequence[str], options: MeasureOptions) -> Measured:
     """Generate the held-out prompts of actions with a bundle, and let the referee judge the exported joints.
 
     Args:
         actions: ids of the vocabulary; none = all.
-        seeds: motions of each prompt, with the seeds from 0 on.
-        settings: sampling settings by name.
-        output: folder for report.json and report.md.
 
     Raises:
         NotFound, InvalidBundle: of the bundle.
         InvalidInput: no such action or setting.
     """
-    try:
-        from marey.bundles import choose_bundle
-        from marey.bundles.limits import check_settings
-        from marey.referee import adherence
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
-    found = choose_bundle(bundle)
-    values = check_settings(found, settings)
-    asked = _asked(actions)
-    generator = resolve(get_model(found.manifest.model, where=bundle).load)(found, threads=threads)
-    trials = _trials(generator, asked, seeds, generator.settings(values), progress)
-    reference = generator.bundle.reference
-    made = adherence.document(reference, generator.describe_settings(generator.settings(values)), trials)
-    table = adherence.markdown(reference, adherence.rates(trials))
-    if output is not None:
-        output.mkdir(parents=True, exist_ok=True)
-        (output / "report.json").write_text(json.dumps(made, indent=1), encoding="utf-8")
-        (output / "report.md").write_text(table, encoding="utf-8")
-    return ActionsMeasured(table, made)
-
-
-def _asked(actions: Sequence[str]) -> list[ActionPrompt]:
+    run = _Run.of(bundle, options)
+    from marey.referee import Body
+    from marey.referee.adherence import document, judge_trial, markdown, rates
     from marey.referee.prompts import action_prompts
 
-    prompts = action_prompts()
+    asked = _of_actions(action_prompts(), actions)
+    trials = [judge_trial(prompt, seed, Body(clip.joints, clip.fps)) for prompt, seed, clip in run.motions(asked)]
+    return run.report(markdown(run.reference, rates(trials)), document(run.reference, run.settings, trials))
+
+
+def measure_studio(bundle: str, options: MeasureOptions) -> Measured:
+    """Generate a studio's list with a bundle; count motions that do what was asked, and those that are flagged.
+
+    Raises:
+        NotFound, InvalidBundle: of the bundle.
+        InvalidInput: no such setting.
+    """
+    run = _Run.of(bundle, options)
+    from marey.referee import Body
+    from marey.referee.prompts import studio_prompts
+    from marey.referee.studio import judge_studio, studio_document, studio_markdown, studio_rates
+
+    trials = [
+        judge_studio(prompt, seed, Body(clip.joints, clip.fps), clip.manifest)
+        for prompt, seed, clip in run.motions(studio_prompts())
+    ]
+    table = studio_markdown(run.reference, studio_rates(trials))
+    return run.report(table, studio_document(run.reference, run.settings, trials))
+
+
+def _of_actions(prompts: Sequence[ActionPrompt], actions: Sequence[str]) -> list[ActionPrompt]:
     known = {action for prompt in prompts for action in prompt.actions}
     if unknown := [action for action in actions if action not in known]:
         raise InvalidInput(
@@ -82,23 +95,50 @@ def _asked(actions: Sequence[str]) -> list[ActionPrompt]:
     return [prompt for prompt in prompts if not actions or set(prompt.actions) <= set(actions)]
 
 
-def _trials(
-    generator: Any, prompts: Sequence[ActionPrompt], seeds: int, settings: Any, progress: Callable[[int, int], None]
-) -> list[ActionTrial]:
-    from marey.generation.export import finish
-    from marey.generation.port import Request
-    from marey.referee import Body
-    from marey.referee.adherence import judge_trial
-    from marey.training.adherence import pipeline_of
+class _Run:
+    """A loaded generator with its settings."""
 
-    texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
-    jobs = [(prompt, Request(text, seed)) for seed in range(seeds) for prompt, text in zip(prompts, texts, strict=True)]
-    trials: list[ActionTrial] = []
-    for start in range(0, len(jobs), generator.batch):
-        part = jobs[start : start + generator.batch]
-        made = generator.generate([request for _, request in part], settings)
-        for (prompt, request), motion in zip(part, made, strict=True):
-            clip = finish(generator, request, motion, settings)
-            trials.append(judge_trial(prompt, request.seed, Body(clip.joints, clip.fps)))
-        progress(len(trials), len(jobs))
-    return trials
+    def __init__(self, generator: Any, options: MeasureOptions, values: Mapping[str, Any]) -> None:
+        self.reference: str = generator.bundle.reference
+        self._generator = generator
+        self._options = options
+        self._settings = generator.settings(values)
+        self.settings: Mapping[str, object] = generator.describe_settings(self._settings)
+
+    @classmethod
+    def of(cls, bundle: str, options: MeasureOptions) -> _Run:
+        try:
+            from marey.bundles import choose_bundle
+            from marey.bundles.limits import check_settings
+        except ImportError as error:
+            raise needs_extra("worker", error) from error
+        found = choose_bundle(bundle)
+        values = check_settings(found, options.settings)
+        load = resolve(get_model(found.manifest.model, where=bundle).load)
+        return cls(load(found, threads=options.threads), options, values)
+
+    def motions(self, prompts: Sequence[ActionPrompt]) -> Iterator[tuple[ActionPrompt, int, MotionClip]]:
+        """Generate each prompt with each seed."""
+        from marey.generation.export import finish
+        from marey.generation.port import Request
+        from marey.training.adherence import pipeline_of
+
+        generator, settings = self._generator, self._settings
+        texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
+        seeds = range(self._options.seeds)
+        jobs = [(prompt, Request(text, seed)) for seed in seeds for prompt, text in zip(prompts, texts, strict=True)]
+        for start in range(0, len(jobs), generator.batch):
+            part = jobs[start : start + generator.batch]
+            made = generator.generate([request for _, request in part], settings)
+            for (prompt, request), motion in zip(part, made, strict=True):
+                yield prompt, request.seed, finish(generator, request, motion, settings)
+            self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
+
+    def report(self, markdown: str, document: Mapping[str, Any]) -> Measured:
+        """Return the report; write it where a folder is given."""
+        output = self._options.output
+        if output is not None:
+            output.mkdir(parents=True, exist_ok=True)
+            (output / "report.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+            (output / "report.md").write_text(markdown, encoding="utf-8")
+        return Measured(markdown, document)
