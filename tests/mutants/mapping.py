@@ -21,7 +21,8 @@ import coverage
 
 from tests.mutants.recording import SOURCES
 
-TESTS = ("tests/unit", "tests/models", "tests/integration", "tests/acceptance", "tests/contracts")
+TESTS = ("tests/unit", "tests/models", "tests/integration", "tests/contracts")
+"""Acceptance tests run the product in processes of its own, whose lines are not recorded."""
 SHARED_TESTS = ("conftest.py", "tests/support", "tests/servers")
 
 
