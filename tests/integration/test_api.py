@@ -20,7 +20,7 @@ from marey.core.errors import NotFound
 from marey.core.spool import IN_MEMORY
 from marey.db import transaction
 from marey.jobs import WorkerHeartbeat, beat, record_scheduler_heartbeat, retire
-from tests.support.live_api import BUNDLE, LiveApi, wait_until
+from tests.support.live_api import BUNDLE, METADATA, LiveApi, wait_until
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
 
@@ -286,7 +286,7 @@ def motion(api: LiveApi, content: bytes) -> str:
 
 def test_a_motion_tells_where_it_comes_from(http: httpx2.Client, motion: str, content: bytes) -> None:
     found = http.get(f"/v1/motions/{motion}").json()
-    assert found["metadata"] == {"prompt": "a person walks"}
+    assert found["metadata"] == {"prompt": "a person walks", **METADATA}
     assert {f["format"]: f["sha256"] for f in found["files"]}["npz"] == hashlib.sha256(content).hexdigest()
     assert motion in [m["id"] for m in http.get("/v1/motions").json()["items"]]
 

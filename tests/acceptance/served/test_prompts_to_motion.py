@@ -14,7 +14,7 @@ from tests.support.marey import TINY, Marey, tiny
 from tests.support.models import another_model
 
 FIELDS = ["job", "item", "motion", "name", "prompt", "variant", "model", "bundle", "licence", "seed", "state", "error",
-          "frames", "fps", "elapsed", "files"]  # fmt: skip
+          "frames", "fps", "elapsed", "quality", "scope", "files"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +64,7 @@ def test_a_one_shot_makes_the_same_tokens_as_the_queue(
         "generate", line["prompt"], "--seed", line["seed"], "--seconds", 2, "-o", tmp_path, "--format", "npz", "--json"
     ).ok().lines  # fmt: skip
     assert (made[0]["job"], made[0]["item"], list(made[0])) == (None, None, FIELDS)
+    assert (made[0]["quality"], made[0]["scope"]) == (line["quality"], line["scope"])
     ours, theirs = load_npz(made[0]["files"]["npz"]), load_npz(line["files"]["npz"])
     # Each motion is decoded by itself, so equal tokens are equal numbers, in a batch of one or two.
     np.testing.assert_array_equal(ours.features, theirs.features)

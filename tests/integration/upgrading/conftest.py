@@ -29,7 +29,7 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
         bundle = Bundle.open(folder / name)
         assert bundle.manifest.text is not None
         text = resolve(bundle.manifest.text, config=Settings(models=folder)).model_dump(mode="json")
-        document = bundle.manifest.model_dump(mode="json", exclude_unset=True, exclude={"actions"})
+        document = bundle.manifest.model_dump(mode="json", exclude_unset=True, exclude={"actions", "offsets"})
         (folder / name / "manifest.json").write_text(json.dumps({**document, "format": 1, "text": text}))
     return folder
 

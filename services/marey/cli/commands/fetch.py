@@ -155,5 +155,7 @@ def output_line(fetched: FetchedItem) -> dict[str, Any]:
         "frames": motion.get("frames"),
         "fps": motion.get("fps"),
         "elapsed": motion.get("elapsed"),
+        "quality": motion.get("quality"),
+        "scope": item.get("scope"),
         "files": {file_format: str(path.absolute()) for file_format, path in fetched.files.items()},
     }
