@@ -7,8 +7,7 @@
    are either rare, or older than all walked ones. First only their creation times are sorted, then the motions of
    the page's times are read: Postgres sorts a single number by value, and copies wider rows, which takes five times
    as long when every row enters the page for a while (rows come oldest first). Where no other tenant has motions,
-   the times are sought without the term of the tenant: intersecting with the list of all motions takes half as long
-   again.
+   the times are sought without the term of the tenant: intersecting with the list of all motions takes a tenth more.
 
 The cost is bounded by the walks plus the matching rows, independent of the table size. Without statistics (after a
 bulk load), or with old ones, the planner would walk the primary key or read the whole table instead: so each
