@@ -15,7 +15,7 @@ from marey.cli.evaluating import EvaluationArguments
 from marey.cli.references import FORMS, find, of_view
 
 if TYPE_CHECKING:
-    from marey.cli.roles.actions import Measured, MeasureOptions
+    from marey.cli.roles.actions import RefereeReport, MeasureOptions
     from marey.client import Client, Evaluation
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
@@ -309,7 +309,7 @@ def studio(
 
 
 def _measure(
-    measure: Callable[[MeasureOptions], Measured],
+    measure: Callable[[MeasureOptions], RefereeReport],
     seeds: int,
     settings: list[str] | None,
     threads: int,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Measured:
+class RefereeReport:
     """The report of a bundle: its table, and all of it as JSON values."""
 
     markdown: str
@@ -44,7 +44,7 @@ class MeasureOptions:
     progress: Callable[[int, int], None]
 
 
-def measure_actions(bundle: str, actions: Sequence[str], options: MeasureOptions) -> Measured:
+def measure_actions(bundle: str, actions: Sequence[str], options: MeasureOptions) -> RefereeReport:
     """Generate the held-out prompts of actions with a bundle, and let the referee judge the exported joints.
 
     Args:
@@ -64,7 +64,7 @@ def measure_actions(bundle: str, actions: Sequence[str], options: MeasureOptions
     return run.report(markdown(run.reference, rates(trials)), document(run.reference, run.settings, trials))
 
 
-def measure_studio(bundle: str, options: MeasureOptions) -> Measured:
+def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:
     """Generate a studio's list with a bundle; count motions that do what was asked, and those that are flagged.
 
     Raises:
@@ -134,11 +134,11 @@ class _Run:
                 yield prompt, request.seed, finish(generator, request, motion, settings)
             self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
 
-    def report(self, markdown: str, document: Mapping[str, Any]) -> Measured:
+    def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:
         """Return the report; write it where a folder is given."""
         output = self._options.output
         if output is not None:
             output.mkdir(parents=True, exist_ok=True)
             (output / "report.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
             (output / "report.md").write_text(markdown, encoding="utf-8")
-        return Measured(markdown, document)
+        return RefereeReport(markdown, document)
