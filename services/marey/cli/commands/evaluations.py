@@ -15,7 +15,7 @@ from marey.cli.evaluating import EvaluationArguments
 from marey.cli.references import FORMS, find, of_view
 
 if TYPE_CHECKING:
-    from marey.cli.roles.actions import RefereeReport, MeasureOptions
+    from marey.cli.roles.actions import MeasureOptions, RefereeReport
     from marey.client import Client, Evaluation
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
