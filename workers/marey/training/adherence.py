@@ -27,6 +27,7 @@ from marey.core.errors import InvalidBundle
 from marey.data.prepared import PreparedData
 from marey.generation.export import finish
 from marey.generation.port import Generator, Request, S
+from marey.motion.clip import MotionClip
 from marey.text.features import TextFeatures
 from marey.text.pipeline import TextPipeline
 
@@ -153,10 +154,8 @@ def measure(
 
 
 def _judged(generator: Generator[S], jobs: Sequence[tuple[HeldOutPrompt, Request]], settings: S) -> Iterator[Trial]:
-    results = generator.generate([request for _, request in jobs], settings)
-    for (prompt, request), made in zip(jobs, results, strict=True):
-        assert made is not None  # no rows are dropped here
-        clip = finish(generator, request, made, settings)
+    clips = finished(generator, [request for _, request in jobs], settings)
+    for (prompt, request), clip in zip(jobs, clips, strict=True):
         verdict = judge(clip.joints, clip.fps, prompt.expected)
         wants_straight = len(prompt.expected) == 1 and prompt.expected[0].straight
         yield Trial(
@@ -169,6 +168,13 @@ def _judged(generator: Generator[S], jobs: Sequence[tuple[HeldOutPrompt, Request
             straightness(clip.joints, clip.fps).straight if wants_straight else None,
             quality(clip.joints, clip.fps),
         )
+
+
+def finished(generator: Generator[S], requests: Sequence[Request], settings: S) -> Iterator[MotionClip]:
+    """Generate a batch, and yield its motions as they are exported, in order."""
+    for request, made in zip(requests, generator.generate(requests, settings), strict=True):
+        assert made is not None  # no rows are dropped here
+        yield finish(generator, request, made, settings)
 
 
 def pipeline_of(generator: Generator[Any]) -> TextPipeline:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,9 +118,8 @@ class _Run:
 
     def motions(self, prompts: Sequence[ActionPrompt]) -> Iterator[tuple[ActionPrompt, int, MotionClip]]:
         """Generate each prompt with each seed."""
-        from marey.generation.export import finish
         from marey.generation.port import Request
-        from marey.training.adherence import pipeline_of
+        from marey.training.adherence import finished, pipeline_of
 
         generator, settings = self._generator, self._settings
         texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
@@ -129,16 +127,16 @@ class _Run:
         jobs = [(prompt, Request(text, seed)) for seed in seeds for prompt, text in zip(prompts, texts, strict=True)]
         for start in range(0, len(jobs), generator.batch):
             part = jobs[start : start + generator.batch]
-            made = generator.generate([request for _, request in part], settings)
-            for (prompt, request), motion in zip(part, made, strict=True):
-                yield prompt, request.seed, finish(generator, request, motion, settings)
+            clips = finished(generator, [request for _, request in part], settings)
+            for (prompt, request), clip in zip(part, clips, strict=True):
+                yield prompt, request.seed, clip
             self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
 
     def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:
         """Return the report; write it where a folder is given."""
+        from marey.training.adherence import write_report
+
         output = self._options.output
         if output is not None:
-            output.mkdir(parents=True, exist_ok=True)
-            (output / "report.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
-            (output / "report.md").write_text(markdown, encoding="utf-8")
+            write_report(document, markdown, output)
         return RefereeReport(markdown, document)
