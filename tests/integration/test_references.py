@@ -164,7 +164,7 @@ def test_plans_go_by_index_and_never_through_the_listing(engine: sa.Engine) -> N
         assert any(index in plan for plan in plans[kind]), f"{index}\n" + "\n\n".join(plans[kind])
     for table in ("job", "evaluation", "stream"):
         assert any(f"ix_{table}_name" in plan for plan in plans[table]), "\n\n".join(plans[table])
-    assert any("ix_motion_search_terms" in plan for plan in plans["place"])
+    assert any("ix_motion_search_filters" in plan for plan in plans["place"])
 
 
 @pytest.mark.parametrize("text", ["", "x" * 301, "a\0", "\ud800"])

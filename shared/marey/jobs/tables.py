@@ -303,7 +303,11 @@ motion_search = sa.Table(
     sa.Index("ix_motion_search_job", "job_id", "created_at", "motion_id"),
     # A search reads the whole pending list.
     sa.Index(
-        "ix_motion_search_terms", "terms", postgresql_using="gin", postgresql_with={"gin_pending_list_limit": 512}
+        "ix_motion_search_filters",
+        "terms",
+        sa.text("motion_name_prefixes(terms)"),
+        postgresql_using="gin",
+        postgresql_with={"gin_pending_list_limit": 512},
     ),
     sa.Index("ix_motion_search_short_id", "tenant_id", short_id("motion_id")),
 )

@@ -3,11 +3,12 @@
 `motion_search` has a row per motion, and its `terms` cover all filters. A page is searched
 
 1. newest first, among the next `WALKED` motions: fast for a filter that matches often;
-2. through the index of terms, which intersects all conditions of the filter, however old the matches. The matches
-   are either rare, or older than all walked ones. First only their creation times are sorted, then the motions of
-   the page's times are read: Postgres sorts a single number by value, and copies wider rows, which takes five times
-   as long when every row enters the page for a while (rows come oldest first). Where no other tenant has motions,
-   the times are sought without the term of the tenant: intersecting with the list of all motions takes a tenth more.
+2. through the index of terms and of the first characters of names, which intersects all conditions of the filter,
+   however old the matches. The matches are either rare, or older than all walked ones. First only their creation
+   times are sorted, then the motions of the page's times are read: Postgres sorts a single number by value, and
+   copies wider rows, which takes five times as long when every row enters the page for a while (rows come oldest
+   first). Where no other tenant has motions, the times are sought without the term of the tenant: intersecting with
+   the list of all motions takes a tenth more.
 
 The cost is bounded by the walks plus the matching rows, independent of the table size. Without statistics (after a
 bulk load), or with old ones, the planner would walk the primary key or read the whole table instead: so each
@@ -24,7 +25,7 @@ from typing import Any, TypeVar
 from uuid import UUID
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import TSQUERY
+from sqlalchemy.dialects.postgresql import TSQUERY, array
 
 from marey.db.pages import Order, Place
 from marey.db.sql import check_text
@@ -38,6 +39,8 @@ WALKED = 20_000
 NEAR = 5_000
 """Motions read of the creation times of a page: a bulk load gives thousands the same; workers write 32 at a time."""
 UNREVIEWED = "new"
+PREFIX = 32
+"""Maximum characters of a name's beginning that `ix_motion_search_filters` holds (migration 0017)."""
 VARIANTS = 1000
 """Maximum motions of one prompt, by its index."""
 
@@ -108,7 +111,7 @@ class _Page:
         table = tables.motion_search.c
         matches = (
             sa.select(table.motion_id, table.created_at)
-            .where(*scope, *_conditions(self.found, table.terms))
+            .where(*scope, *_conditions(self.found, table.terms, indexed=True))
             .offset(0)  # optimization fence: order and page condition stay outside
             .subquery("matches")
         )
@@ -171,20 +174,34 @@ def _plan(conn: sa.Connection, allowed: Sequence[str]) -> Generator[None]:
     conn.exec_driver_sql("; ".join(f"SET LOCAL {name} TO DEFAULT" for name in wanted))
 
 
-def _conditions(found: MotionFilter, terms: sa.ColumnElement[Any]) -> list[sa.ColumnElement[bool]]:
-    """Return the conditions of a filter separately, so that the index can intersect them."""
+def _conditions(
+    found: MotionFilter, terms: sa.ColumnElement[Any], *, indexed: bool = False
+) -> list[sa.ColumnElement[bool]]:
+    """Return the conditions of a filter separately, so that the index can intersect them; `indexed`: the name's by
+    its first characters, as the index has them."""
     for where, text in (("name", found.name), ("text", found.text), *(("tag", tag) for tag in found.tags)):
         check_text(text, where)
     wanted = [_has(terms, _lexeme("g", tag)) for tag in found.tags]
     if found.name is not None:
-        begins = sa.literal("'\x01n").concat(sa.func.lower(_escaped(found.name))).concat("':*")
-        wanted.append(_has(terms, begins))
+        wanted += _begins(found.name, terms, indexed=indexed)
     if found.text is not None:
         asked = sa.func.websearch_to_tsquery(sa.literal_column("'english'::regconfig"), found.text)
         wanted.append(terms.bool_op("@@")(asked))
     verdicts = [*map(str, found.reviews), *([UNREVIEWED] if found.unreviewed else [])]
     if verdicts:
         wanted.append(_has(terms, sa.literal(" | ".join(f"'\x01r{_escaped(each)}'" for each in verdicts))))
+    return wanted
+
+
+def _begins(name: str, terms: sa.ColumnElement[Any], *, indexed: bool) -> list[sa.ColumnElement[bool]]:
+    """Return the conditions of a name's beginning. As a prefix of terms it reads an entry for each name that fits:
+    of 300,000 names half of the whole search."""
+    wanted: list[sa.ColumnElement[bool]] = []
+    if indexed and name:
+        first = sa.func.left(sa.func.lower(name), PREFIX)
+        wanted.append(sa.func.motion_name_prefixes(terms).bool_op("@>")(sa.cast(array([first]), sa.ARRAY(sa.Text))))
+    if not wanted or len(name.lower()) > PREFIX:
+        wanted.append(_has(terms, sa.literal("'\x01n").concat(sa.func.lower(_escaped(name))).concat("':*")))
     return wanted
 
 

@@ -137,7 +137,8 @@ def test_a_search_has_two_plans_whatever_the_planner_believes(
         assert "Sort" not in plan
     assert seen["matches"]
     for plan in seen["matches"]:
-        assert "Bitmap Index Scan on ix_motion_search_terms" in plan
+        assert "Bitmap Index Scan on ix_motion_search_filters" in plan
+        assert (FILTERS[name].name is not None) == ("motion_name_prefixes" in plan), "many names are one entry"
     for plan in seen["near"]:
         assert re.search(r"Index Scan (Backward )?using ix_motion_search_(created|job) on motion_search", plan)
         assert "Sort" not in plan

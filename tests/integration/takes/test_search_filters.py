@@ -23,7 +23,10 @@ PROMPTS = (
     "a person walks slowly", "the man is walking", "slowly he walks", "she bows", "it's o'clock: run & jump | turn",
     "x:* ! 'quoted' \\ back", "Élan vital ÀÉÎ", "running",
 )  # fmt: skip
-NAMES = ("take 1", "Take 10", "take%", "take_1", "O'b\\c", "ÉLAN", "élan 2", "straße", "a:*", "a & b", None)
+NAMES = (
+    "take 1", "Take 10", "take%", "take_1", "O'b\\c", "ÉLAN", "élan 2", "straße", "a:*", "a & b", None,
+    f"{'long ' * 7}1", f"{'Long ' * 7}2", f"{'İ' * 32}a",
+)  # fmt: skip
 TAGS = ("a", "A", "it's", "b\\", "g:*", "!x", "a | b", "show=one", "ü", "x y")
 TEXTS = (
     *("walk", "walking slowly", '"walks slowly"', "walk or bow", "walk -slowly", "-walk", "the", "O'clock", "élan"),
