@@ -1,0 +1,186 @@
+"""The selector: synthetic motions match their own prompts and no others, in order, wherever the body stands."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from marey.core.errors import InvalidInput
+from marey.motion.resample import frame_times, interpolate
+from marey.selector import RULES, Motion, Wanted, match, wanted_of
+from marey.selector.matching import PASS
+from marey.vocabulary.entries import load_vocabulary
+from tests.support.bodies import FPS, Array, Body, bower, raiser, runner, steady, walker, waver
+
+SINGLE = {
+    "a person walks": walker,
+    "he runs forward": runner,
+    "she walks backward": lambda: Body(4.0, speed=steady(-0.8)).joints(),
+    "someone turns left": lambda: walker(turn=90.0),
+    "a man waves with his left hand": lambda: waver("left"),
+    "a woman raises both arms": lambda: raiser("both"),
+    "a person bows": bower,
+    "a person stands still": lambda: Body(4.0).joints(),
+    "a person jumps up": lambda: jumper(0.25, 0.0),
+    "a person jumps forward": lambda: jumper(0.25, 1.0),
+    "a person squats": lambda: lowered([0.92, 0.45, 0.92]),
+    "a person crouches": lambda: lowered([0.92, 0.55, 0.55, 0.55, 0.55, 0.92]),
+}
+
+
+def jumper(height: float, distance: float) -> Array:
+    joints = Body(3.0).joints()
+    phase = np.clip((np.arange(len(joints)) - 25) / 10, 0, 1)
+    joints[..., 1] += (4 * height * phase * (1 - phase))[:, None]
+    joints[..., 2] += (distance * phase)[:, None]
+    return joints
+
+
+def lowered(heights: list[float]) -> Array:
+    """A standing body of which the hips go through these heights, the feet in place."""
+    from marey.data.retarget import two_bones
+    from tests.support.bodies import LENGTH
+
+    joints = Body(3.0).joints()
+    times = np.linspace(0, len(joints) - 1, len(heights))
+    drop = joints[:, 0, 1] - np.interp(np.arange(len(joints)), times, heights)
+    legs = (1, 2, 4, 5, 7, 8, 10, 11)
+    upper = [j for j in range(22) if j not in legs] + [1, 2]
+    joints[:, upper, 1] -= drop[:, None]
+    forward = np.broadcast_to([0.0, 0.0, 1.0], (len(joints), 3))
+    for hip, knee, ankle in ((1, 4, 7), (2, 5, 8)):
+        lengths = LENGTH[knee], LENGTH[ankle]
+        joints[:, knee], joints[:, ankle] = two_bones(joints[:, hip], joints[:, ankle].copy(), forward, lengths)
+    return joints
+
+
+def matched(joints: Array, prompt: str, fps: float = FPS) -> float:
+    steps = wanted_of([prompt])
+    assert steps is not None, prompt
+    return match(Motion(joints, fps), steps)
+
+
+@pytest.mark.parametrize("prompt", SINGLE)
+def test_a_motion_matches_its_own_prompt(prompt: str) -> None:
+    assert matched(SINGLE[prompt](), prompt) >= PASS
+
+
+@pytest.mark.parametrize(
+    ("prompt", "other"),
+    [
+        ("a person walks", "he runs forward"),
+        ("he runs forward", "a person walks"),
+        ("a person walks", "she walks backward"),
+        ("someone turns left", "a person walks"),
+        ("a person bows", "a person walks"),
+        ("a man waves with his left hand", "a woman raises both arms"),
+        ("a person stands still", "a person bows"),
+        ("a person jumps up", "a person stands still"),
+        ("a person jumps forward", "a person jumps up"),
+        ("a person squats", "a person stands still"),
+    ],
+)
+def test_another_motion_does_not_match(prompt: str, other: str) -> None:
+    assert matched(SINGLE[other](), prompt) < PASS
+
+
+def test_a_side_counts_where_the_prompt_names_one() -> None:
+    left = waver("left")
+    assert matched(left, "a person waves") >= PASS
+    assert matched(left, "a person waves with the right hand") < PASS
+    assert matched(walker(turn=90.0), "someone turns right") < PASS
+
+
+def in_order(first: Array, then: Array) -> Array:
+    """One motion after the other, from where the first one ends."""
+    then = then + (first[-1, 0] - then[0, 0]) * [1, 0, 1]
+    return np.concatenate([first, then])
+
+
+def test_actions_count_in_their_order() -> None:
+    both = in_order(walker(), waver("left"))
+    forward, backward = wanted_of(["a person walks", "he waves"]), wanted_of(["a person waves", "he walks"])
+    assert forward is not None
+    assert backward is not None
+    assert match(Motion(both, FPS), forward) >= PASS
+    assert match(Motion(both, FPS), backward) < PASS
+    assert match(Motion(walker(), FPS), forward) < PASS
+
+
+def test_a_step_of_two_actions_is_met_at_once_or_in_order() -> None:
+    both = wanted_of(["a person walks and waves"])
+    assert both is not None
+    assert len(both) == 1
+    assert match(Motion(in_order(walker(), waver("left")), FPS), both) >= PASS
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    ["the dog barks", "a person swims", "a person limps", "a person walks without waving", "asdf qwer zxcv"],
+)
+def test_a_prompt_without_rules_has_no_match(prompt: str) -> None:
+    assert wanted_of([prompt]) is None
+    assert wanted_of(["a person walks", prompt]) is None
+
+
+def test_a_side_is_read_only_for_actions_that_have_one() -> None:
+    assert wanted_of(["she waves with her right hand"]) == ((Wanted("wave", "right"),),)
+    assert wanted_of(["a person squats on the left"]) == ((Wanted("squat"),),)
+
+
+def test_every_rule_is_of_an_action_and_gives_a_grade() -> None:
+    assert set(RULES) <= set(load_vocabulary().actions)
+    for make in SINGLE.values():
+        motion = Motion(make(), FPS)
+        for name, rule in RULES.items():
+            for side in ("", "left", "right", "both"):
+                assert 0 <= rule(motion, side) <= 1, name
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.sampled_from(sorted(SINGLE)),
+    st.floats(-180, 180),
+    st.floats(-5, 5),
+    st.floats(0.8, 1.25),
+    st.sampled_from([20.0, 30.0, 60.0]),
+)
+def test_place_heading_size_and_rate_hardly_change_a_match(
+    prompt: str, degrees: float, metres: float, size: float, fps: float
+) -> None:
+    joints = SINGLE[prompt]()
+    turned = np.radians(degrees)
+    rotation = np.array([[np.cos(turned), 0, np.sin(turned)], [0, 1, 0], [-np.sin(turned), 0, np.cos(turned)]])
+    moved = size * (joints @ rotation.T + [metres, 0, -metres])
+    moved = np.asarray(interpolate(moved, frame_times(len(moved), FPS, fps)))
+    assert matched(moved, prompt, fps) == pytest.approx(matched(joints, prompt), abs=0.35)
+    assert matched(moved, prompt, fps) >= PASS
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(8, 60), st.integers(0, 2**31))
+def test_any_finite_motion_has_a_grade_for_every_rule(frames: int, seed: int) -> None:
+    motion = Motion(np.random.default_rng(seed).normal(0.5, 1, (frames, 22, 3)), 20.0)
+    assert all(0 <= rule(motion, side) <= 1 for rule in RULES.values() for side in ("", "left", "both"))
+
+
+def test_other_shapes_and_numbers_are_refused() -> None:
+    for bad in (np.zeros((7, 22, 3)), np.zeros((20, 21, 3)), np.full((20, 22, 3), np.nan)):
+        with pytest.raises(InvalidInput, match="joints"):
+            Motion(bad, 20.0)
+
+
+def test_a_clip_of_ten_seconds_takes_under_20_ms() -> None:
+    joints = in_order(walker(5.0), waver("left", 4.8))
+    steps = wanted_of(["a person walks", "he waves"])
+    assert steps is not None
+    spent: list[float] = []
+    for _ in range(5):
+        began = time.process_time()
+        match(Motion(joints, FPS), steps)
+        spent.append(time.process_time() - began)
+    assert min(spent) < 0.02

@@ -1,0 +1,138 @@
+"""Match of a motion with the actions of a prompt, in their order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from marey.selector.motion import SHORTEST, Motion
+from marey.selector.rules import RULES
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import ActionLists, match_scope
+
+PASS = 0.5
+"""Value from which a motion shows its actions, as their definitions have it."""
+LEAST_PART = 0.5
+"""Seconds that each action of several needs."""
+CUTS = {2: 14, 3: 9}
+"""Moments that are tried as ends of an action, by the number of actions; of more actions 7."""
+FEWEST_CUTS = 7
+
+_SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
+_WORDS = re.compile(r"[a-z]+")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An action that a motion should show.
+
+    Attributes:
+        action: id in the vocabulary, one that `RULES` has.
+        side: `left`, `right`, `both`, or empty: any.
+    """
+
+    action: str
+    side: str = ""
+
+
+Step = tuple[Wanted, ...]
+"""Actions of one stretch of time."""
+
+
+def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
+    """Return the actions of a prompt in their order.
+
+    Args:
+        sentences: the prompt's actions in the order of time, each as a sentence (`TextFeatures.acts`), or the whole
+            prompt as one.
+
+    Returns:
+        One step a sentence; None if a sentence negates, names no action, or names one that has no rule.
+    """
+    steps = [_step(sentence) for sentence in sentences]
+    found = tuple(step for step in steps if step is not None)
+    return found if found and len(found) == len(steps) else None
+
+
+def _step(sentence: str) -> Step | None:
+    scope = match_scope(sentence, _every())
+    if "negation" in scope.flags:
+        return None
+    found = [named.action for named in scope.actions if named.verdict == "known" and named.action in RULES]
+    if len(found) < len(scope.actions):
+        return None
+    sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
+    side = sides.pop() if len(sides) == 1 else ""
+    actions = load_vocabulary().actions
+    return tuple(Wanted(name, side if actions[name].sided else "") for name in found if name is not None)
+
+
+@lru_cache(maxsize=1)
+def _every() -> ActionLists:
+    return ActionLists(supported=tuple(load_vocabulary().actions))
+
+
+def match(motion: Motion, steps: Sequence[Step]) -> float:
+    """Return how well a motion shows actions in their order, 0 to 1; from `PASS` on it shows them.
+
+    Args:
+        motion: the joints.
+        steps: as `wanted_of` returns them, at least one.
+    """
+    return round(_in_order(motion, [lambda part, step=step: _grade(part, step) for step in steps]), 3)
+
+
+def _grade(motion: Motion, step: Step) -> float:
+    """Grade the actions of a step: at one time, or one after the other as they are named."""
+    together = min(RULES[wanted.action](motion, wanted.side) for wanted in step)
+    if len(step) == 1:
+        return together
+    rules: list[Callable[[Motion], float]] = [
+        lambda part, wanted=wanted: RULES[wanted.action](part, wanted.side) for wanted in step
+    ]
+    return max(together, _in_order(motion, rules))
+
+
+def _in_order(motion: Motion, rules: Sequence[Callable[[Motion], float]]) -> float:
+    """Return the best smallest grade over all ways to cut a motion into one part a rule, in their order."""
+    if len(rules) == 1:
+        return rules[0](motion)
+    ends = _cuts(motion, len(rules))
+    if not ends:
+        return 0.0
+    reached = {end: rules[0](motion.part(0, end)) for end in ends}
+    for rule in rules[1:-1]:
+        reached = {
+            end: max(
+                (min(grade, rule(motion.part(begin, end))) for begin, grade in _worth(reached, end, motion)),
+                default=0.0,
+            )
+            for end in ends
+        }
+    best = 0.0
+    for begin, grade in sorted(reached.items(), key=lambda each: -each[1]):
+        if grade <= best:
+            break
+        best = max(best, min(grade, rules[-1](motion.part(begin, motion.frames))))
+    return best
+
+
+def _worth(reached: dict[int, float], end: int, motion: Motion) -> list[tuple[int, float]]:
+    """Return the beginnings from which a part up to an end is long enough, with their grades, where these are not 0."""
+    return [(begin, grade) for begin, grade in reached.items() if grade > 0 and end - begin >= _least(motion)]
+
+
+def _least(motion: Motion) -> int:
+    return max(round(LEAST_PART * motion.fps), SHORTEST)
+
+
+def _cuts(motion: Motion, parts: int) -> list[int]:
+    """Return the frames at which a part may end; none if the motion is too short for its parts."""
+    least, frames = _least(motion), motion.frames
+    if frames < parts * least:
+        return []
+    count = min(CUTS.get(parts, FEWEST_CUTS), frames - 2 * least + 1)
+    room = frames - 2 * least
+    return sorted({least + round(k * room / max(count - 1, 1)) for k in range(count)})

@@ -1,0 +1,307 @@
+"""Signals of a motion that rules read, computed once for the whole motion and sliced for its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import (
+    ANKLES,
+    ELBOWS,
+    HEAD,
+    HIPS,
+    KNEES,
+    NECK,
+    PELVIS,
+    SHOULDERS,
+    TOES,
+    WRISTS,
+    body_frame,
+    heading,
+    smooth,
+    trunk_up,
+    velocity,
+)
+from marey.core.errors import InvalidInput
+from marey.motion.body import STATURE, stature
+from marey.motion.feet import runs
+from marey.motion.skeleton import HUMANML3D
+
+Array = NDArray[np.floating]
+Bool = NDArray[np.bool_]
+
+SHORTEST = 8
+"""Frames of the shortest motion that is matched."""
+CHEST = HUMANML3D.index("spine3")
+OFF_FLOOR = 0.04
+"""Metres over its standing height from which a foot is off the floor."""
+
+_REST = HUMANML3D.rest.astype(np.float64) * STATURE / stature(HUMANML3D)
+_LEG = float(np.linalg.norm(_REST[1] - _REST[4]) + np.linalg.norm(_REST[4] - _REST[7]))
+STANDING = {joint: float(_REST[joint, 1] - _REST[list(TOES), 1].min()) for joint in (PELVIS, CHEST, NECK, HEAD, 16, 17)}
+"""Heights in metres of joints of a standing body of 1.75 m."""
+
+
+class Signal:
+    """A value for each frame of a `Motion`."""
+
+    def __init__(self, compute: Callable[[Motion], Array]) -> None:
+        self._compute = compute
+        self._name = compute.__name__
+        self.__doc__ = compute.__doc__
+
+    def __get__(self, motion: Motion, owner: type[Motion]) -> Array:
+        cache = motion.whole.cache
+        if self._name not in cache:
+            cache[self._name] = self._compute(motion.whole)
+        return cache[self._name][motion.begin : motion.end]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A stretch in which both feet are off the floor.
+
+    Attributes:
+        height: of the lower foot at the highest moment, metres.
+        distance: of the hips over the floor, metres.
+        seconds: length.
+        apart: seconds between the moments at which the two feet leave the floor.
+        turn: degrees, from a tenth of a second before it to a tenth after it; positive to the left.
+    """
+
+    height: float
+    distance: float
+    seconds: float
+    apart: float
+    turn: float
+
+
+class Motion:
+    """A motion, or a part of one, scaled to a body 1.75 m tall. Angles are in degrees, positive to the left."""
+
+    def __init__(self, joints: NDArray[np.floating], fps: float) -> None:
+        """Keep the joints.
+
+        Args:
+            joints: (T >= `SHORTEST`, 22, 3) metres, Y up, the floor at y = 0.
+            fps: frames a second.
+
+        Raises:
+            InvalidInput: another shape, or numbers that are not finite.
+        """
+        joints = np.asarray(joints, np.float64)
+        if joints.ndim != 3 or joints.shape[1:] != (len(HUMANML3D), 3) or len(joints) < SHORTEST:
+            wanted = f"(T >= {SHORTEST}, {len(HUMANML3D)}, 3)"
+            raise InvalidInput(f"joints have shape {joints.shape}, not {wanted}", where="selector")
+        if not np.isfinite(joints).all():
+            raise InvalidInput("joints hold numbers that are not finite", where="selector")
+        legs = [
+            np.median(np.linalg.norm(joints[:, a] - joints[:, b], axis=-1))
+            for pair in (zip(HIPS, KNEES, strict=True), zip(KNEES, ANKLES, strict=True))
+            for a, b in pair
+        ]
+        scale = 2 * _LEG / max(float(np.sum(legs)), 1e-6)
+        self.cache: dict[str, Array] = {"joints": joints * scale}
+        self.fps = fps
+        self.begin, self.end = 0, len(joints)
+        self.whole = self
+
+    def part(self, begin: int, end: int) -> Motion:
+        """Return frames `begin` to `end` (exclusive) of this motion, sharing its signals."""
+        part = object.__new__(Motion)
+        part.cache, part.fps, part.whole = self.cache, self.fps, self.whole
+        part.begin, part.end = self.begin + begin, self.begin + end
+        return part
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return self.end - self.begin
+
+    @property
+    def seconds(self) -> float:
+        """Length."""
+        return self.frames / self.fps
+
+    @property
+    def joints(self) -> Array:
+        """(T, 22, 3) metres."""
+        return self.cache["joints"][self.begin : self.end]
+
+    # -- the whole body
+
+    @Signal
+    def heading(self) -> Array:
+        """(T,) heading, unwrapped."""
+        return heading(self.joints, self.fps)
+
+    @Signal
+    def hips(self) -> Array:
+        """(T,) height of the hips as a share of their standing height."""
+        return self.joints[:, PELVIS, 1] / STANDING[PELVIS]
+
+    @Signal
+    def place(self) -> Array:
+        """(T, 2) place of the hips over the floor, smoothed."""
+        return smooth(self.joints[:, PELVIS], 0.1, self.fps)[:, [0, 2]]
+
+    @Signal
+    def flow(self) -> Array:
+        """(T, 2) speed of the hips forward and to the left, smoothed over a step, metres a second."""
+        forward, left = body_frame(velocity(smooth(self.joints[:, PELVIS], 0.25, self.fps), self.fps), self.heading)
+        return np.stack([forward, left], axis=-1)
+
+    @Signal
+    def lean(self) -> Array:
+        """(T,) degrees by which the trunk leans forward."""
+        up = smooth(trunk_up(self.joints), 0.08, self.fps)
+        forward, _ = body_frame(up, self.heading)
+        return np.degrees(np.arctan2(forward, up[:, 1]))
+
+    @Signal
+    def tilt(self) -> Array:
+        """(T,) degrees between the trunk and the vertical."""
+        return np.degrees(np.arccos(np.clip(trunk_up(self.joints)[:, 1], -1, 1)))
+
+    @Signal
+    def lively(self) -> Array:
+        """(T,) mean speed of the joints relative to the hips, smoothed over half a second, metres a second."""
+        local = self.joints - self.joints[:, :1]
+        return smooth(np.linalg.norm(velocity(local, self.fps), axis=-1).mean(axis=1), 0.5, self.fps)
+
+    # -- legs
+
+    @Signal
+    def feet(self) -> Array:
+        """(T, 2) height of each foot over where it stands, metres."""
+        ankle, toe = self.joints[:, list(ANKLES), 1] - 0.07, self.joints[:, list(TOES), 1]
+        return np.minimum(ankle, toe)
+
+    @Signal
+    def foot_speed(self) -> Array:
+        """(T, 2) speed of each ankle, metres a second."""
+        points = smooth(self.joints[:, list(ANKLES)], 0.03, self.fps)
+        return np.linalg.norm(velocity(points, self.fps), axis=-1)
+
+    @Signal
+    def step_speed(self) -> Array:
+        """(T, 2) speed of the slower one of ankle and toe of each foot, metres a second."""
+        toes = velocity(smooth(self.joints[:, list(TOES)], 0.03, self.fps), self.fps)
+        return np.minimum(self.foot_speed, np.linalg.norm(toes, axis=-1))
+
+    @Signal
+    def foot_local(self) -> Array:
+        """(T, 2, 3) each ankle from the hips: forward, up, left, metres."""
+        return _local(self.joints[:, list(ANKLES)] - self.joints[:, [PELVIS]], self.heading)
+
+    @Signal
+    def knees(self) -> Array:
+        """(T, 2) bend of each knee, degrees, 0 = straight."""
+        return _bend(self.joints, HIPS, KNEES, ANKLES)
+
+    @Signal
+    def thighs(self) -> Array:
+        """(T, 2) angle of each thigh over level, degrees: -90 hangs down."""
+        thigh = self.joints[:, list(KNEES)] - self.joints[:, list(HIPS)]
+        return np.degrees(np.arctan2(thigh[..., 1], np.hypot(thigh[..., 0], thigh[..., 2])))
+
+    # -- arms
+
+    @Signal
+    def hands(self) -> Array:
+        """(T, 2, 3) each wrist from the middle of the shoulders: forward, up, left, metres."""
+        middle = self.joints[:, list(SHOULDERS)].mean(axis=1, keepdims=True)
+        return _local(smooth(self.joints[:, list(WRISTS)] - middle, 0.03, self.fps), self.heading)
+
+    @Signal
+    def reach(self) -> Array:
+        """(T, 2, 3) each wrist from its own shoulder: forward, up, left, metres."""
+        arms = self.joints[:, list(WRISTS)] - self.joints[:, list(SHOULDERS)]
+        return _local(smooth(arms, 0.03, self.fps), self.heading)
+
+    @Signal
+    def over(self) -> Array:
+        """(T, 2) height of each wrist over the middle of the shoulders along the trunk, metres."""
+        middle = self.joints[:, list(SHOULDERS)].mean(axis=1, keepdims=True)
+        arms = self.joints[:, list(WRISTS)] - middle
+        return smooth(np.einsum("tki,ti->tk", arms, trunk_up(self.joints)), 0.05, self.fps)
+
+    @Signal
+    def hand_speed(self) -> Array:
+        """(T, 2) speed of each wrist relative to the hips, metres a second."""
+        points = smooth(self.joints[:, list(WRISTS)] - self.joints[:, [PELVIS]], 0.03, self.fps)
+        return np.linalg.norm(velocity(points, self.fps), axis=-1)
+
+    @Signal
+    def elbows(self) -> Array:
+        """(T, 2) bend of each elbow, degrees, 0 = straight."""
+        return _bend(self.joints, SHOULDERS, ELBOWS, WRISTS)
+
+    # -- numbers of the part
+
+    @property
+    def turn(self) -> float:
+        """Degrees of heading from the first to the last frame."""
+        angle = self.heading
+        return float(angle[-1] - angle[0])
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Metres gone forward and to the left, in the direction that the body faces at each moment."""
+        forward, left = self.flow.sum(axis=0) / self.fps
+        return float(forward), float(left)
+
+    @property
+    def path(self) -> float:
+        """Length of the way of the hips over the floor, metres; sway does not count."""
+        speed = np.hypot(*self.flow.T)
+        return float(speed[speed > 0.15].sum() / self.fps)
+
+    @property
+    def extent(self) -> float:
+        """Farthest that the hips get from their first place, metres."""
+        return float(np.linalg.norm(self.place - self.place[0], axis=-1).max())
+
+    @property
+    def flights(self) -> list[Flight]:
+        """The stretches of at least 0.08 s between two contacts in which both feet are off the floor."""
+        feet, found = self.feet, list[Flight]()
+        near = max(round(0.1 * self.fps), 1)
+        for a, b in runs(feet.min(axis=1) > OFF_FLOOR):
+            if a and b < len(feet) and b - a >= 0.08 * self.fps:
+                left, right = (_last(feet[:a, k] < OFF_FLOOR) for k in (0, 1))
+                found.append(
+                    Flight(
+                        height=float(feet[a:b].min(axis=1).max()),
+                        distance=float(np.linalg.norm(self.place[b] - self.place[a - 1])),
+                        seconds=(b - a) / self.fps,
+                        apart=abs(left - right) / self.fps,
+                        turn=float(self.heading[min(b + near, len(feet) - 1)] - self.heading[max(a - near, 0)]),
+                    )
+                )
+        return found
+
+    def longest(self, mask: Bool) -> float:
+        """Return the seconds of the longest stretch of a mask of frames."""
+        return max((b - a for a, b in runs(mask)), default=0) / self.fps
+
+
+def _last(mask: Bool) -> int:
+    """Return the last frame of a mask; -1 if there is none."""
+    found = np.flatnonzero(mask)
+    return int(found[-1]) if len(found) else -1
+
+
+def _local(vectors: Array, angle: Array) -> Array:
+    """(T, 2, 3) vectors as forward, up, left."""
+    forward, left = body_frame(vectors, angle[:, None])
+    return np.stack([forward, vectors[..., 1], left], axis=-1)
+
+
+def _bend(joints: Array, first: tuple[int, int], at: tuple[int, int], last: tuple[int, int]) -> Array:
+    upper, lower = joints[:, list(at)] - joints[:, list(first)], joints[:, list(last)] - joints[:, list(at)]
+    norms = np.linalg.norm(upper, axis=-1) * np.linalg.norm(lower, axis=-1)
+    return np.degrees(np.arccos(np.clip((upper * lower).sum(axis=-1) / np.maximum(norms, 1e-9), -1, 1)))

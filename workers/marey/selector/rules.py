@@ -1,0 +1,69 @@
+"""The table of rules: one line an action of the vocabulary. Actions without a rule have no match."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from marey.selector import arms, floor, gaits, jumps
+from marey.selector.motion import Motion
+
+Rule = Callable[[Motion, str], float]
+"""`(motion, side)` to a grade: 1 = shows the action clearly, 0.5 = at the bound of its definition, 0 = does not. `side`
+is `left`, `right`, `both`, or empty where the prompt names none."""
+
+RULES: Mapping[str, Rule] = {
+    "idle": gaits.idle,
+    "walk": gaits.walk,
+    "walk-backward": gaits.walk_backward,
+    "run": gaits.run,
+    "sprint": gaits.sprint,
+    "turn": gaits.turn,
+    "turn-around": gaits.turn_around,
+    "spin": gaits.spin,
+    "sidestep": gaits.sidestep,
+    "sneak": gaits.sneak,
+    "balance": gaits.balance,
+    "climb-stairs": gaits.climb_stairs,
+    "climb-ladder": gaits.climb_ladder,
+    "jump": jumps.jump,
+    "jump-forward": jumps.jump_forward,
+    "leap": jumps.leap,
+    "hop": jumps.hop,
+    "jump-turn": jumps.jump_turn,
+    "jumping-jacks": jumps.jumping_jacks,
+    "bow": floor.bow,
+    "bend-over": floor.bend_over,
+    "crouch": floor.crouch,
+    "squat": floor.squat,
+    "sit": floor.sit,
+    "sit-down": floor.sit_down,
+    "stand-up": floor.stand_up,
+    "sit-floor": floor.sit_floor,
+    "kneel": floor.kneel,
+    "lie": floor.lie,
+    "lie-down": floor.lie_down,
+    "die": floor.die,
+    "get-up": floor.get_up,
+    "crawl": floor.crawl,
+    "push-ups": floor.push_ups,
+    "sit-ups": floor.sit_ups,
+    "pick-up": floor.pick_up,
+    "roll": floor.roll,
+    "cartwheel": floor.cartwheel,
+    "flip": floor.flip,
+    "wave": arms.wave,
+    "raise-arm": arms.raise_arm,
+    "reach-up": arms.reach_up,
+    "cheer": arms.cheer,
+    "clap": arms.clap,
+    "drink": arms.drink,
+    "arm-circles": arms.arm_circles,
+    "kick": arms.kick,
+    "kick-ball": arms.kick_ball,
+    "punch": arms.punch,
+    "slash": arms.slash,
+    "throw": arms.throw,
+    "arabesque": arms.arabesque,
+    "knee-to-elbow": arms.knee_to_elbow,
+    "dance": arms.dance,
+}
