@@ -64,7 +64,7 @@ if TYPE_CHECKING:
         SamplingSetting,
         TrainingData,
     )
-    from marey.client.types.motions import Motion, MotionDetail, MotionQuality, Reroll, Review
+    from marey.client.types.motions import Motion, MotionDetail, MotionQuality, PromptMatch, Reroll, Review
     from marey.client.types.references import ReferenceMatch
     from marey.client.types.schedules import Schedule
     from marey.client.types.streams import Stream, StreamDetail, StreamPrompt, StreamSkeleton
@@ -116,7 +116,7 @@ __getattr__ = lazy_names(
             "ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
-        "marey.client.types.motions": "Motion MotionDetail MotionQuality Reroll Review",
+        "marey.client.types.motions": "Motion MotionDetail MotionQuality PromptMatch Reroll Review",
         "marey.client.types.references": "ReferenceMatch",
         "marey.client.types.schedules": "Schedule",
         "marey.client.types.streams": "Stream StreamDetail StreamPrompt StreamSkeleton",
@@ -186,6 +186,7 @@ __all__ = [
     "Overloaded",
     "Problem",
     "Progress",
+    "PromptMatch",
     "QueuePosition",
     "Quota",
     "QuotaUsedUp",

@@ -26,6 +26,21 @@ class Flag(StrEnum):
     SELF_CONTACT = "self-contact"
 
 
+class PromptMatch(BaseModel):
+    """How well a motion shows the actions of its prompt."""
+
+    model_config = ConfigDict(frozen=True)
+
+    value: float | None = Field(
+        default=None,
+        description="0 to 1; from 0.5 on it shows them in their order. Null where an action has no rule.",
+    )
+    by: Literal["check"] = Field(default="check", description="`check`: by rules on the joints.")
+    percentile: int | None = Field(
+        default=None, description="Percent of real clips of the action with no larger value. Null without enough clips."
+    )
+
+
 class MotionQuality(BaseModel):
     """Physical quality of a motion. Measures are those of the whole clip, on the floor y = 0."""
 
@@ -45,6 +60,7 @@ class MotionQuality(BaseModel):
     self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
     flags: list[Flag] = Field(description="Measures beyond their limits.")
     ok: bool = Field(description="True without flags.")
+    match: PromptMatch | None = Field(default=None, description="Null for motions of earlier releases.")
 
 
 def read_quality(manifest: Mapping[str, Any]) -> MotionQuality | None:

@@ -33,9 +33,11 @@ def test_a_walk_passes_and_a_floating_one_exits_with_6(tmp_path: Path) -> None:
     assert passed.exit_code == 0
     record = json.loads(passed.stdout)
     assert (record["quality"]["ok"], record["shows"]) == (True, True)
+    assert record["quality"]["match"]["value"] >= 0.5
     failed = CliRunner().invoke(app, ["check", str(good), str(bad)])
     assert failed.exit_code == 6
     assert "bad.npz: floating" in failed.stdout
+    assert "match" not in failed.stdout
     assert CliRunner().invoke(app, ["check", str(good), "--expect", "walk; then lie"]).exit_code == 6
 
 

@@ -43,6 +43,7 @@ NAMES = {
     motions.Motion: "MotionView",
     motions.MotionDetail: "MotionDetailView",
     motions.MotionQuality: "MotionQuality",
+    motions.PromptMatch: "PromptMatch",
     motions.Reroll: "RerollView",
     streams.StreamPrompt: "PromptView",
     streams.StreamSkeleton: "SkeletonView",

@@ -24,6 +24,7 @@ from marey.quality.limits import assess, expected_by_prompts
 from marey.quality.record import read_quality
 from marey.registry import get_model, model_names, resolve
 from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
+from marey.selector.records import match_of
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
 from tests.support.models import random_bundle
@@ -140,7 +141,10 @@ def test_the_files_hold_the_motion_and_where_it_comes_from(handler: GeneratorHan
     assert manifest["licence"] == export.licence == "MIT"
     assert bundle.endswith(manifest["weights_sha256"][:12])
     assert manifest == export.manifest
-    assert read_quality(manifest) == assess(clip.joints, clip.fps, expected_by_prompts(["a person waves"]))
+    quality = assess(clip.joints, clip.fps, expected_by_prompts(["a person waves"]))
+    matched = match_of(clip, ["a person waves"])
+    assert matched.value is not None
+    assert read_quality(manifest) == quality.model_copy(update={"match": matched})
 
 
 def test_the_frame_rate_of_the_files_is_the_items(handler: GeneratorHandler[Any]) -> None:

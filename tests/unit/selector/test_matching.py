@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
 from marey.motion.resample import frame_times, interpolate
-from marey.selector import RULES, Motion, Wanted, match, wanted_of
+from marey.selector import RULES, Motion, WantedAction, match, wanted_of
 from marey.selector.matching import PASS
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.bodies import FPS, Array, Body, bower, raiser, runner, steady, walker, waver
@@ -128,8 +128,8 @@ def test_a_prompt_without_rules_has_no_match(prompt: str) -> None:
 
 
 def test_a_side_is_read_only_for_actions_that_have_one() -> None:
-    assert wanted_of(["she waves with her right hand"]) == ((Wanted("wave", "right"),),)
-    assert wanted_of(["a person squats on the left"]) == ((Wanted("squat"),),)
+    assert wanted_of(["she waves with her right hand"]) == ((WantedAction("wave", "right"),),)
+    assert wanted_of(["a person squats on the left"]) == ((WantedAction("squat"),),)
 
 
 def test_every_rule_is_of_an_action_and_gives_a_grade() -> None:

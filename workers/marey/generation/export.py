@@ -17,8 +17,9 @@ from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
-from marey.quality.record import KEY
+from marey.quality.record import KEY, PromptMatch
 from marey.runtime.handler import Export, ExportedFile
+from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
 
 
@@ -87,7 +88,15 @@ def finish(
     quality = quality_of(clip, expected_by_prompts(prompts))
     if quality is None:
         return clip
+    quality = quality.model_copy(update={"match": _match(clip, request)})
     return replace(clip, manifest={**manifest, KEY: quality.model_dump(mode="json")})
+
+
+def _match(clip: MotionClip, request: Request) -> PromptMatch:
+    """Match a clip with its prompt; recordings of streams, which hold several, have no match."""
+    if request.recording is not None:
+        return PromptMatch()
+    return match_of(clip, request.text.acts or (request.text.rewritten,))
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:

@@ -6,8 +6,8 @@ the other.
 
 from __future__ import annotations
 
-from marey.selector.matching import Wanted, match, wanted_of
+from marey.selector.matching import WantedAction, match, wanted_of
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
 
-__all__ = ["RULES", "Motion", "Wanted", "match", "wanted_of"]
+__all__ = ["RULES", "Motion", "WantedAction", "match", "wanted_of"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from marey.checks.kinematics import turning_points
 from marey.motion.feet import runs
 from marey.selector.grades import best, least, most
-from marey.selector.motion import OFF_FLOOR, Flight, Motion
+from marey.selector.motion import OFF_FLOOR, AirPhase, Motion
 
 
-def _together(flight: Flight) -> float:
+def _together(flight: AirPhase) -> float:
     """Grade that both feet leave the floor at once."""
     return most(flight.apart, 0.17, 0.07)
 
@@ -54,7 +54,7 @@ def _hops(m: Motion, k: int) -> float:
 def jump_turn(m: Motion, side: str) -> float:
     """Jump and turn in the air."""
 
-    def angle(flight: Flight) -> float:
+    def angle(flight: AirPhase) -> float:
         return {"left": flight.turn, "right": -flight.turn}.get(side, abs(flight.turn))
 
     return best([min(least(f.height, 0.08, 0.04), least(angle(f), 80, 20), _together(f)) for f in m.flights])

@@ -25,7 +25,7 @@ _WORDS = re.compile(r"[a-z]+")
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedAction:
     """An action that a motion should show.
 
     Attributes:
@@ -37,7 +37,7 @@ class Wanted:
     side: str = ""
 
 
-Step = tuple[Wanted, ...]
+Step = tuple[WantedAction, ...]
 """Actions of one stretch of time."""
 
 
@@ -66,7 +66,7 @@ def _step(sentence: str) -> Step | None:
     sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
     side = sides.pop() if len(sides) == 1 else ""
     actions = load_vocabulary().actions
-    return tuple(Wanted(name, side if actions[name].sided else "") for name in found if name is not None)
+    return tuple(WantedAction(name, side if actions[name].sided else "") for name in found if name is not None)
 
 
 @lru_cache(maxsize=1)

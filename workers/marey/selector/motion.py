@@ -61,7 +61,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Flight:
+class AirPhase:
     """A stretch in which both feet are off the floor.
 
     Attributes:
@@ -266,15 +266,15 @@ class Motion:
         return float(np.linalg.norm(self.place - self.place[0], axis=-1).max())
 
     @property
-    def flights(self) -> list[Flight]:
+    def flights(self) -> list[AirPhase]:
         """The stretches of at least 0.08 s between two contacts in which both feet are off the floor."""
-        feet, found = self.feet, list[Flight]()
+        feet, found = self.feet, list[AirPhase]()
         near = max(round(0.1 * self.fps), 1)
         for a, b in runs(feet.min(axis=1) > OFF_FLOOR):
             if a and b < len(feet) and b - a >= 0.08 * self.fps:
                 left, right = (_last(feet[:a, k] < OFF_FLOOR) for k in (0, 1))
                 found.append(
-                    Flight(
+                    AirPhase(
                         height=float(feet[a:b].min(axis=1).max()),
                         distance=float(np.linalg.norm(self.place[b] - self.place[a - 1])),
                         seconds=(b - a) / self.fps,

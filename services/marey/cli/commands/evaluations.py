@@ -230,6 +230,8 @@ def check(
         console.result(f"{console.home_relative(path)}: {', '.join(quality['flags']) or 'ok'}")
         for name in ("float_s", "skate", "penetration_mm", "pops", "range_deg", "self_contact"):
             _line(name, quality[name])
+        if (value := quality["match"]["value"]) is not None:
+            _line("match", value)
         if found["shows"] is not None:
             _line("shows", f"{'; '.join(found['expect'])}: {'yes' if found['shows'] else 'no'}")
     if faults:

@@ -17,6 +17,9 @@ from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.core.extras import needs_extra
 from marey.items.item import MAX_SEED, Item, Problem
 
+SHOWN = 0.5
+"""Match with its prompt from which a motion shows it; see docs/reference/quality.md."""
+
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.cli.roles.generating import Wanted
@@ -98,8 +101,14 @@ def _report_rewrite(clip: MotionClip) -> None:
 
 def _report_quality(line: dict[str, Any]) -> None:
     quality = line["quality"]
-    if quality is not None and not quality["ok"]:
-        console.say(f"{line['prompt']!r}, seed {line['seed']}: the motion is {', '.join(quality['flags'])}.")
+    if quality is None:
+        return
+    about = f"{line['prompt']!r}, seed {line['seed']}"
+    if not quality["ok"]:
+        console.say(f"{about}: the motion is {', '.join(quality['flags'])}.")
+    value = quality["match"]["value"]
+    if value is not None and value < SHOWN:
+        console.say(f"{about}: the motion does not show the prompt (match {value:g}).")
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:

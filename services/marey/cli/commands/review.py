@@ -217,7 +217,9 @@ def _page(
 def _facts(motion: Motion) -> str:
     take = ["take of another"] if motion.replaces else []
     name = [motion.name] if motion.name else []
-    return "  ·  ".join([f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s", *take])
+    match = motion.quality.match if motion.quality else None
+    shown = [f"match {match.value:g}"] if match and match.value is not None else []
+    return "  ·  ".join([f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s", *shown, *take])
 
 
 def _verdict(motion: Motion) -> str:

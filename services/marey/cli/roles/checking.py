@@ -18,7 +18,8 @@ def check_file(path: Path, expect: str | None) -> dict[str, Any]:
         expect: ids of actions of the vocabulary in order, as "jump; then sit"; None = not judged.
 
     Returns:
-        The file, its quality record, and `shows`: whether the referee sees the actions; None without `expect`.
+        The file, its quality record with the match by the selector, and `shows`: whether the referee sees the actions;
+        None without `expect`.
 
     Raises:
         NotFound, InvalidFile: of the file.
@@ -30,6 +31,8 @@ def check_file(path: Path, expect: str | None) -> dict[str, Any]:
         from marey.quality.clips import quality_of
         from marey.quality.limits import expected_of
         from marey.referee import Body, shows_in_order
+        from marey.selector import RULES, WantedAction
+        from marey.selector.records import match_steps
     except ImportError as error:
         raise needs_extra("motion", error) from error
     actions = actions_of(expect)
@@ -41,6 +44,8 @@ def check_file(path: Path, expect: str | None) -> dict[str, Any]:
             "humanml3d",
             where=str(path),
         )
+    steps = [(WantedAction(name),) for name in actions] if all(name in RULES for name in actions) else None
+    quality = quality.model_copy(update={"match": match_steps(clip, steps)})
     shows = shows_in_order(actions, Body(clip.joints, clip.fps)) if actions else None
     return {"file": str(path), "quality": quality.model_dump(mode="json"), "expect": actions, "shows": shows}
 

@@ -23,6 +23,18 @@ class Review(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class PromptMatch(Result):
+    """How well a motion shows the actions of its prompt."""
+
+    value: float | None = None
+    """0 to 1; from 0.5 on it shows them in their order. None where an action has no rule."""
+    by: str = ""
+    """`check`: by rules on the joints."""
+    percentile: int | None = None
+    """Percent of real clips of the action with no larger value. None without enough clips."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MotionQuality(Result):
     """Physical quality of a motion: measures of the whole clip, and what is wrong with it."""
 
@@ -45,6 +57,8 @@ class MotionQuality(Result):
     """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact."""
     ok: bool = False
     """True without flags."""
+    match: PromptMatch | None = None
+    """None for motions of earlier releases."""
 
 
 @dataclass(frozen=True, kw_only=True)

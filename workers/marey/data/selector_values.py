@@ -1,0 +1,82 @@
+"""Compute the values of real clips by the selector: `python -m marey.data.selector_values PREPARED`.
+
+A motion's percentile among real clips of its action is read from the quantiles that this writes. Clips count that are
+captured as they are (not mirrored, spliced or of another speed) and show one action; of those with enough of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from marey.data.prepared import PreparedData
+from marey.motion.files import write_atomically
+from marey.selector import RULES, Motion, WantedAction, match
+from marey.selector.matching import PASS
+from marey.selector.motion import SHORTEST
+from marey.selector.records import FILE, PERCENT
+
+ENOUGH = 10
+"""Clips of an action from which it has quantiles."""
+PASSING = 0.75
+"""Share of them that shows the action by its rule; with a smaller one the rule is too strict for a percentile."""
+
+
+def read_values(data: PreparedData) -> dict[str, list[float]]:
+    """Return the values of the clips of each action that has a rule."""
+    found: dict[str, list[float]] = defaultdict(list)
+    for clip in data.clips:
+        as_captured = not clip.mirrored and not clip.spliced and clip.speed == 1.0
+        if as_captured and clip.content in RULES and clip.length >= SHORTEST:
+            motion = Motion(data.joints(clip), data.manifest.fps)
+            found[clip.content].append(match(motion, [(WantedAction(clip.content),)]))
+    return dict(sorted(found.items()))
+
+
+def document(data: PreparedData, values: Mapping[str, Sequence[float]]) -> str:
+    """Return the text of `real_values.toml`."""
+    enough = {action: of for action, of in values.items() if _is_enough(of)}
+    percents = np.arange(0, 101, PERCENT) / 100
+    lines = [
+        "# Written by `python -m marey.data.selector_values`; docs/reference/quality.md explains it.",
+        "",
+        "[provenance]",
+        f'prepared_sha256 = "{data.sha256}"',
+        f"sources = {json.dumps([source.name for source in data.manifest.sources])}",
+        f'tier = "{data.manifest.tier}"',
+        "",
+        "[clips]",
+        *(f"{action} = {len(of)}" for action, of in enough.items()),
+        "",
+        "[values]",
+    ]
+    for action, of in enough.items():
+        quantiles = np.quantile(of, percents, method="higher").round(3).tolist()
+        lines.append(f"{action} = {quantiles}")
+    return "\n".join(lines) + "\n"
+
+
+def _is_enough(values: Sequence[float]) -> bool:
+    return len(values) >= ENOUGH and sum(value >= PASS for value in values) >= PASSING * len(values)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the values of a prepared folder."""
+    parser = argparse.ArgumentParser(description="Compute the values of real clips by the selector.")
+    parser.add_argument("prepared", type=Path, help="Folder of `marey data prepare`.")
+    parser.add_argument("-o", "--output", type=Path, default=FILE)
+    chosen = parser.parse_args(arguments)
+    data = PreparedData.open(chosen.prepared)
+    text = document(data, read_values(data))
+    write_atomically(chosen.output, text.encode())
+    sys.stdout.write(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""The match of a motion in its quality record."""
+
+from __future__ import annotations
+
+import tomllib
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from marey.motion.clip import MotionClip
+from marey.motion.skeleton import HUMANML3D
+from marey.quality.record import PromptMatch
+from marey.selector.matching import Step, match, wanted_of
+from marey.selector.motion import SHORTEST, Motion
+
+FILE = Path(__file__).with_name("real_values.toml")
+PERCENT = 5
+"""Percent between two quantiles of the table."""
+
+
+def match_of(clip: MotionClip, sentences: Iterable[str]) -> PromptMatch:
+    """Match a clip with its prompt.
+
+    Args:
+        clip: the motion.
+        sentences: as of `wanted_of`.
+    """
+    return match_steps(clip, wanted_of(sentences))
+
+
+def match_steps(clip: MotionClip, steps: Sequence[Step] | None) -> PromptMatch:
+    """Match a clip with actions in their order; the value is null without rules for them, on other skeletons than that
+    of 22 joints, and under 8 frames."""
+    if not steps or clip.skeleton.name != HUMANML3D.name or clip.frames < SHORTEST:
+        return PromptMatch()
+    value = match(Motion(clip.joints, clip.fps), steps)
+    single = steps[0][0].action if len(steps) == 1 and len(steps[0]) == 1 else None
+    return PromptMatch(value=value, percentile=None if single is None else percentile(single, value))
+
+
+def percentile(action: str, value: float) -> int | None:
+    """Return the percent of real clips of an action that match it no better than this; None without enough of them."""
+    quantiles = real_values().get(action)
+    return None if quantiles is None else max(PERCENT * (bisect_right(quantiles, value) - 1), 0)
+
+
+@lru_cache(maxsize=1)
+def real_values() -> Mapping[str, Sequence[float]]:
+    """Return the quantiles of the values of real clips by action, from 0 to 100 percent; `marey.data.selector_values`
+    writes them."""
+    return tomllib.loads(FILE.read_text("utf-8"))["values"]
