@@ -11,11 +11,11 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidFile
 from marey.labeller.adapter import AdaptedMiniLM, token_batch
 from marey.labeller.fit import FitConfig, encode, fit, roles_of, tag_set
-from marey.labeller.grammar import Example
 from marey.labeller.pack import pack
-from marey.labeller.pools import CaptionPool, frequent_roles, propbank_batches, with_roles
+from marey.labeller.pools import SentencePool, frequent_roles, propbank_batches, with_roles
 from marey.labeller.propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
 from marey.labeller.recipe import Recipe
+from marey.labeller.sentences import Example
 from marey.labeller.weights import Weights
 from marey.text.encoders import find_encoder
 from marey.text.light import LightLabeller, WordStates
@@ -148,7 +148,7 @@ def test_the_first_training_is_kept_and_shipped_whole(tmp_path: Path) -> None:
     config = FitConfig(steps=40, batch=4, learning_rate=4e-3, rank=2, average=0.5)
     losses: list[float] = []
     words = WordStates(minilm, network.layers)
-    batches = propbank_batches([EXAMPLE] * 4, words, network.tags, 4, 0, grammar=0)
+    batches = propbank_batches([EXAMPLE] * 4, [], words, network.tags, 4, 0)
     first = fit(batches, minilm, network, config, 0, progress=lambda _, loss: losses.append(loss))
     assert losses[-1] < 0.3 * losses[0]
     assert first.updates["encoder.layer.3.output.dense.up"].abs().max() > 0
@@ -159,10 +159,10 @@ def test_the_first_training_is_kept_and_shipped_whole(tmp_path: Path) -> None:
     said = first.labeller(minilm).label([EXAMPLE.words])
     assert said == again.labeller(minilm).label([EXAMPLE.words]) == [EXAMPLE.frames]
 
-    pool = CaptionPool(variants=0, grammar=0)
+    pool = SentencePool(variants=0)
     recipe = Recipe(minilm, network, FitConfig(steps=2, batch=4), pool, 0, [EXAMPLE], again)
-    (tmp_path / "gold.json").write_text("[]")
-    bundle = pack(tmp_path / "tiny", recipe.make([EXAMPLE]), [tmp_path / "gold.json"], recipe, None)
+    (tmp_path / "own.txt").write_text("")
+    bundle = pack(tmp_path / "tiny", recipe.make([EXAMPLE]), [tmp_path / "own.txt"], recipe, None)
     assert LightLabeller.load(Bundle.open(bundle.path)).label([EXAMPLE.words]) == [EXAMPLE.frames]
     assert bundle.manifest.licence == "CC-BY-SA-4.0"
     assert bundle.manifest.commercial

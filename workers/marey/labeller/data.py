@@ -1,19 +1,17 @@
-"""Training sentences of the role labeller: gold with its corrections, and augmentation that keeps labels true."""
+"""Augmentation of the role labeller's sentences, which keeps labels true, and labels that it is tested on."""
 
 from __future__ import annotations
 
-import hashlib
 import random
 import re
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile
-from marey.labeller.grammar import SUBJECTS, Example
+from marey.labeller.sentences import Example
 from marey.text.roles import Argument, Frame
 
 _AUXILIARIES = (
@@ -36,39 +34,24 @@ _SWAP = {word: group for group in SWAPS for word in group}
 _STOP = re.compile(r"[.!?]+$")
 
 
-def read_gold(file: Path) -> list[Example]:
-    """AllenNLP's labels of KIT captions, without argument-less auxiliaries ("is" beside "walking").
+def read_labels(file: Path) -> list[Example]:
+    """A parser's labels of captions (`srl-kit-dev.json`), without argument-less auxiliaries ("is" beside "walking").
+
+    They are for tests alone: no weights are trained on them.
 
     Args:
-        file: a list of captions (`srl-kit-dev.json`), or the captions of each clip as GraphMotion's repository has
-            them (`datasets/kit-ml/new_test_data.json`).
+        file: a list of captions, each with `words`, `predicates` and `arguments`.
 
     Raises:
         InvalidFile: not such a file.
     """
     try:
-        found = read_json(file)
-        if isinstance(found, dict):
-            found = [_listed(entry) for clip in found.values() for entry in clip]
-        return [_gold(entry) for entry in found]
+        return [_labelled(entry) for entry in read_json(file)]
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise InvalidFile(f"is not a file of role labels: {error!r}", where=str(file)) from error
 
 
-def _listed(entry: dict[str, Any]) -> dict[str, Any]:
-    """A caption of GraphMotion's as one of the list: predicates and arguments by number, words by their index."""
-    spans = {name: {int(key): value["spans"] for key, value in entry[name].items()} for name in ("V", "entities")}
-    return {
-        "words": entry["caption"].split(),
-        "predicates": [{"word": spans["V"][number][0]} for number in sorted(spans["V"])],
-        "arguments": [
-            {"predicate": predicate, "role": role, "words": spans["entities"][entity]}
-            for predicate, entity, role in entry["relations"]
-        ],
-    }
-
-
-def _gold(entry: dict[str, list[dict[str, object]]]) -> Example:
+def _labelled(entry: dict[str, list[dict[str, object]]]) -> Example:
     words = tuple(str(word) for word in entry["words"])
     frames: list[Frame] = []
     for number, predicate in enumerate(entry["predicates"]):
@@ -81,33 +64,9 @@ def _gold(entry: dict[str, list[dict[str, object]]]) -> Example:
     return Example(words, tuple(frames))
 
 
-def corrected(examples: Sequence[Example]) -> list[Example]:
-    """Training sentences without two kinds of the parser's mistakes.
-
-    The verb "left", which in these captions is always the side, never a form of "leave"; and captions without any
-    predicate ("A person is waving.", "A human walks fast forward."): 20 distinct ones, every one has a verb.
-    """
-    kept: list[Example] = []
-    for example in examples:
-        frames = tuple(f for f in example.frames if not example.words[f.predicate].lower().startswith("left"))
-        if frames:
-            kept.append(Example(example.words, frames))
-    return kept
-
-
 def distinct(examples: Sequence[Example]) -> list[Example]:
     """One of each sentence."""
     return list({example.words: example for example in examples}.values())
-
-
-def group(words: Sequence[str]) -> str:
-    """The caption without case and punctuation: equal ones must fall into one fold."""
-    return " ".join(re.sub(r"[^a-z0-9 ]", "", " ".join(words).lower()).split())
-
-
-def fold_of(words: Sequence[str], folds: int) -> int:
-    """The fold of a caption, by hash."""
-    return int(hashlib.sha256(group(words).encode()).hexdigest(), 16) % folds
 
 
 def replace(example: Example, start: int, stop: int, new: Sequence[str]) -> Example | None:
@@ -151,6 +110,7 @@ class Augmenter:
                     if predicates.isdisjoint(a.words):
                         key = (a.role, stem(example.words[frame.predicate]))
                         self._phrases[key].append(example.words[a.start : a.stop])
+        self._subjects = [example.words[: a.stop] for example in self.donors if (a := _subject(example))]
 
     def variant(self, example: Example) -> Example:
         """One variant: words and phrases exchanged, clauses joined, then noise of spelling and punctuation."""
@@ -191,13 +151,13 @@ class Augmenter:
         return self.rng.choice(choices) + word[len(core) :] if choices else word
 
     def swap_subject(self, example: Example) -> Example:
-        """Another subject ("a person" → "the old man") where the sentence begins with one of at most two words."""
+        """Another sentence's subject ("a person" → "the old man"), for one of at most two words at the start."""
         first = next(
             (a for f in example.frames for a in f.arguments if a.start == 0 and a.role in ("ARG0", "ARG1")), None
         )
-        if first is None or first.stop > 2:
+        if first is None or first.stop > 2 or not self._subjects:
             return example
-        return replace(example, 0, first.stop, self.rng.choice(SUBJECTS.split("|")).split()) or example
+        return replace(example, 0, first.stop, self.rng.choice(self._subjects)) or example
 
     def swap_phrase(self, example: Example) -> Example:
         """Another phrase of the same role of the same verb."""

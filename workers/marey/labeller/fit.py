@@ -12,7 +12,7 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.labeller.adapter import AdaptedMiniLM, TokenBatch, token_batch
-from marey.labeller.grammar import Example
+from marey.labeller.sentences import Example
 from marey.labeller.weights import Weights
 from marey.text.bio import transition_scores
 from marey.text.light import WordStates, surface_features
@@ -23,7 +23,7 @@ SMOOTHING_SENTENCES = 150
 
 @dataclass(frozen=True)
 class FitConfig:
-    """Hyperparameters of the head and MiniLM's updates; the defaults are for captions."""
+    """Hyperparameters of the head and MiniLM's updates; the defaults are for annotated sentences."""
 
     steps: int = 450
     batch: int = 24  # sentences

@@ -14,13 +14,13 @@ from marey.labeller.fit import PROPBANK_FIT
 from marey.text.light import UPDATES
 
 if TYPE_CHECKING:
-    from marey.labeller.recipe import Recipe, Validation
+    from marey.labeller.recipe import Evaluation, Recipe
     from marey.labeller.weights import Weights
 
-CAPTIONS = DataSource(
-    name="AllenNLP SRL-BERT labels of KIT-ML captions",
-    licence="Apache-2.0 (labels, jpthu17/GraphMotion); captions: KIT Motion-Language data set",
-    credit="Jin et al. 2023 (GraphMotion); Shi & Lin 2019 (the parser); Plappert et al. 2016 (KIT-ML)",
+SENTENCES = DataSource(
+    name="Marey's annotated sentences (workers/marey/labeller/sentences)",
+    licence="MIT",
+    credit="made up and annotated for Marey; no caption of a data set, no output of a parser",
 )
 PROPBANK = DataSource(
     name="PropBank of the English Web Treebank (github.com/propbank/propbank-release)",
@@ -34,9 +34,12 @@ TREEBANK = DataSource(
 )
 
 
-def pack(output: Path, weights: Weights, gold: Sequence[Path], recipe: Recipe, result: Validation | None) -> Bundle:
+def pack(
+    output: Path, weights: Weights, sentences: Sequence[Path], recipe: Recipe, result: Evaluation | None
+) -> Bundle:
     """Write the bundle; weights that PropBank went into are under its terms."""
-    sources = [CAPTIONS.model_copy(update={"sha256": hashlib.sha256(file.read_bytes()).hexdigest()}) for file in gold]
+    hashes = [hashlib.sha256(file.read_bytes()).hexdigest() for file in sentences]
+    sources = [SENTENCES.model_copy(update={"sha256": sha256}) for sha256 in hashes]
     if recipe.first:
         sources += [PROPBANK, TREEBANK]
     with BundleWriter(output, overwrite=True) as writer:
@@ -51,7 +54,7 @@ def pack(output: Path, weights: Weights, gold: Sequence[Path], recipe: Recipe, r
             config="light",
             parameters={**asdict(weights.network), "minilm_sha256": recipe.minilm.weights_sha256},
             data=tuple(sources),
-            licence="CC-BY-SA-4.0" if recipe.first else "Apache-2.0",
+            licence="CC-BY-SA-4.0" if recipe.first else SENTENCES.licence,
             metrics=result.metrics() if result else {},
             training={
                 "command": "python -m marey.labeller.train",

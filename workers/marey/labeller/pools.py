@@ -1,4 +1,4 @@
-"""Training batches of the role labeller: first PropBank, then captions."""
+"""Training batches of the role labeller: first PropBank, then the project's sentences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from marey.labeller.data import Augmenter
 from marey.labeller.fit import Encoded, encode
-from marey.labeller.grammar import Example, sentence
+from marey.labeller.sentences import Example
 from marey.text.light import WordStates
 from marey.text.roles import Frame
 
@@ -17,14 +17,12 @@ CHUNKS = 16  # batches that are drawn together, so that sentences of like length
 
 
 @dataclass(frozen=True)
-class CaptionPool:
+class SentencePool:
     """Sentences of the second training, and their weights; a variant's is 1."""
 
-    variants: int = 6  # augmented copies of each gold sentence
-    grammar: int = 700  # silver sentences
+    variants: int = 8  # augmented copies of each annotated sentence
     propbank: int = 1000  # sentences of the first training, so that it is not forgotten
-    gold_weight: float = 2.0
-    grammar_weight: float = 0.7
+    annotated_weight: float = 2.0
     propbank_weight: float = 0.4
 
 
@@ -53,13 +51,19 @@ def split(examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
 
 
 def propbank_batches(
-    examples: Sequence[Example], words: WordStates, tags: Sequence[str], size: int, seed: int, grammar: int = 1500
+    examples: Sequence[Example],
+    annotated: Sequence[Example],
+    words: WordStates,
+    tags: Sequence[str],
+    size: int,
+    seed: int,
+    variants: int = 3,
 ) -> Iterator[list[Encoded]]:
-    """PropBank and the grammar again and again, `size` sentences at a time, without end."""
+    """PropBank and variants of annotated sentences again and again, `size` sentences at a time, without end."""
     rng = random.Random(seed)  # noqa: S311
-    silver = [sentence(rng) for _ in range(grammar)]
-    noise = Augmenter(silver, rng).noise
-    pool = [encode(example, words, tags) for example in [*examples, *map(noise, silver)]]
+    augmenter = Augmenter(annotated, rng)
+    more = [augmenter.variant(example) for _ in range(variants) for example in annotated]
+    pool = [encode(example, words, tags) for example in [*examples, *more]]
     while True:
         rng.shuffle(pool)
         for start in range(0, len(pool), CHUNKS * size):
@@ -67,21 +71,20 @@ def propbank_batches(
             yield from _chunks(drawn, size, rng)
 
 
-def caption_batches(
-    gold: Sequence[Example],
+def sentence_batches(
+    annotated: Sequence[Example],
     propbank: Sequence[Example],
     words: WordStates,
     tags: Sequence[str],
-    config: CaptionPool,
+    config: SentencePool,
     size: int,
     seed: int,
 ) -> Iterator[list[Encoded]]:
-    """Captions, their variants, the grammar and some of PropBank, drawn by weight, `size` at a time, without end."""
+    """Annotated sentences, their variants and some of PropBank, drawn by weight, without end."""
     rng = random.Random(seed)  # noqa: S311
-    augmenter = Augmenter(gold, rng)
-    pool = [(example, config.gold_weight) for example in gold]
-    pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in gold]
-    pool += [(augmenter.noise(sentence(rng)), config.grammar_weight) for _ in range(config.grammar)]
+    augmenter = Augmenter(annotated, rng)
+    pool = [(example, config.annotated_weight) for example in annotated]
+    pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in annotated]
     some = rng.sample(propbank, min(config.propbank, len(propbank)))
     pool += [(example, config.propbank_weight) for example in some]
     encoded = [encode(example, words, tags) for example, _ in pool]

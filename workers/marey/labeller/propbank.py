@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from marey.core.errors import InvalidFile
-from marey.labeller.grammar import Example
+from marey.labeller.sentences import Example
 from marey.text.roles import Argument, Frame
 
 SKELETONS = "data/google/ewt"
@@ -22,7 +22,7 @@ MAX_WORDS = 30  # captions have no more
 AGREEMENT = 0.9  # of the tags of a sentence: UD has corrected some since
 _COLUMNS = 8  # before the predicates': document, sentence, token, word, tag, parse, frame file, roleset
 _ROLES = {"ARGM-PRR": "ARG1", "ARGM-LVB": None, "ARGM-CXN": None, "ARGM-ADJ": None, "ARGM-DSP": None}
-"""Roles of later PropBanks in terms of the parser that labelled the captions ("take a step": ARG1); None = left out."""
+"""Roles of light verbs as Marey's sentences have them ("take a step": ARG1); None = left out."""
 _PUNCTUATION = re.compile(r"^\W+$")
 
 

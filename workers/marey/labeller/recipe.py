@@ -1,68 +1,65 @@
-"""Recipe of the role labeller's weights, and the scores of its cross-validation."""
+"""Recipe of the role labeller's weights, and its scores on sentences that it was not trained on."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from marey.bundles import Bundle
-from marey.labeller.data import corrected
 from marey.labeller.fit import FitConfig, fit
-from marey.labeller.grammar import Example
-from marey.labeller.pools import CaptionPool, caption_batches
+from marey.labeller.pools import SentencePool, sentence_batches
 from marey.labeller.score import Scores, confusions
+from marey.labeller.sentences import Example
 from marey.labeller.weights import Weights
-from marey.text.light import WordStates
+from marey.text.light import LightLabeller, WordStates
 from marey.text.light_network import LightConfig
-from marey.text.roles import Frame
+
+HELD_OUT = "held_out"
+KIT, KIT_PARSED = "kit", "kit_parsed"
 
 
-@dataclass(frozen=True)
-class Validation:
-    """Cross-validated scores.
+@dataclass
+class Evaluation:
+    """Scores by set: `held_out` sentences of the project, `kit` captions, and those of them with a verb in the gold.
 
     Attributes:
-        occurring: captions of the first gold file as often as they occur there.
-        distinct: each of them once.
-        parsed: of those, the ones in which the parser found a verb at all.
-        every: the distinct captions of all gold files.
-        every_parsed: of those, the ones in which the parser found a verb at all.
-        given: these again, with predicates given.
-        confused: roles of these, (wanted, said) counts.
-        folds: how many.
+        scores: by name of the set.
+        sentences: how many each has.
+        given: of the held-out sentences with predicates given.
+        confused: roles of the held-out sentences, (wanted, said) counts.
     """
 
-    occurring: Scores = field(default_factory=Scores)
-    distinct: Scores = field(default_factory=Scores)
-    parsed: Scores = field(default_factory=Scores)
-    every: Scores = field(default_factory=Scores)
-    every_parsed: Scores = field(default_factory=Scores)
+    scores: dict[str, Scores] = field(default_factory=dict[str, Scores])
+    sentences: dict[str, int] = field(default_factory=dict[str, int])
     given: Scores = field(default_factory=Scores)
     confused: Counter[tuple[str, str]] = field(default_factory=Counter[tuple[str, str]])
-    folds: int = 0
-
-    def add(self, said: Sequence[Frame], known: Sequence[Frame], wanted: Sequence[Frame], occurs: int) -> None:
-        """Count one caption that occurs so often in the first file; `known` is said of given predicates."""
-        counts = {"every": 1, "distinct": min(occurs, 1), "occurring": occurs}
-        if wanted:
-            counts |= {"every_parsed": 1, "parsed": min(occurs, 1)}
-            self.given.add(known, wanted)
-        for name, count in counts.items():
-            for _ in range(count):
-                getattr(self, name).add(said, wanted)
-        self.confused.update(confusions([said], [wanted]))
 
     def metrics(self) -> dict[str, float]:
         """For the manifest."""
-        named = {name: getattr(self, name) for name in ("occurring", "distinct", "parsed", "every", "every_parsed")}
         found = {
-            f"cv_{name}_{what}_f1": getattr(scores, f"{what}s").f1
-            for name, scores in named.items()
+            f"{name}_{what}_f1": getattr(scores, f"{what}s").f1
+            for name, scores in self.scores.items()
             for what in ("predicate", "argument")
         }
-        found["cv_argument_f1_given_predicates"] = self.given.arguments.f1
+        found[f"{HELD_OUT}_argument_f1_given_predicates"] = self.given.arguments.f1
         return {name: round(value, 4) for name, value in found.items()}
+
+
+def evaluate(labeller: LightLabeller, sets: Mapping[str, Sequence[Example]]) -> Evaluation:
+    """Score a labeller on sets of sentences by name."""
+    result = Evaluation()
+    for name, examples in sets.items():
+        scores = result.scores[name] = Scores()
+        result.sentences[name] = len(examples)
+        for example in examples:
+            said = labeller.label([example.words])[0]
+            scores.add(said, example.frames)
+            if name == HELD_OUT:
+                known = labeller.frames(example.words, [frame.predicate for frame in example.frames])
+                result.given.add(known, example.frames)
+                result.confused.update(confusions([said], [example.frames]))
+    return result
 
 
 @dataclass(frozen=True)
@@ -72,15 +69,15 @@ class Recipe:
     minilm: Bundle
     network: LightConfig
     config: FitConfig
-    pool: CaptionPool
+    pool: SentencePool
     seed: int
     propbank: Sequence[Example] = ()
     first: Weights | None = None
-    """Weights after PropBank; None = captions alone."""
+    """Weights after PropBank; None = the project's sentences alone."""
 
-    def make(self, gold: Sequence[Example]) -> Weights:
+    def make(self, sentences: Sequence[Example]) -> Weights:
         """Weights from annotated sentences."""
         words = WordStates(self.minilm, self.network.layers)
         tags, size = self.network.tags, self.config.batch
-        batches = caption_batches(corrected(gold), self.propbank, words, tags, self.pool, size, self.seed)
+        batches = sentence_batches(sentences, self.propbank, words, tags, self.pool, size, self.seed)
         return fit(batches, self.minilm, self.network, self.config, self.seed, self.first)
