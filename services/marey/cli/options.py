@@ -11,7 +11,7 @@ import typer
 
 from marey.client.names import DEFAULT_TEMPLATE
 from marey.core.errors import InvalidInput
-from marey.items.item import read_setting
+from marey.items.item import MAX_BEST_OF, MAX_REDRAWS, read_setting
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:
@@ -87,6 +87,16 @@ Tags = Annotated[
     list[str] | None, typer.Option("--tag", help="A tag of every motion, in addition to a row's own; may be repeated.")
 ]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; default: the model's.")]
+BestOf = Annotated[
+    int | None,
+    typer.Option(
+        "--best-of", help=f"Candidates of each motion, of which the best is kept: 1 to {MAX_BEST_OF}; default 1."
+    ),
+]
+Redraws = Annotated[
+    int | None,
+    typer.Option("--redraws", help=f"Further rounds of candidates while none is good. 0 to {MAX_REDRAWS}, default 0."),
+]
 Sampling = Annotated[
     list[str] | None,
     typer.Option(

@@ -64,7 +64,16 @@ if TYPE_CHECKING:
         SamplingSetting,
         TrainingData,
     )
-    from marey.client.types.motions import Motion, MotionDetail, MotionQuality, PromptMatch, Reroll, Review
+    from marey.client.types.motions import (
+        Candidate,
+        Motion,
+        MotionDetail,
+        MotionQuality,
+        PromptMatch,
+        Reroll,
+        Review,
+        Selection,
+    )
     from marey.client.types.references import ReferenceMatch
     from marey.client.types.schedules import Schedule
     from marey.client.types.streams import Stream, StreamDetail, StreamPrompt, StreamSkeleton
@@ -116,7 +125,7 @@ __getattr__ = lazy_names(
             "ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
-        "marey.client.types.motions": "Motion MotionDetail MotionQuality PromptMatch Reroll Review",
+        "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
         "marey.client.types.references": "ReferenceMatch",
         "marey.client.types.schedules": "Schedule",
         "marey.client.types.streams": "Stream StreamDetail StreamPrompt StreamSkeleton",
@@ -135,6 +144,7 @@ __getattr__ = lazy_names(
 __all__ = [
     "BrokenModel",
     "Busy",
+    "Candidate",
     "CheckedJob",
     "Client",
     "ComparedRun",
@@ -202,6 +212,7 @@ __all__ = [
     "Scope",
     "ScopeExample",
     "ScopeReport",
+    "Selection",
     "Server",
     "Speed",
     "Stream",

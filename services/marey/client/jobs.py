@@ -34,6 +34,8 @@ class Defaults(TypedDict, total=False):
     seed: int | None
     variants: int | None
     fps: float | None
+    best_of: int | None
+    redraws: int | None
     tags: Sequence[str] | None
     settings: Mapping[str, float] | None
 
@@ -124,7 +126,8 @@ class Jobs(Resource):
                 (`warn`), refused (`refuse`), or not examined (`ignore`).
             idempotency_key: of all attempts; None = random. Give your own key to submit at most once even if your
                 program runs again.
-            defaults: fields of rows that do not set them: model, bundle, seconds, seed, variants, fps, tags,
+            defaults: fields of rows that do not set them: model, bundle, seconds, seed, variants, fps,
+                best_of, redraws, tags,
                 settings (of sampling, by name).
 
         Raises:

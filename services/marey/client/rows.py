@@ -17,11 +17,13 @@ from marey.core.errors import InvalidInput
 from marey.items.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
 from marey.items.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
 from marey.items.item import (
+    BEST_OF,
     CHECKS,
     COLUMNS,
     MAX_BODY_BYTES,
     MAX_PROBLEMS,
     OUTPUT_FPS,
+    REDRAWS,
     InvalidItems,
     Item,
     OutOfScope,
@@ -143,6 +145,8 @@ def defaults_of(
     seed: int | None = None,
     variants: int | None = None,
     fps: float | None = None,
+    best_of: int | None = None,
+    redraws: int | None = None,
     tags: Sequence[str] | None = None,
     settings: Mapping[str, float] | None = None,
 ) -> Mapping[str, object]:
@@ -150,19 +154,20 @@ def defaults_of(
 
     Args:
         bundle: names the model more exactly.
-        fps: of the files, one of the settings.
+        fps: of the files; like `best_of` and `redraws` one of the settings.
 
     Raises:
         InvalidInput: a field is out of range; the error names its argument.
     """
-    sampling = {**(settings or {}), **({} if fps is None else {OUTPUT_FPS: fps})}
+    platform = {OUTPUT_FPS: fps, BEST_OF: best_of, REDRAWS: redraws}
+    named = {name: value for name, value in platform.items() if value is not None}
     given = (
         ("model", "model", model),
         ("bundle", "model", bundle),
         ("seconds", "seconds", seconds),
         ("seed", "seed", seed),
         ("variants", "variants", variants),
-        ("settings" if settings else "fps", "settings", sampling or None),
+        ("settings" if settings else next(iter(named), "settings"), "settings", {**(settings or {}), **named} or None),
         ("tags", "tags", tags or None),
     )
     found: dict[str, object] = {}

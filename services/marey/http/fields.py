@@ -10,14 +10,18 @@ from pydantic.config import JsonDict
 from marey.core.characters import LINE_PATTERN
 from marey.items.expected import ACTIONS, JOIN, MAX_ACTIONS, SIDED, STRAIGHT
 from marey.items.item import (
+    BEST_OF,
+    MAX_BEST_OF,
     MAX_NAME,
     MAX_OUTPUT_FPS,
+    MAX_REDRAWS,
     MAX_SETTING,
     MAX_SETTINGS,
     MAX_TAG_LENGTH,
     MIN_OUTPUT_FPS,
     MODEL,
     OUTPUT_FPS,
+    REDRAWS,
     SETTING,
 )
 from marey.items.prompts import MAX_CHARACTERS
@@ -48,7 +52,11 @@ EXPECTED: JsonDict = {"pattern": rf"^{_ACTION}( {JOIN} {_ACTION}){{0,{MAX_ACTION
 
 
 SAMPLING: dict[str, Any] = {
-    "properties": {OUTPUT_FPS: {"type": "number", "minimum": MIN_OUTPUT_FPS, "maximum": MAX_OUTPUT_FPS}},
+    "properties": {
+        OUTPUT_FPS: {"type": "number", "minimum": MIN_OUTPUT_FPS, "maximum": MAX_OUTPUT_FPS},
+        BEST_OF: {"type": "integer", "minimum": 1, "maximum": MAX_BEST_OF},
+        REDRAWS: {"type": "integer", "minimum": 0, "maximum": MAX_REDRAWS},
+    },
     "additionalProperties": {"type": "number", "minimum": -MAX_SETTING, "maximum": MAX_SETTING},
     "propertyNames": {"pattern": f"^{SETTING.pattern}$"},
     "maxProperties": MAX_SETTINGS,

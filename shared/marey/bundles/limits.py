@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.items.item import MAX_SETTING, OUTPUT_FPS, outside_range
+from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, outside_range
 from marey.registry import Setting, find_model
 
 MAX_FRAMES = 2**53
@@ -79,14 +79,30 @@ def settings_of(bundle: Bundle) -> tuple[Setting, ...]:
 
 
 def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:
-    """Return an item's settings as the model takes them: whole numbers as integers.
+    """Return an item's settings as the model takes them: whole numbers as integers, without those that choose nothing.
 
     Raises:
         InvalidInput: the model has no such setting, or the value is out of range.
     """
     known = {setting.name: setting for setting in settings_of(bundle)}
-    for name in values:
-        if name != OUTPUT_FPS and name not in known:
-            names = ", ".join([*known, OUTPUT_FPS])
+    platform = {name: value for name, value in values.items() if name in PLATFORM_SETTINGS}
+    own = {name: value for name, value in values.items() if name not in platform}
+    for name in own:
+        if name not in known:
+            names = ", ".join([*known, *PLATFORM_SETTINGS])
             raise InvalidInput(f"unknown setting {name!r} of {bundle.manifest.name}; known: {names}")
-    return {name: value if name == OUTPUT_FPS else known[name].check(value) for name, value in values.items()}
+    return {**{name: known[name].check(value) for name, value in own.items()}, **_platform_settings(bundle, platform)}
+
+
+def _platform_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the settings that are not the network's; one candidate and no redraw are what an item has without them.
+
+    Raises:
+        InvalidInput: the model cannot choose among candidates.
+    """
+    found = {name: value for name, value in values.items() if (name, value) not in {(BEST_OF, 1), (REDRAWS, 0)}}
+    spec = find_model(bundle.manifest.model)
+    for name in (BEST_OF, REDRAWS):
+        if name in found and not (spec and spec.best_of):
+            raise InvalidInput(f"{name}: the model {bundle.manifest.model!r} does not choose among candidates")
+    return found

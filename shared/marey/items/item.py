@@ -33,9 +33,17 @@ MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 """Range over all models; a bundle's own range, which is narrower, is checked once the bundle is known."""
 MAX_TAGS, MAX_TAG_LENGTH = 20, 64
 
-OUTPUT_FPS = "fps"
-"""The only setting of an item that is not the network's: the frame rate of its files."""
+OUTPUT_FPS, BEST_OF, REDRAWS = "fps", "best_of", "redraws"
+"""Settings of an item that are not the network's: the frame rate of its files, the candidates of which the best one
+becomes its motion, and the most further rounds of candidates while none is good."""
 MIN_OUTPUT_FPS, MAX_OUTPUT_FPS = 1.0, 240.0
+MAX_BEST_OF, MAX_REDRAWS = 8, 2
+PLATFORM_SETTINGS: Mapping[str, tuple[float, float]] = {
+    OUTPUT_FPS: (MIN_OUTPUT_FPS, MAX_OUTPUT_FPS),
+    BEST_OF: (1, MAX_BEST_OF),
+    REDRAWS: (0, MAX_REDRAWS),
+}
+"""The range of each. All but the frame rate are whole numbers."""
 SETTING = re.compile(r"[a-z][a-z0-9_]{0,39}")
 """Names of settings. The spec of a model (`marey.registry`) defines its settings and their ranges: they are checked
 where the model is known."""
@@ -371,9 +379,9 @@ def _settings(value: object) -> dict[str, float]:
     for name, number in given.items():
         if not isinstance(name, str) or not SETTING.fullmatch(name):
             raise InvalidInput(f"{str(name)[:60]!r} is not the name of a setting, such as guidance")
-        low, high = (MIN_OUTPUT_FPS, MAX_OUTPUT_FPS) if name == OUTPUT_FPS else (-MAX_SETTING, MAX_SETTING)
+        low, high = PLATFORM_SETTINGS.get(name, (-MAX_SETTING, MAX_SETTING))
         try:
-            checked[name] = _number(number)
+            checked[name] = _whole(number, int(low), int(high)) if name in (BEST_OF, REDRAWS) else _number(number)
         except InvalidInput as error:
             raise InvalidInput(f"{name}: {error.message}") from error
         if not low <= checked[name] <= high:

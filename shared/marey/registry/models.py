@@ -103,6 +103,7 @@ class ModelSpec:
         handler: `() -> Handler` of its queue.
         load: `(bundle, *, device, threads) -> Generator` (`marey.generation.port`).
         settings: of sampling.
+        best_of: True if its handler can choose among candidates, as `marey.generation.handler.GeneratorHandler` can.
         limits: lengths of motions; None = each bundle states its own.
         live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
         live_examples: `(reference) -> prompts` that this bundle performs well while it streams, for the page `/live`;
@@ -123,6 +124,7 @@ class ModelSpec:
     handler: str
     load: str
     settings: tuple[Setting, ...] = ()
+    best_of: bool = False
     limits: LengthLimits | None = None
     live: str | None = None
     training: Training | None = None

@@ -32,7 +32,7 @@ ROUND = 200
 """Jobs or files per round."""
 KEPT = (
     *("model", "bundle", "weights_sha256", "random_weights", "licence", "seed", "settings", "software"),
-    *("feet_cleaned", "stream", "quality"),
+    *("feet_cleaned", "stream", "quality", "selection"),
 )
 """Manifest keys other than the prompt that are kept. All others are removed: a new key is removed until it is listed
 here."""

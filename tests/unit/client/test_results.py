@@ -44,6 +44,8 @@ NAMES = {
     motions.MotionDetail: "MotionDetailView",
     motions.MotionQuality: "MotionQuality",
     motions.PromptMatch: "PromptMatch",
+    motions.Candidate: "Candidate",
+    motions.Selection: "Selection",
     motions.Reroll: "RerollView",
     streams.StreamPrompt: "PromptView",
     streams.StreamSkeleton: "SkeletonView",

@@ -16,12 +16,14 @@ import pytest
 from marey.bundles import Bundle
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.core.settings import Settings
+from marey.generation.candidates import candidate_seed
 from marey.generation.handler import GeneratorHandler
 from marey.jobs import Claim, ClaimedItem, ItemStage
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.io.bvh import parse_bvh
 from marey.quality.limits import assess, expected_by_prompts
 from marey.quality.record import read_quality
+from marey.quality.selection import read_selection
 from marey.registry import get_model, model_names, resolve
 from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
 from marey.selector.records import match_of
@@ -215,6 +217,63 @@ def test_a_setting_out_of_range_or_unknown_is_told_by_its_name(
     item = make_item("a person walks", 0, 2.0, settings)
     with pytest.raises(InvalidInput, match=next(iter(settings))):
         run(handler, make_batch(handler, item))
+
+
+BEST = {"best_of": 3, "redraws": 1}
+
+
+def test_one_candidate_gives_the_same_bytes_as_none(handler: GeneratorHandler[Any]) -> None:
+    plain, one = make_item("a person walks", 5, 2.0), make_item("a person walks", 5, 2.0, {"best_of": 1, "redraws": 0})
+    files = [export_of(run(handler, make_batch(handler, item))[item.id]).files for item in (plain, one)]
+    assert files[0] == files[1]
+
+
+def test_the_best_of_several_candidates_is_recorded_with_all_of_them(handler: GeneratorHandler[Any]) -> None:
+    item = make_item("a person walks", 5, None, BEST)
+    clip = clip_of(run(handler, make_batch(handler, item))[item.id])
+    assert clip.manifest["seed"] == 5
+    found = read_selection(clip.manifest)
+    assert found is not None
+    assert found.best_of == 3
+    assert len(found.candidates) == 3 * (found.redraws + 1)
+    assert [each.seed for each in found.candidates] == [candidate_seed(5, n) for n in range(len(found.candidates))]
+    quality = read_quality(clip.manifest)
+    assert quality is not None
+    assert quality.match is not None
+    best = max(found.candidates, key=lambda each: (each.ok, each.match or 0, -each.index))
+    assert (found.chosen, best.flags, best.match) == (best.index, quality.flags, quality.match.value)
+    good = any(each.ok and (each.match or 0) >= 0.5 for each in found.candidates[:3])
+    assert found.redraws == (0 if good else 1)
+
+
+def test_a_candidate_is_what_its_seed_makes_alone_at_the_length_of_the_first(handler: GeneratorHandler[Any]) -> None:
+    item = make_item("a person jumps", 11, None, {"best_of": 4})
+    clip = clip_of(run(handler, make_batch(handler, item))[item.id])
+    first = make_item("a person jumps", 11, None)
+    frames = len(clip_of(run(handler, make_batch(handler, first))[first.id]).features)
+    found = read_selection(clip.manifest)
+    assert found is not None
+    alone = make_item("a person jumps", found.candidates[found.chosen].seed, frames / 20.0)
+    np.testing.assert_allclose(
+        clip.features, clip_of(run(handler, make_batch(handler, alone))[alone.id]).features, atol=1e-4
+    )
+
+
+def test_a_choice_does_not_depend_on_the_batch(handler: GeneratorHandler[Any]) -> None:
+    items = [make_item(f"a person waves {n}", n, 2.0 + n % 2, BEST) for n in range(4)]
+    together, alone = run(handler, make_batch(handler, *items)), run(handler, make_batch(handler, items[2]))
+    clips = [clip_of(outcomes[items[2].id]) for outcomes in (together, alone)]
+    np.testing.assert_allclose(clips[0].features, clips[1].features, atol=1e-4)
+    assert clips[0].manifest == clips[1].manifest
+
+
+def test_a_cancelled_item_has_no_candidates_and_steps_of_all_are_counted(handler: GeneratorHandler[Any]) -> None:
+    items = [make_item("a person bows", n, 2.0, BEST) for n in range(3)]
+    control = FakeControl(items[1].id)
+    assert set(run(handler, make_batch(handler, *items), control)) == {items[0].id, items[2].id}
+    done = [step for step, _ in control.steps]
+    assert done == sorted(done)
+    assert all(step <= total for step, total in control.steps)
 
 
 def test_a_replaced_bundle_is_refused(model: str, bundle: str, tmp_path: Path) -> None:

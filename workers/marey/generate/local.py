@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.core.extras import needs_extra
 from marey.generate.oneshot import OneShot, Wanted
-from marey.items.item import MAX_SEED, OUTPUT_FPS, Item, Problem, read_items
+from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, REDRAWS, Item, Problem, read_items
 from marey.registry import find_model, model_names
 
 if TYPE_CHECKING:
@@ -49,6 +49,8 @@ class LocalModel:
         seconds: float | None = None,
         variants: int | None = None,
         fps: float | None = None,
+        best_of: int | None = None,
+        redraws: int | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Sequence[MotionClip]:
         """Generate motions; equal prompts, seeds and settings give the same clips as a server.
@@ -59,6 +61,8 @@ class LocalModel:
             seconds: length; None = the model decides.
             variants: motions of each prompt; None = 1.
             fps: frames a second of the clips; None = the model's.
+            best_of: candidates of each motion, of which the best is kept, 1 to 8; None = 1.
+            redraws: further rounds of candidates while none is good, 0 to 2; None = 0.
             settings: of sampling, as `{"guidance": 4.5}`.
 
         Returns:
@@ -68,7 +72,11 @@ class LocalModel:
             InvalidItems: with every problem of every prompt; nothing is generated then.
             InvalidInput: no prompts.
         """
-        return [*self.stream(prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, settings=settings)]
+        made = self.stream(
+            prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, best_of=best_of, redraws=redraws,
+            settings=settings,
+        )  # fmt: skip
+        return [*made]
 
     def stream(
         self,
@@ -78,10 +86,13 @@ class LocalModel:
         seconds: float | None = None,
         variants: int | None = None,
         fps: float | None = None,
+        best_of: int | None = None,
+        redraws: int | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Iterator[MotionClip]:
         """Generate motions as `generate` does, and yield each when it is ready."""
-        sampling = {**(settings or {}), **({} if fps is None else {OUTPUT_FPS: fps})}
+        platform = {OUTPUT_FPS: fps, BEST_OF: best_of, REDRAWS: redraws}
+        sampling = {**(settings or {}), **{name: value for name, value in platform.items() if value is not None}}
         defaults = {"seed": seed, "seconds": seconds, "variants": variants, "settings": sampling or None}
         rows = [prompts] if isinstance(prompts, str) else prompts
         raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))

@@ -16,7 +16,8 @@ from marey.registry import get_model, resolve
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.core.settings import Settings
-    from marey.generation.port import Generator
+    from marey.generation.candidates import DrawPlan
+    from marey.generation.port import Generator, Request
     from marey.motion.clip import MotionClip
 
 
@@ -60,7 +61,7 @@ class OneShot:
         Raises:
             InvalidInput: a length out of the bundle's range; raised before anything is generated.
         """
-        from marey.generation.export import finish, split_settings
+        from marey.generation.candidates import split_settings
         from marey.generation.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
@@ -73,14 +74,27 @@ class OneShot:
         start = 0
         for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
             rows = list(group)
-            values, output_fps = split_settings(rows[0].settings)
+            values, plan = split_settings(rows[0].settings)
             settings, size = self._generator.settings(values), self._generator.batch
             for low in range(0, len(rows), size):
                 batch = requests[start + low : start + min(low + size, len(rows))]
                 began = time.monotonic()
-                made = self._generator.generate(batch, settings)
+                clips = self._clips(batch, settings, plan)
                 elapsed = (time.monotonic() - began) / len(batch)
-                for row, request, generated in zip(rows[low:], batch, made, strict=False):
-                    assert generated is not None  # nothing was dropped
-                    yield row, finish(self._generator, request, generated, settings, fps=output_fps), elapsed
+                for row, clip in zip(rows[low:], clips, strict=False):
+                    yield row, clip, elapsed
             start += len(rows)
+
+    def _clips(self, requests: Sequence[Request], settings: Any, plan: DrawPlan) -> Iterator[MotionClip]:
+        """Generate, and return the motion of each request."""
+        from marey.generation.candidates import best_clips
+        from marey.generation.export import finish
+
+        if not plan.is_single:
+            return filter(None, best_clips(self._generator, requests, settings, plan))  # nothing was dropped
+        made = self._generator.generate(requests, settings)
+        return (
+            finish(self._generator, request, generated, settings, fps=plan.fps)
+            for request, generated in zip(requests, made, strict=True)
+            if generated is not None
+        )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -11,7 +10,6 @@ import torch
 
 from marey.exporters import Coordinates, exporters
 from marey.generation.port import Generated, Generator, Request, S
-from marey.items.item import OUTPUT_FPS
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
@@ -21,11 +19,6 @@ from marey.quality.record import KEY, PromptMatch
 from marey.runtime.handler import Export, ExportedFile
 from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
-
-
-def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
-    """Split an item's settings into the network's own and the output's frame rate (None = the model's)."""
-    return {k: v for k, v in values.items() if k != OUTPUT_FPS}, values.get(OUTPUT_FPS)
 
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:

@@ -12,8 +12,9 @@ from uuid import UUID
 from marey.core.errors import MareyError
 from marey.core.settings import Settings
 from marey.exporters import exporters
-from marey.generation.export import export_clip, finish, split_settings
-from marey.generation.port import Generated, Generator, Request, S
+from marey.generation.candidates import best_clips, split_settings
+from marey.generation.export import export_clip, finish
+from marey.generation.port import Generated, GenerationControl, Generator, Request, S
 from marey.jobs import ClaimedItem
 from marey.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
 from marey.streams.recording import StreamRecording
@@ -88,13 +89,27 @@ class GeneratorHandler(Generic[S]):
                 requests.append(request)
         if not items:
             return
-        values, fps = split_settings(items[0].settings)  # the same for the whole batch
-        settings = self.generator.settings(values)
-        made = self.generator.generate(requests, settings, control=_Rows(items, control))
+        exports = self._exports(items, requests, _Rows(items, control))
         elapsed = (time.monotonic() - started) / len(items)
-        for item, request, generated in zip(items, requests, made, strict=True):
-            if generated is not None:
-                yield Done(item.id, partial(_export, self.generator, request, generated, settings, fps), elapsed)
+        for item, export in zip(items, exports, strict=True):
+            if export is not None:
+                yield Done(item.id, export, elapsed)
+
+    def _exports(
+        self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl
+    ) -> Sequence[Callable[[], Export] | None]:
+        """Generate, and return how each motion is exported later; None for dropped ones."""
+        values, plan = split_settings(items[0].settings)  # the same for the whole batch
+        settings = self.generator.settings(values)
+        if plan.is_single:
+            made = self.generator.generate(requests, settings, control=control)
+            return [
+                None if generated is None else partial(_export, self.generator, request, generated, settings, plan.fps)
+                for request, generated in zip(requests, made, strict=True)
+            ]
+        licence = self.generator.bundle.manifest.licence
+        clips = best_clips(self.generator, requests, settings, plan, control=control)
+        return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
         fps = self.generator.limits.fps

@@ -13,6 +13,7 @@ from marey.api.files import FileView
 from marey.http.schemas import Comment, View
 from marey.jobs import ItemState, MotionRow, Review
 from marey.quality.record import MotionQuality, read_quality
+from marey.quality.selection import Selection, read_selection
 from marey.takes import MAX_REVIEWED, Reroll
 
 
@@ -112,15 +113,16 @@ class MotionView(View):
         description="Physical quality; null for motions of earlier releases and of skeletons other than that of 22 "
         "joints."
     )
+    selection: Selection | None = Field(description="Null if the motion was not chosen among candidates.")
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionView:
         """Convert a row."""
         files = [FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.files]
-        apart = {"files", "tags", "review", "quality"}
+        apart = {"files", "tags", "review", "quality", "selection"}
         own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
-        quality = read_quality(row.metadata)
-        return cls(files=files, tags=list(row.tags), review=_review(row), quality=quality, **own)
+        records = {"quality": read_quality(row.metadata), "selection": read_selection(row.metadata)}
+        return cls(files=files, tags=list(row.tags), review=_review(row), **records, **own)
 
 
 def _review(row: MotionRow) -> ReviewView | None:

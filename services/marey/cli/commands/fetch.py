@@ -156,6 +156,7 @@ def output_line(fetched: FetchedItem) -> dict[str, Any]:
         "fps": motion.get("fps"),
         "elapsed": motion.get("elapsed"),
         "quality": motion.get("quality"),
+        "selection": motion.get("selection"),
         "scope": item.get("scope"),
         "files": {file_format: str(path.absolute()) for file_format, path in fetched.files.items()},
     }

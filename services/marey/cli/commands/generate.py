@@ -50,6 +50,8 @@ def generate(
     seed: options.Seed = None,
     variants: options.Variants = None,
     fps: options.Fps = None,
+    best_of: options.BestOf = None,
+    redraws: options.Redraws = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -65,7 +67,17 @@ def generate(
 
     check_template(name_template)
     kinds = _exporters(formats)
-    defaults = row_defaults(sampling, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
+    defaults = row_defaults(
+        sampling,
+        model=model,
+        seconds=seconds,
+        seed=seed,
+        variants=variants,
+        fps=fps,
+        best_of=best_of,
+        redraws=redraws,
+        tags=tags,
+    )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)
@@ -282,6 +294,7 @@ def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, o
         "fps": clip.fps,
         "elapsed": elapsed,
         "quality": clip.manifest.get("quality"),
+        "selection": clip.manifest.get("selection"),
         "scope": clip.manifest.get("scope"),
         "files": {kind: str(path.absolute()) for kind, path in paths.items()},
     }

@@ -219,7 +219,10 @@ def _facts(motion: Motion) -> str:
     name = [motion.name] if motion.name else []
     match = motion.quality.match if motion.quality else None
     shown = [f"match {match.value:g}"] if match and match.value is not None else []
-    return "  ·  ".join([f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s", *shown, *take])
+    chosen = motion.selection
+    of = [f"candidate {chosen.chosen} of {len(chosen.candidates)}"] if chosen else []
+    place = [f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
+    return "  ·  ".join([*place, *of, *shown, *take])
 
 
 def _verdict(motion: Motion) -> str:

@@ -43,6 +43,8 @@ def submit(
     seed: options.Seed = None,
     variants: options.Variants = None,
     fps: options.Fps = None,
+    best_of: options.BestOf = None,
+    redraws: options.Redraws = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -68,7 +70,16 @@ def submit(
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = row_defaults(
-        sampling, model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags
+        sampling,
+        model=model,
+        bundle=bundle,
+        seconds=seconds,
+        seed=seed,
+        variants=variants,
+        fps=fps,
+        best_of=best_of,
+        redraws=redraws,
+        tags=tags,
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     with Lines(item.as_json() for item in reader) as lines:

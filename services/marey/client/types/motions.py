@@ -62,6 +62,36 @@ class MotionQuality(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Candidate(Result):
+    """One motion that was drawn for an item."""
+
+    index: int = 0
+    """From 0, in the order in which they were drawn; redraws follow."""
+    seed: int = 0
+    """Candidate 0 has the item's seed."""
+    flags: tuple[str, ...] = ()
+    """Those of its quality record."""
+    ok: bool = False
+    """True without flags."""
+    match: float | None = None
+    """Value of its match; None where an action has no rule."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection(Result):
+    """The choice of a motion among candidates: without flags first, then by match, then the earlier one."""
+
+    version: int = 0
+    best_of: int = 0
+    """Candidates of a round."""
+    redraws: int = 0
+    """Further rounds that were drawn because no candidate was good."""
+    chosen: int = 0
+    """Index of the candidate that is this motion."""
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion(Result):
     """A motion."""
 
@@ -89,6 +119,8 @@ class Motion(Result):
     """The item that is another take of it."""
     quality: MotionQuality | None = None
     """None for motions of earlier releases and of skeletons other than that of 22 joints."""
+    selection: Selection | None = None
+    """None if the motion was not chosen among candidates."""
 
     @property
     def seconds(self) -> float:

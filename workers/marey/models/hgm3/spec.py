@@ -26,6 +26,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("residual_temperature", 0.0, 100.0, 1.0, "As temperature, for the residual levels."),
         Setting("residual_top_k", 0.001, 1.0, 0.1, "As top_k, for the residual levels."),
     ),
+    best_of=True,
     limits=LengthLimits(0.8, 9.8),
     training=Training(
         help="HGM³: stages in this order, then `bundle`.",

@@ -1,0 +1,156 @@
+"""Best of N: several candidates of each request, of which one becomes the motion.
+
+Candidates of one number share forward passes; one clip of each request is kept, so memory does not grow with N. Every
+candidate depends on the seed of its request and its own number alone: results do not depend on the batch.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from marey.generation.export import finish
+from marey.generation.port import GenerationControl, Generator, NoControl, Request, S
+from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
+from marey.motion.clip import MotionClip
+from marey.quality.record import read_quality
+from marey.quality.selection import KEY, Candidate, Selection
+from marey.selector.matching import PASS
+
+
+@dataclass(frozen=True)
+class DrawPlan:
+    """Settings of an item that are not the network's.
+
+    Attributes:
+        fps: of the files; None = the model's.
+        best_of: candidates of a round.
+        redraws: most further rounds, drawn while no candidate is good.
+    """
+
+    fps: float | None = None
+    best_of: int = 1
+    redraws: int = 0
+
+    @property
+    def is_single(self) -> bool:
+        """True if nothing is chosen."""
+        return self.candidates == 1
+
+    @property
+    def candidates(self) -> int:
+        """The most candidates of an item."""
+        return self.best_of * (self.redraws + 1)
+
+
+def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], DrawPlan]:
+    """Split an item's settings into the network's own and the platform's."""
+    own = {name: value for name, value in values.items() if name not in PLATFORM_SETTINGS}
+    return own, DrawPlan(values.get(OUTPUT_FPS), int(values.get(BEST_OF, 1)), int(values.get(REDRAWS, 0)))
+
+
+def candidate_seed(seed: int, number: int) -> int:
+    """Return the seed of a candidate: the item's own for candidate 0, else one derived from both."""
+    if number == 0:
+        return seed
+    digest = hashlib.sha256(f"marey candidate {seed} {number}".encode()).digest()
+    return int.from_bytes(digest[:8], "little") % (MAX_SEED + 1)
+
+
+def best_clips(
+    generator: Generator[S],
+    requests: Sequence[Request],
+    settings: S,
+    plan: DrawPlan,
+    *,
+    control: GenerationControl | None = None,
+) -> list[MotionClip | None]:
+    """Draw candidates of each request, and return the best of each; None where `control` dropped the request.
+
+    Raises:
+        InvalidInput: as `Generator.generate`.
+    """
+    draws = [_Draw(request, plan) for request in requests]
+    open_rows, number = list(range(len(draws))), 0
+    while open_rows and number < plan.candidates:
+        part = [draws[row].request(number) for row in open_rows]
+        watched = _CandidateControl(control or NoControl(), open_rows, number, plan.candidates)
+        made = generator.generate(part, settings, control=watched)
+        kept: list[int] = []
+        for row, generated in zip(open_rows, made, strict=True):
+            if generated is None:
+                draws[row].best = None
+                continue
+            draws[row].fix_length(len(generated.features))
+            draws[row].offer(number, finish(generator, draws[row].asked, generated, settings, fps=plan.fps))
+            kept.append(row)
+        number += 1
+        round_ended = number % plan.best_of == 0
+        open_rows = [row for row in kept if not (round_ended and draws[row].good)]
+    return [draw.result() for draw in draws]
+
+
+class _Draw:
+    """The candidates of one request, and the best of them."""
+
+    def __init__(self, asked: Request, plan: DrawPlan) -> None:
+        self.asked = asked
+        self.best: MotionClip | None = None
+        self.good = False
+        self._plan = plan
+        self._frames = asked.frames
+        self._rank = (False, -1.0)
+        self._chosen = 0
+        self._candidates: list[Candidate] = []
+
+    def request(self, number: int) -> Request:
+        """Return the request of a candidate; all have the length of the first."""
+        return replace(self.asked, seed=candidate_seed(self.asked.seed, number), frames=self._frames)
+
+    def fix_length(self, frames: int) -> None:
+        """Give the candidates that follow the length of the first one, where the model drew it."""
+        self._frames = self._frames or frames
+
+    def offer(self, number: int, clip: MotionClip) -> None:
+        """Keep a candidate if it is better than those before it: without flags, then by match."""
+        quality = read_quality(clip.manifest)
+        flags = [] if quality is None else quality.flags
+        match = None if quality is None or quality.match is None else quality.match.value
+        seed = candidate_seed(self.asked.seed, number)
+        self._candidates.append(Candidate(index=number, seed=seed, flags=flags, ok=not flags, match=match))
+        self.good = self.good or (not flags and (match is None or match >= PASS))
+        rank = (not flags, 0.0 if match is None else match)
+        if rank > self._rank:
+            self.best, self._rank, self._chosen = clip, rank, number
+
+    def result(self) -> MotionClip | None:
+        """Return the best clip, with the record of the choice in its manifest."""
+        if self.best is None:
+            return None
+        selection = Selection(
+            best_of=self._plan.best_of,
+            redraws=-(-len(self._candidates) // self._plan.best_of) - 1,
+            chosen=self._chosen,
+            candidates=self._candidates,
+        )
+        return replace(self.best, manifest={**self.best.manifest, KEY: selection.model_dump(mode="json")})
+
+
+class _CandidateControl:
+    """Control of one pass over candidates, as a part of all of them."""
+
+    def __init__(self, control: GenerationControl, rows: Sequence[int], number: int, candidates: int) -> None:
+        self._control = control
+        self._position = {row: position for position, row in enumerate(rows)}
+        self._number = number
+        self._candidates = candidates
+
+    def progress(self, done: int, total: int) -> None:
+        """Report a step of this candidate as one of all candidates."""
+        self._control.progress(self._number * total + done, self._candidates * total)
+
+    def dropped(self) -> set[int]:
+        """Return the positions of dropped requests among those of this pass."""
+        return {self._position[row] for row in self._control.dropped() if row in self._position}
