@@ -14,7 +14,8 @@ from tests.support.marey import TINY, Marey, tiny
 from tests.support.models import another_model
 
 FIELDS = ["job", "item", "motion", "name", "prompt", "variant", "model", "bundle", "licence", "seed", "state", "error",
-          "frames", "fps", "elapsed", "quality", "scope", "files"]  # fmt: skip
+          "frames", "fps", "elapsed", "quality", "selection", "scope",
+          "files"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.settings import Settings
 from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, TAGS
 from marey.items.expected import read_expected
-from marey.items.item import MAX_TAG_LENGTH, OUTPUT_FPS, read_item
+from marey.items.item import BEST_OF, MAX_TAG_LENGTH, OUTPUT_FPS, REDRAWS, read_item
 from marey.text_service.routes import ParseBody
 
 BODIES = {
@@ -94,7 +94,8 @@ def test_ranges_are_those_of_the_checks(document: dict[str, Any]) -> None:
     item = document["components"]["schemas"]["NewItemBody"]["properties"]
     settings = item["settings"]
     fps, others = settings["properties"][OUTPUT_FPS], settings["additionalProperties"]
-    for name, shown in ((OUTPUT_FPS, fps), ("guidance", others)):
+    whole = [(name, settings["properties"][name]) for name in (BEST_OF, REDRAWS)]
+    for name, shown in ((OUTPUT_FPS, fps), ("guidance", others), *whole):
         low, high = shown["minimum"], shown["maximum"]
         for value, right in ((low, True), (high, True), (high * 1.1, False), (low - 1, False)):
             problems = read_item({"prompt": "walk", "settings": {name: value}})[1]

@@ -63,3 +63,20 @@ def test_a_row_holds_whole_settings_as_integers_however_they_were_written(config
     rows = list(new_items((Item("walk", settings={"steps": steps}), generator) for steps in (8, 8.0)))
     assert [type(row.settings["steps"]) for row in rows] == [int, int]
     assert len({row.batch_key for row in rows}) == 1
+
+
+def test_candidates_and_redraws_are_settings_of_models_that_can_choose(config: Settings) -> None:
+    known = bundle(config, KNOWN)
+    assert check_settings(known, {"best_of": 4, "redraws": 1, "steps": 8}) == {"best_of": 4, "redraws": 1, "steps": 8}
+    assert check_settings(known, {"best_of": 1, "redraws": 0}) == {}
+    for name in ("best_of", "redraws"):
+        with pytest.raises(InvalidInput, match=f"{name}: the model 'toy' does not choose among candidates"):
+            check_settings(bundle(config, FOREIGN), {name: 2})
+    assert check_settings(bundle(config, FOREIGN), {"best_of": 1}) == {}
+
+
+def test_one_candidate_shares_the_batch_of_items_that_name_none(config: Settings) -> None:
+    generator = capabilities_of(bundle(config, KNOWN), config)
+    plain, one, two = new_items((Item("walk", settings=s), generator) for s in ({}, {"best_of": 1}, {"best_of": 2}))
+    assert plain.batch_key == one.batch_key != two.batch_key
+    assert two.settings == {"best_of": 2}

@@ -84,7 +84,7 @@ def best_clips(
                 draws[row].best = None
                 continue
             draws[row].fix_length(len(generated.features))
-            draws[row].offer(number, finish(generator, draws[row].asked, generated, settings, fps=plan.fps))
+            draws[row].consider(number, finish(generator, draws[row].asked, generated, settings, fps=plan.fps))
             kept.append(row)
         number += 1
         round_ended = number % plan.best_of == 0
@@ -113,7 +113,7 @@ class _Draw:
         """Give the candidates that follow the length of the first one, where the model drew it."""
         self._frames = self._frames or frames
 
-    def offer(self, number: int, clip: MotionClip) -> None:
+    def consider(self, number: int, clip: MotionClip) -> None:
         """Keep a candidate if it is better than those before it: without flags, then by match."""
         quality = read_quality(clip.manifest)
         flags = [] if quality is None else quality.flags
@@ -148,8 +148,8 @@ class _CandidateControl:
         self._candidates = candidates
 
     def progress(self, done: int, total: int) -> None:
-        """Report a step of this candidate as one of all candidates."""
-        self._control.progress(self._number * total + done, self._candidates * total)
+        """Report a step of this candidate as a percent of it; the steps of candidates may differ in number."""
+        self._control.progress(100 * self._number + 100 * done // total, 100 * self._candidates)
 
     def dropped(self) -> set[int]:
         """Return the positions of dropped requests among those of this pass."""
