@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import pytest
 import torch
 
@@ -70,15 +72,45 @@ def test_doctor_says_what_to_do_with_a_home_that_cannot_be_written(offline: Mare
 
 
 def test_an_interrupted_demo_ends_like_any_command(tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
-    command = [sys.executable, "-m", "marey.cli.demo"]
-    demo = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
-    log = tmp_path / "out" / "demo" / ".home" / "serve.log"
-    while not log.exists():
-        assert demo.poll() is None
-        time.sleep(0.1)
+    demo = _demo(tmp_path)
     demo.send_signal(signal.SIGINT)
     said = demo.communicate(timeout=120)[1].decode()
     assert demo.returncode == 130, said
     assert "make demo: interrupted" in said
     assert "Traceback" not in said
+    _wait_for_servers(tmp_path, 0)
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="processes outlive their parent without setpriv")
+def test_no_server_outlives_a_killed_demo(tmp_path: Path) -> None:
+    demo = _demo(tmp_path)
+    _wait_for_servers(tmp_path, 1)
+    demo.kill()
+    demo.communicate(timeout=60)
+    _wait_for_servers(tmp_path, 0)
+
+
+def _demo(folder: Path) -> subprocess.Popen[bytes]:
+    """A demo that has begun to start its server."""
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    command = [sys.executable, "-m", "marey.cli.demo"]
+    demo = subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE)
+    log = folder / "out" / "demo" / ".home" / "serve.log"
+    while not log.exists():
+        assert demo.poll() is None
+        time.sleep(0.1)
+    return demo
+
+
+def _wait_for_servers(folder: Path, number: int) -> None:
+    deadline = time.monotonic() + 60
+    while len(running := [process for process in psutil.process_iter() if _serves(process, folder)]) != number:
+        assert time.monotonic() < deadline, running
+        time.sleep(0.2)
+
+
+def _serves(process: psutil.Process, folder: Path) -> bool:
+    try:
+        return "serve" in process.cmdline() and process.cwd() == str(folder)
+    except psutil.Error:
+        return False

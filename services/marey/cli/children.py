@@ -88,7 +88,7 @@ class SupervisedProcess:
             self.log_from = self.log.stat().st_size if self.log.exists() else 0
         with contextlib.nullcontext() if self.log is None else open_private(self.log, "ab") as output:
             self.process = subprocess.Popen(
-                [*_death_signal(), *self.command],
+                ends_with_parent(self.command),
                 env=self.environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -118,6 +118,13 @@ def marey(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "marey.cli", *arguments]
 
 
+def ends_with_parent(command: Sequence[str]) -> list[str]:
+    """Return the command line of a process that gets SIGTERM when its parent ends, in any way; without `setpriv`
+    (util-linux) the command alone."""
+    setpriv = shutil.which("setpriv")
+    return [*([setpriv, "--pdeathsig", "TERM"] if setpriv else []), *command]
+
+
 def metrics_port(config: Settings, place: int) -> dict[str, str]:
     """Return the environment variable of a child's metrics port; ports count up, one for each child."""
     return {} if config.metrics_port is None else {"MAREY_METRICS_PORT": str(config.metrics_port + place)}
@@ -145,11 +152,6 @@ def stop_all(children: Sequence[SupervisedProcess]) -> None:
         child.terminate()
     for child in children:
         child.join(STOP_SECONDS)
-
-
-def _death_signal() -> list[str]:
-    setpriv = shutil.which("setpriv")
-    return [setpriv, "--pdeathsig", "TERM"] if setpriv else []
 
 
 def _how(code: int) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.cli import console
+from marey.cli.children import ends_with_parent, marey
 from marey.cli.watching import watch_job
 from marey.client.health import is_healthy
 from marey.client.place import find_server
@@ -90,7 +91,8 @@ def _server(home: Path) -> Iterator[None]:
     (home / "server.json").unlink(missing_ok=True)
     log = home / "serve.log"
     log.touch(mode=0o600)
-    command = [sys.executable, "-m", "marey.cli", "serve", "--port", "0"]
+    # An interrupt can come before `Popen` has returned: then no one here could end the server.
+    command = ends_with_parent(marey("serve", "--port", "0"))
     with log.open("wb") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
         try:
             _wait_until_ready(process, log)
