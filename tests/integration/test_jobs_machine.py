@@ -72,7 +72,9 @@ class Jobs(RuleBasedStateMachine):
         super().__init__()
         self.succeeded: dict[UUID, UUID] = {}
         with self.engine.begin() as conn:
-            conn.execute(sa.text("TRUNCATE job, lease, asset, text_features, webhook, webhook_event CASCADE"))
+            conn.execute(
+                sa.text("TRUNCATE job, lease, asset, text_features, prompt_scope, webhook, webhook_event CASCADE")
+            )
         new_webhook(self.engine)
         with transaction(self.engine) as conn:
             set_quotas(conn, "default", {"queued": 12, "running": 4})

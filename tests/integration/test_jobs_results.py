@@ -19,6 +19,7 @@ from marey.jobs import (
     ItemStage,
     ItemState,
     JobState,
+    NewItem,
     NewText,
     begin_assets,
     cancel,
@@ -31,6 +32,9 @@ from marey.jobs import (
     release,
     sweep,
 )
+from marey.jobs.leases import PromptScope
+from marey.jobs.types import JsonObject
+from marey.takes import erase
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,
@@ -252,6 +256,74 @@ def test_the_marks_of_the_text_stage_do_not_follow_into_the_next(engine: sa.Engi
     parse_texts(engine)
     claimed = claim_some(engine)
     assert (len(claimed.items), claimed.solo) == (2, False)
+
+
+# --- scopes ---
+
+WORDS = {"version": 1, "by": "words", "verdict": "known", "actions": [], "flags": []}
+UNKNOWN = WORDS | {"by": "encoder", "verdict": "unknown"}
+
+
+def undecided(index: int, prompt: str = "a bow", **changes: object) -> NewItem:
+    """An item whose scope the words leave to the encoder."""
+    return new_item(index, prompt, scope=WORDS, scope_key=f"{prompt} {changes.get('bundle')}", **changes)
+
+
+def judge_texts(engine: sa.Engine, scope: JsonObject = UNKNOWN) -> list[UUID]:
+    """Run the text stage once, with a verdict for the first item."""
+    claimed = claim_some(engine, "text", limit=1)
+    (item,) = claimed.items
+    text = NewText(item.id, item.text_key, b"blob", PromptScope(f"{item.prompt} None", scope))
+    with transaction(engine) as conn:
+        done = commit_texts(conn, claimed.lease_token, [text])
+        assert audit(conn) == []
+    return list(done.items)
+
+
+def scopes_of(engine: sa.Engine, job: UUID) -> list[JsonObject | None]:
+    with transaction(engine) as conn:
+        return [item.scope for item in list_items(conn, "default", job).rows]
+
+
+def test_a_verdict_of_the_encoder_replaces_that_of_the_words_for_all_variants(engine: sa.Engine) -> None:
+    job = submit_items(engine, [undecided(0, variant=n) for n in range(3)])
+    judge_texts(engine)
+    assert scopes_of(engine, job) == [UNKNOWN] * 3
+    assert {item.scope["verdict"] for item in claim_some(engine).items if item.scope} == {"unknown"}
+
+
+def test_known_features_do_not_skip_the_verdict_and_known_verdicts_do(engine: sa.Engine) -> None:
+    submit_items(engine, [new_item(0, "a bow")])
+    parse_texts(engine)
+    judged = submit_items(engine, [undecided(0)])
+    assert scopes_of(engine, judged) == [WORDS]
+    judge_texts(engine)
+    again = submit_items(engine, [undecided(0), undecided(1, bundle="other@1")])
+    assert scopes_of(engine, again) == [UNKNOWN, WORDS]
+    assert [item.bundle for item in claim_some(engine, "text").items] == ["other@1"]
+
+
+def test_refused_verdicts_are_made_again_so_that_the_item_fails(engine: sa.Engine) -> None:
+    submit_items(engine, [undecided(0)], scope="warn")
+    judge_texts(engine)
+    submit_items(engine, [undecided(0)], scope="refuse")
+    assert claim_some(engine, "text").scope == "refuse"
+
+
+def test_siblings_of_another_bundle_wait_for_a_verdict_of_their_own(engine: sa.Engine) -> None:
+    job = submit_items(engine, [undecided(0), undecided(1, bundle="other@1")])
+    judge_texts(engine)
+    assert scopes_of(engine, job) == [UNKNOWN, WORDS]
+    assert [item.bundle for item in claim_some(engine, "text").items] == ["other@1"]
+
+
+def test_an_erased_prompt_leaves_no_verdict(engine: sa.Engine) -> None:
+    job = submit_items(engine, [undecided(0)])
+    judge_texts(engine)
+    with transaction(engine) as conn:
+        cancel(conn, "default", job, "enough")
+        erase(conn, "default", job, by="test")
+        assert conn.execute(sa.text("SELECT count(*) FROM prompt_scope")).scalar_one() == 0
 
 
 # --- errors ---

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
-from marey.bundles import TextSpec, find_bundle
+from marey.bundles import BundleManifest, TextSpec, find_bundle
+from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
+from marey.items.item import UnknownAction
 from marey.jobs import TEXT_QUEUE, ClaimedItem
+from marey.jobs.leases import PromptScope
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
-from marey.text.keys import as_served
+from marey.text.keys import as_served, scope_key
+from marey.text.meaning import MeaningJudge
 from marey.text.pipeline import TextPipeline
+from marey.vocabulary.report import refusal, says_known
+from marey.vocabulary.scope import ScopePolicy, match_scope
 
 BATCH = 64
 """Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""
@@ -23,7 +30,9 @@ class TextHandler:
 
     def __init__(self) -> None:
         self._pipelines: dict[TextSpec, TextPipeline] = {}
+        self._stages: dict[TextSpec, ScopeStage] = {}
         self._pipeline: TextPipeline | None = None
+        self._scopes: ScopeStage | None = None
 
     def load(self, bundle: str) -> None:
         """Load the text pipeline of `bundle`; bundles of one specification share it.
@@ -31,12 +40,17 @@ class TextHandler:
         Raises:
             NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or does not match.
         """
-        spec = find_bundle(bundle, verify=False).manifest.text
+        manifest = find_bundle(bundle, verify=False).manifest
+        spec = manifest.text
         if spec is None:
             raise InvalidBundle("this bundle does not read prompts", where=bundle)
         if spec not in self._pipelines:
             self._pipelines[spec] = TextPipeline.load(as_served(spec))
-        self._pipeline = self._pipelines[spec]
+            if judges_meaning(spec):
+                self._stages[spec] = ScopeStage(MeaningJudge(self._pipelines[spec].pooled))
+        self._pipeline, self._scopes = self._pipelines[spec], self._stages.get(spec)
+        if self._scopes is not None:
+            self._scopes.bundles[bundle] = manifest
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
         """Return one bucket: texts are encoded one by one anyway."""
@@ -49,23 +63,55 @@ class TextHandler:
         for done, item in enumerate(batch.items, 1):
             if item.id in control.dropped():
                 continue
-            yield _outcome(self._pipeline, item)
+            yield _outcome(self._pipeline, self._scopes, item, batch.claim.scope)
             control.progress(done, len(batch.items))
 
 
-def _outcome(pipeline: TextPipeline, item: ClaimedItem) -> Outcome:
-    """Return the features of one item under the key it was submitted with; the key, which promises weights, is
-    checked."""
+@dataclass(frozen=True)
+class ScopeStage:
+    """Scopes of prompts, for bundles of one text specification."""
+
+    judge: MeaningJudge
+    bundles: dict[str, BundleManifest] = field(default_factory=dict[str, BundleManifest])
+    """Manifests of the bundles that were asked for."""
+
+    def scope_of(self, item: ClaimedItem, policy: ScopePolicy) -> PromptScope | None:
+        """Return the encoder's verdict on an item's prompt; None if the words decide it, or it is not examined.
+
+        Raises:
+            UnknownAction: the job refuses unknown prompts, and this is one.
+        """
+        if policy == "ignore":
+            return None
+        manifest = self._manifest(item.bundle)
+        lists = manifest.actions
+        if lists is None or match_scope(item.prompt, lists).left is None:
+            return None
+        scope = self.judge.judge(item.prompt, lists)
+        if policy == "refuse" and (message := refusal(scope)) is not None:
+            raise UnknownAction(f"the prompt {message}", hint=says_known(manifest.name, lists.known))
+        return PromptScope(scope_key(item.prompt, item.bundle, lists), scope.as_json())
+
+    def _manifest(self, bundle: str) -> BundleManifest:
+        if bundle not in self.bundles:
+            self.bundles[bundle] = find_bundle(bundle, verify=False).manifest
+        return self.bundles[bundle]
+
+
+def _outcome(pipeline: TextPipeline, scopes: ScopeStage | None, item: ClaimedItem, policy: ScopePolicy) -> Outcome:
+    """Return the features of one item under the key it was submitted with, and its scope; the key, which promises
+    weights, is checked."""
     try:
         if pipeline.key(item.prompt) != item.text_key:
             raise InvalidBundle(
                 "the server that took this job has another text encoder or labeller than this worker",
                 hint="Install the same models on both, then retry the job's failed items.",
             )
+        scope = None if scopes is None else scopes.scope_of(item, policy)
         (features,) = pipeline.features([item.prompt])
     except MareyError as error:
         return Failed(item.id, error)
-    return TextDone(item.id, item.text_key, features.to_blob())
+    return TextDone(item.id, item.text_key, features.to_blob(), scope)
 
 
 def create_handler() -> TextHandler:

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from marey.bundles.bundle import Bundle
+from marey.bundles.manifest import TextSpec
 from marey.core.errors import InvalidInput
 from marey.items.item import MAX_PROBLEMS, OutOfScope, Problem
 from marey.vocabulary.report import MAX_BUNDLES, refusal, says_known
-from marey.vocabulary.scope import match_scope
+from marey.vocabulary.scope import ActionLists, Scope, match_scope
+
+MEANING_ENCODERS = ("minilm",)
+"""Encoders that the limits of `marey.text.meaning` were set for; with others the words decide alone."""
 
 
-def refuse_unknown(prompts: Iterable[tuple[int | None, str, Bundle]], *, where: str | None = None) -> None:
+def judges_meaning(text: TextSpec | None) -> bool:
+    """Return True if the encoder of this specification decides what the words of prompts leave undecided."""
+    return text is not None and text.encoder in MEANING_ENCODERS
+
+
+def refuse_unknown(
+    prompts: Iterable[tuple[int | None, str, Bundle]],
+    *,
+    where: str | None = None,
+    match: Callable[[str, ActionLists], Scope] = match_scope,
+) -> None:
     """Check that every prompt names only actions that its bundle knows, tries, or reads as a known one.
+
+    Prompts that the words leave undecided pass: the encoder of their bundle decides them later.
 
     Args:
         prompts: line in the input, prompt, and the bundle that will read it.
         where: name of the input.
+        match: by words, or by words and meaning.
 
     Raises:
         OutOfScope: with every prompt that does not, and what the bundles know.
@@ -33,8 +50,9 @@ def refuse_unknown(prompts: Iterable[tuple[int | None, str, Bundle]], *, where: 
                 where="scope",
                 hint="Choose the scope `warn` or `ignore`, or another bundle.",
             )
-        message = refusal(match_scope(prompt, lists))
-        if message is None:
+        scope = match(prompt, lists)
+        message = refusal(scope)
+        if message is None or (scope.left is not None and judges_meaning(bundle.manifest.text)):
             continue
         total += 1
         if len(known) < MAX_BUNDLES:

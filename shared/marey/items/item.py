@@ -153,6 +153,12 @@ class OutOfScope(InvalidItems):
     problem_type = "out-of-scope"
 
 
+class UnknownAction(InvalidInput):
+    """One prompt with an action that the model does not know, refused as the caller asked."""
+
+    problem_type = OutOfScope.problem_type
+
+
 @dataclass(frozen=True)
 class Unreadable:
     """A line, or a part of it, that could not be parsed; `read_item` refuses it with this message."""

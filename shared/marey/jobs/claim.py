@@ -76,7 +76,7 @@ TAKE = sa.text(f"""
     )
     UPDATE item SET state = 'leased', lease_token = :token FROM picked WHERE item.id = picked.id
     RETURNING item.id, item.position, item.index, item.variant, item.model, item.bundle, item.text_key, item.seed,
-              item.settings, item.attempts, item.stage, {", ".join(f"item.{name}" for name in SPEC_FIELDS)}
+              item.settings, item.attempts, item.stage, item.scope, {", ".join(f"item.{name}" for name in SPEC_FIELDS)}
 """)  # noqa: S608
 
 ALONE = sa.text("SELECT EXISTS (SELECT FROM lease WHERE job_id = :job AND queue = :queue AND solo)")
@@ -256,7 +256,9 @@ def _take(
     items = sorted((_claimed(row) for row in rows), key=lambda item: item.position)
     stage = ItemStage(rows[0]["stage"])
     bundle = items[0].bundle
-    return Claim(token, job.tenant, job.id, queue, stage, batch_key, bundle, solo, tuple(items), job.traceparent)
+    return Claim(
+        token, job.tenant, job.id, queue, stage, batch_key, bundle, solo, tuple(items), job.traceparent, job.scope
+    )
 
 
 def _claimed(row: sa.RowMapping) -> ClaimedItem:

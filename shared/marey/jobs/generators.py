@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
 from marey.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
+from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
 from marey.items.item import MAX_SEED, Item
 from marey.jobs import NewItem
-from marey.text.keys import as_served, feature_key, resolve
+from marey.text.keys import as_served, feature_key, resolve, scope_key
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import Scope
 
@@ -41,6 +42,13 @@ class GeneratorCapabilities:
     def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
         """Return the scope of a prompt, and count it; None if the bundle lists no actions."""
         return report.judge(prompt, self.bundle.manifest.name, self.bundle.manifest.actions)
+
+    def scope_key(self, prompt: str, scope: Scope | None) -> str | None:
+        """Return the key of the encoder's verdict; None if the words decide."""
+        lists = self.bundle.manifest.actions
+        if lists is None or scope is None or scope.left is None or not judges_meaning(self.text):
+            return None
+        return scope_key(prompt, self.bundle.reference, lists)
 
 
 @dataclass(frozen=True)
@@ -112,6 +120,7 @@ def new_items(
                 variant=variant,
                 settings=dict(values),
                 scope=None if scope is None else scope.as_json(),
+                scope_key=generator.scope_key(item.prompt, scope),
             )
 
 

@@ -17,6 +17,7 @@ from marey.db.sql import CLOCK, notify
 from marey.jobs import tables
 from marey.jobs.notifications import enqueue_job_event
 from marey.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
+from marey.vocabulary.scope import ScopePolicy
 
 Lane = tuple[str, str]
 """Queue and batch key."""
@@ -41,6 +42,7 @@ class LockedJob:
     erased: bool = False
     """True if its prompts were erased: its items cannot be made again."""
     traceparent: str | None = None
+    scope: ScopePolicy = "ignore"
 
     @property
     def state(self) -> JobState:
@@ -85,6 +87,7 @@ def lock_job(
         *(table[str(state)] for state in ItemState),
         table.erased_at.is_not(None).label("erased"),
         table.traceparent,
+        table.scope,
     ).where(table.id == job)
     if tenant is not None:
         query = query.where(table.tenant_id == tenant)

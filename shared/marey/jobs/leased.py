@@ -18,7 +18,7 @@ from marey.jobs.types import FailureReason
 LEASED_JOB = sa.text("SELECT job_id FROM lease WHERE token = :token")
 
 HELD_ITEMS = sa.text("""
-    SELECT id, queue, batch_key, solo, attempts, text_key, position FROM item
+    SELECT id, queue, batch_key, solo, attempts, text_key, position, bundle FROM item
     WHERE lease_token = :token AND (CAST(:items AS uuid[]) IS NULL OR id = ANY(CAST(:items AS uuid[])))
     ORDER BY position
     FOR UPDATE
@@ -40,6 +40,7 @@ class LeasedItem:
     attempts: int
     text_key: str
     position: int
+    bundle: str
 
 
 def lock_leased_items(

@@ -10,6 +10,7 @@ from uuid import UUID
 from marey.items.item import ItemSpec
 from marey.jobs.states import ItemStage, ItemState
 from marey.jobs.types import FailureReason, JsonObject
+from marey.vocabulary.scope import ScopePolicy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +27,8 @@ class ClaimedItem(ItemSpec):
     seed: int
     settings: JsonObject
     attempts: int
+    scope: JsonObject | None = None
+    """Scope of the prompt (`marey.vocabulary.scope.Scope.as_json`); None = not examined."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Claim:
     items: tuple[ClaimedItem, ...]
     traceparent: str | None = None
     """`traceparent` of the submitting request."""
+    scope: ScopePolicy = "ignore"
+    """The job's treatment of prompts with unknown actions."""
 
 
 @dataclass(frozen=True)
@@ -130,12 +135,22 @@ class NewMotion:
 
 
 @dataclass(frozen=True)
+class PromptScope:
+    """The encoder's verdict on the scope of a prompt, under its key (`marey.text.keys.scope_key`)."""
+
+    key: str
+    scope: JsonObject
+
+
+@dataclass(frozen=True)
 class NewText:
     """Text features of one item's prompt."""
 
     item: UUID
     key: str
     blob: bytes
+    scope: PromptScope | None = None
+    """The encoder's verdict; None = the words decided."""
 
 
 @dataclass(frozen=True)

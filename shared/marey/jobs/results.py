@@ -110,7 +110,7 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText]) -> Committed:
     """Store text features and move their items to the stage `generate`.
 
-    Ready items of the same job with the same key move with them.
+    Ready items of the same job, key and bundle move with them, and get the same scope.
     """
     leased = lock_lease(conn, lease_token, [text.item for text in texts])
     if leased is None:
@@ -123,7 +123,8 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
         blobs = {text.key: text.blob for text in done}
         rows = [{"key": key, "blob": blobs[key]} for key in sorted(blobs)]  # in order: two commits may share keys
         conn.execute(insert(tables.text_features).values(rows).on_conflict_do_nothing())
-        _leave_text_stage(conn, leased.job, [text.item for text in done], list(blobs))
+        siblings = _leave_text_stage(conn, leased.job, [leased.items[text.item] for text in done])
+        _store_scopes(conn, done, siblings)
         drop_empty_lease(conn, lease_token)
     return leased.committed([text.item for text in texts])
 
@@ -228,19 +229,34 @@ def _store(
     return found
 
 
-def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID], keys: Sequence[str]) -> None:
+def _store_scopes(conn: sa.Connection, texts: Sequence[NewText], siblings: Mapping[UUID, Sequence[UUID]]) -> None:
+    """Store verdicts of the encoder, for later jobs and on the items of each text."""
+    judged = [(text, text.scope) for text in texts if text.scope is not None]
+    if not judged:
+        return
+    rows = {scope.key: {"key": scope.key, "text_key": text.key, "scope": scope.scope} for text, scope in judged}
+    ordered = [rows[key] for key in sorted(rows)]  # as the features: two commits may share keys
+    conn.execute(insert(tables.prompt_scope).values(ordered).on_conflict_do_nothing())
     table = tables.item
+    for text, scope in judged:
+        ids = [text.item, *siblings[text.item]]
+        conn.execute(sa.update(table).where(among(table.c.id, ids)).values(scope=dict(scope.scope)))
+
+
+def _leave_text_stage(conn: sa.Connection, job: LockedJob, done: Sequence[LeasedItem]) -> dict[UUID, list[UUID]]:
+    """Move items on, with ready ones of the same text and bundle; return the latter by the item they follow."""
+    table = tables.item
+    items, keys = [item.id for item in done], list({item.text_key for item in done})
+    leaders = {(item.text_key, item.bundle): item.id for item in done}
     waiting = (
         (table.c.job_id == job.id)
         & (table.c.state == ItemState.READY)
         & (table.c.stage == ItemStage.TEXT)
         & among(table.c.text_key, keys)
     )
-    siblings = conn.execute(
-        sa.select(table.c.id, table.c.queue, table.c.batch_key, table.c.solo, table.c.run_after)
-        .where(waiting)
-        .with_for_update()
-    ).all()
+    columns = (table.c.id, table.c.queue, table.c.batch_key, table.c.solo, table.c.run_after)
+    found = conn.execute(sa.select(*columns, table.c.text_key, table.c.bundle).where(waiting).with_for_update())
+    siblings = [row for row in found if (row.text_key, row.bundle) in leaders]
     lanes = returned((row.queue, row.batch_key, row.solo) for row in siblings if row.run_after is None)
     change_lanes(conn, job.id, {lane: LaneChange(-gain.ready, -gain.solo) for lane, gain in lanes.items()})
     moved = conn.execute(
@@ -262,6 +278,10 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
     change_lanes(conn, job.id, returned((row.queue, row.batch_key, False) for row in moved))
     event = NewEvent("progress", f"{len(moved)} prompts parsed", data={"items": 0, "prompts": len(moved)})
     record(conn, job, [event], moved={(ItemState.LEASED, ItemState.READY): len(items)})
+    followers: dict[UUID, list[UUID]] = {item: [] for item in items}
+    for row in siblings:
+        followers[leaders[row.text_key, row.bundle]].append(row.id)
+    return followers
 
 
 def _fail(conn: sa.Connection, item: LeasedItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:

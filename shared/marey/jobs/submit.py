@@ -6,6 +6,7 @@ import itertools
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from operator import attrgetter
 from typing import cast
 from uuid import UUID
@@ -28,11 +29,13 @@ from marey.jobs.types import (
     PRIORITY_LIMIT,
     SEED_LIMIT,
     TEXT_QUEUE,
+    JsonObject,
     NewItem,
     NewJob,
     SubmittedJob,
 )
 from marey.tenants.quotas import check_queue, reserve_quotas
+from marey.vocabulary.scope import ScopePolicy
 
 CHUNK = 2000  # items per COPY chunk, and keys per look-up
 
@@ -51,8 +54,8 @@ COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Id
 def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     """Write a job and its items; the relay is notified when the transaction commits.
 
-    Items with known text features skip the text stage. With an idempotency key, a second submit of the same body
-    within 24 hours returns the first one's job, `replayed`.
+    Items with known text features skip the text stage, unless its encoder has to decide their scope. With an
+    idempotency key, a second submit of the same body within 24 hours returns the first one's job, `replayed`.
 
     Raises:
         InvalidInput: no items, or a value out of its range; nothing is written (roll the transaction back).
@@ -85,7 +88,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
             scope=job.scope,
         )
     )
-    lanes = write_items(conn, identifier, job.items)
+    lanes = write_items(conn, identifier, job.items, scope=job.scope)
     total = sum(lanes.values())
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
@@ -112,19 +115,31 @@ def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob
     return SubmittedJob(made, replayed=True, items=total)
 
 
-def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0) -> Counter[Lane]:
+def write_items(
+    conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0, scope: ScopePolicy = "ignore"
+) -> Counter[Lane]:
     """COPY the items in chunks, with positions from `first` on; return the size of each lane. The caller updates
-    counters and lanes."""
+    counters and lanes.
+
+    Args:
+        scope: policy of the job; the text stage refuses what its encoder finds unknown, known verdicts or not.
+    """
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock_shared(TEXTS_LOCK)))
     lanes: Counter[Lane] = Counter()
     connection = cast("psycopg.Connection", conn.connection.driver_connection)
     positions = itertools.count(first)
     for chunk in _chunks(items):
         known = _known_texts(conn, {item.text_key for item in chunk}) | {NO_TEXT}
+        scopes = _known_scopes(conn, {item.scope_key for item in chunk if item.scope_key is not None}, scope)
         with connection.cursor() as cursor, cursor.copy(COPY) as copy:
             for item, position in zip(chunk, positions, strict=False):
                 _check_item(item)
-                stage = ItemStage.GENERATE if item.text_key in known else ItemStage.TEXT
+                ready = item.text_key in known
+                if item.scope_key is not None:
+                    verdict = scopes.get(item.scope_key)
+                    ready = ready and verdict is not None
+                    item = replace(item, scope=verdict or item.scope)
+                stage = ItemStage.GENERATE if ready else ItemStage.TEXT
                 lane = (TEXT_QUEUE, item.text_batch_key) if stage is ItemStage.TEXT else (item.model, item.batch_key)
                 lanes[lane] += 1
                 copy.write_row(_row(item, job, position, stage, lane))
@@ -153,6 +168,14 @@ def _row(item: NewItem, job: UUID, position: int, stage: ItemStage, lane: Lane) 
 def _known_texts(conn: sa.Connection, keys: set[str]) -> set[str]:
     table = tables.text_features.c
     return set(conn.execute(sa.select(table.key).where(among(table.key, keys))).scalars())
+
+
+def _known_scopes(conn: sa.Connection, keys: set[str], policy: ScopePolicy) -> dict[str, JsonObject]:
+    """Return verdicts of earlier text stages by their keys; under `refuse` without those that it refuses."""
+    table = tables.prompt_scope.c
+    query = sa.select(table.key, table.scope).where(among(table.key, keys))
+    found = {row.key: row.scope for row in conn.execute(query)} if keys else {}
+    return {key: scope for key, scope in found.items() if policy != "refuse" or scope["verdict"] != "unknown"}
 
 
 def _check_item(item: NewItem) -> None:

@@ -199,6 +199,16 @@ text_features = sa.Table(
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
 )
 
+# Verdicts of the encoder, by prompt, vocabulary and bundle; erased with the text features of the same prompt.
+prompt_scope = sa.Table(
+    "prompt_scope",
+    metadata,
+    sa.Column("key", sa.Text, primary_key=True),
+    sa.Column("text_key", sa.Text, nullable=False, index=True),
+    sa.Column("scope", JSONB, nullable=False),
+    sa.Column("created_at", Time, nullable=False, server_default=NOW),
+)
+
 job_event = sa.Table(
     "job_event",
     metadata,

@@ -63,6 +63,8 @@ class NewItem(ItemSpec):
         settings: the handler's settings (steps, guidance, fps, formats, …).
         replaces: replaced motion of a re-roll.
         scope: of the prompt, as `marey.vocabulary.scope.Scope.as_json`; None = not examined.
+        scope_key: key of the encoder's verdict (`marey.text.keys.scope_key`), which the text stage gives; None = the
+            words decide.
     """
 
     index: int
@@ -76,6 +78,7 @@ class NewItem(ItemSpec):
     settings: JsonObject = field(default_factory=dict[str, object])
     replaces: UUID | None = None
     scope: JsonObject | None = None
+    scope_key: str | None = None
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,7 @@ class Committer(threading.Thread):
             self._write_motions(lease, motions)
         for score in (outcome for outcome in group if isinstance(outcome, Scored)):
             self._write_score(lease, score)
-        texts = [NewText(o.item, o.key, o.blob) for o in group if isinstance(o, TextDone)]
+        texts = [NewText(o.item, o.key, o.blob, o.scope) for o in group if isinstance(o, TextDone)]
         if texts:
             self._commit(lease, "texts", lambda conn, token: commit_texts(conn, token, texts))
         failures = [

@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeAlias
 from uuid import UUID
 
 from marey.core.errors import MareyError
-from marey.jobs.leases import Claim, ClaimedItem
+from marey.jobs.leases import Claim, ClaimedItem, PromptScope
 from marey.runtime.scoring import ScoreInput
 
 
@@ -83,6 +83,8 @@ class TextDone:
     item: UUID
     key: str
     blob: bytes
+    scope: PromptScope | None = None
+    """The encoder's verdict on the prompt; None = the words decided."""
 
 
 @dataclass(frozen=True)

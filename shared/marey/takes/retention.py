@@ -75,6 +75,11 @@ FORGET_TEXTS = sa.text("""
     WHERE key = ANY(:keys) AND NOT EXISTS (SELECT FROM item WHERE item.text_key = text_features.key)
 """)
 
+FORGET_SCOPES = sa.text("""
+    DELETE FROM prompt_scope
+    WHERE text_key = ANY(:keys) AND NOT EXISTS (SELECT FROM item WHERE item.text_key = prompt_scope.text_key)
+""")
+
 
 class FileStore(ObjectStore, Protocol):
     """Methods of an asset store that rewriting files needs (`marey.storage.AssetStore` fits)."""
@@ -215,6 +220,7 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     # A concurrent submit may have seen these features and rely on them: wait for it, then check.
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
     conn.execute(FORGET_TEXTS, {"keys": list(keys)})
+    conn.execute(FORGET_SCOPES, {"keys": list(keys)})
     record(conn, job, [NewEvent("erased", f"prompts erased by {by}")])
 
 

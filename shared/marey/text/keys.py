@@ -8,11 +8,15 @@ import json
 from marey.bundles import TextSpec, find_bundle
 from marey.core.errors import InvalidBundle
 from marey.core.settings import Settings, settings
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import VERSION, ActionLists
 
 PIPELINE_VERSION = 5
 """Raise it when the graph, the actions or the features of the same prompt change for any reason but weights."""
 REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
+MEANING_VERSION = 1
+"""Raise it when `marey.text.meaning` judges the same prompt otherwise for any reason but the vocabulary."""
 NO_LABELLER = "none"
 """A spec may say so: graphs are the motion node alone."""
 
@@ -40,6 +44,19 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
         [spec.encoder, spec.encoder_sha256, spec.width, spec.node_features],
         [spec.max_actions, spec.max_specifics, spec.in_order],
     ]
+    return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
+
+
+def scope_key(prompt: str, bundle: str, lists: ActionLists) -> str:
+    """Return the key under which the encoder's verdict of a prompt is stored.
+
+    Args:
+        prompt: as `check_prompt` returns it.
+        bundle: the exact bundle, which names the encoder.
+        lists: its actions.
+    """
+    actions = [lists.supported, lists.single_take, lists.tried]
+    parts = [VERSION, MEANING_VERSION, load_vocabulary().sha256, bundle, actions, prompt]
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 

@@ -56,6 +56,21 @@ class PhraseFinder:
         proper = [match for match in found if match.end - match.start > 1 or words[match.start].base not in manner]
         return [match for match in proper or found if not self._hypothetical(words, match)]
 
+    def names_person(self, words: list[Word]) -> bool:
+        """Return True if a person, or a part of one, is among the words."""
+        people = self._lists.people | self._lists.plural_people
+        return any(word.text in people or word.base in people for word in words)
+
+    def may_be_things(self, words: list[Word], found: list[Match]) -> bool:
+        """Return True if every phrase is a single noun ("a bow", "run of stairs"), and no person is named."""
+        return not self.names_person(words) and all(self._may_be_thing(words, match) for match in found)
+
+    def _may_be_thing(self, words: list[Word], match: Match) -> bool:
+        if match.end - match.start > 1 or not any(meaning.noun for meaning in match.meanings):
+            return False
+        before_of = match.end < len(words) and words[match.end].text == "of"
+        return not self.is_verb(words, match.start) or (match.start == 0 and before_of)
+
     def is_verb(self, words: list[Word], at: int) -> bool:
         """Return True if a word may be a verb here: not behind an article, a preposition or another verb."""
         text = words[at].text

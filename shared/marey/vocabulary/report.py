@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
@@ -15,6 +15,8 @@ MAX_SHOWN = 60
 """Characters of a prompt in a message."""
 MAX_NAMED = 20
 """Actions that a message names."""
+MAX_LEFT = 64
+"""Undecided prompts that a report keeps: as many as the text service judges at a time."""
 MAX_BUNDLES = 3
 """Bundles whose actions a message names."""
 
@@ -52,7 +54,7 @@ class ScopeExample:
 
 @dataclass
 class ScopeReport:
-    """Scopes of the prompts of one input, by words alone.
+    """Scopes of the prompts of one input, by words, and by the encoder where its verdicts are given.
 
     Attributes:
         total: prompts.
@@ -60,6 +62,8 @@ class ScopeReport:
         flags: prompts with each flag.
         unlisted: prompts for bundles that list no actions; they have no verdict.
         known: actions that each bundle knows which got an `unknown` prompt.
+        decided: the encoder's verdicts, by bundle and prompt.
+        left: the first prompts that the words leave undecided and that have no such verdict, by bundle.
     """
 
     total: int = 0
@@ -67,6 +71,8 @@ class ScopeReport:
     flags: Counter[str] = field(default_factory=Counter[str])
     unlisted: int = 0
     known: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    decided: Mapping[tuple[str, str], Scope] = field(default_factory=dict[tuple[str, str], Scope])
+    left: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     _noted: Counter[str] = field(default_factory=Counter[str])
     """Prompts with each flag that are not `unknown` anyway."""
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
@@ -83,7 +89,9 @@ class ScopeReport:
         if lists is None:
             self.unlisted += 1
             return None
-        scope = match_scope(prompt, lists)
+        scope = self.decided.get((bundle, prompt)) or match_scope(prompt, lists)
+        if scope.left is not None:
+            self._leave(bundle, prompt)
         verdict = scope.verdict
         self.counts[verdict] += 1
         if verdict == "unknown" and len(self.known) < MAX_BUNDLES:
@@ -97,6 +105,10 @@ class ScopeReport:
                 self._add(flag, index, prompt, scope)
         return scope
 
+    def _leave(self, bundle: str, prompt: str) -> None:
+        if sum(map(len, self.left.values())) < MAX_LEFT and prompt not in self.left.get(bundle, ()):
+            self.left.setdefault(bundle, []).append(prompt)
+
     def _add(self, kind: str, index: int, prompt: str, scope: Scope) -> None:
         examples = self._examples.setdefault(kind, [])
         if len(examples) < MAX_EXAMPLES:
@@ -107,7 +119,7 @@ class ScopeReport:
     def as_json(self) -> dict[str, Any]:
         """Return the report as the API answers it."""
         return {
-            "by": "words",
+            "by": "encoder" if self.decided and not self.left else "words",
             **{verdict: self.counts[verdict] for verdict in get_args(Verdict)},
             "unlisted": self.unlisted,
             "flags": dict(self.flags),

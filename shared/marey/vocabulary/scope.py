@@ -1,13 +1,13 @@
 """Scope of a prompt by its words: which actions it names, and whether a bundle knows them.
 
-No network and no labeller: `submit` runs this on every prompt, in the client and in the server. It sees words alone;
-the text stage judges by meaning where it runs.
+No network and no labeller: `submit` runs this on every prompt, in the client and in the server. It sees words alone,
+and says which prompts they leave undecided (`Scope.left`); `marey.text.meaning` decides those in the text stage.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, get_args
 
@@ -24,6 +24,10 @@ was trained on it, with less than 80 % adherence; `unknown`: none of these."""
 ScopePolicy = Literal["warn", "refuse", "ignore"]
 """Treatment of prompts with an unknown action: accepted with a warning, refused, or not examined."""
 POLICIES: tuple[ScopePolicy, ...] = get_args(ScopePolicy)
+
+Left = Literal["noun", "verb"]
+"""Kinds of prompts that the words leave undecided. `noun`: a noun that names an action may stand for a thing ("a bow");
+`verb`: a person does something in a verb that is in no list."""
 
 VERSION = 1
 MAX_TEXT = 200
@@ -79,10 +83,17 @@ class NamedAction:
 
 @dataclass(frozen=True)
 class Scope:
-    """Scope of one prompt."""
+    """Scope of one prompt.
+
+    Attributes:
+        by: `words`, or `encoder` where the words left it undecided.
+        left: what the words leave undecided; None = nothing, or the encoder has decided it.
+    """
 
     actions: tuple[NamedAction, ...]
     flags: tuple[Flag, ...] = ()
+    by: Literal["words", "encoder"] = "words"
+    left: Left | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -93,11 +104,17 @@ class Scope:
         """Return the record that items and manifests store."""
         return {
             "version": VERSION,
-            "by": "words",
+            "by": self.by,
             "verdict": self.verdict,
             "actions": [action.as_json() for action in self.actions],
             "flags": list(self.flags),
         }
+
+
+def read_scope(record: Mapping[str, Any]) -> Scope:
+    """Return the scope that `Scope.as_json` wrote."""
+    actions = (NamedAction(**action) for action in record["actions"])
+    return Scope(tuple(actions), tuple(record["flags"]), by=record["by"])
 
 
 class ScopeMatcher:
@@ -118,9 +135,17 @@ class ScopeMatcher:
         flags = list(self._flagger.details(words, found))
         foreign = self._flagger.foreign(words, found)
         if foreign is not None or not found:
-            nothing = NamedAction(prompt[:MAX_TEXT], "unknown")
-            return Scope((nothing,), (*flags, foreign or "no-action"))
-        return Scope(tuple(_unique(self._named(words, match, lists) for match in found)), tuple(flags))
+            left = "verb" if foreign is None and self._phrases.names_person(words) else None
+            return Scope((_nothing(prompt),), (*flags, foreign or "no-action"), left=left)
+        named = tuple(_unique(self._named(words, match, lists) for match in found))
+        scope = Scope(named, tuple(flags))
+        ambiguous = scope.verdict != "unknown" and self._phrases.may_be_things(words, found)
+        return replace(scope, left="noun") if ambiguous else scope
+
+    def read_as(self, prompt: str, action: str, lists: ActionLists) -> Scope:
+        """Return the scope of a prompt in which the words name no action, read as this one."""
+        flags: list[Flag] = [flag for flag in self.match(prompt, lists).flags if flag != "no-action"]
+        return Scope((self._judged(prompt[:MAX_TEXT], Meaning(action, near=True), lists),), tuple(flags), by="encoder")
 
     def _named(self, words: list[Word], match: Match, lists: ActionLists) -> NamedAction:
         """Return the best of a phrase's meanings."""
@@ -138,6 +163,11 @@ class ScopeMatcher:
             return NamedAction(text, "tried", name)
         read_as = next((kind for kind in self._vocabulary.kinds(name) if lists.knows(kind)), None)
         return NamedAction(text, "close" if read_as else "unknown", name, read_as)
+
+
+def _nothing(prompt: str) -> NamedAction:
+    """Return what stands for the action of a prompt that names none."""
+    return NamedAction(prompt[:MAX_TEXT], "unknown")
 
 
 def _unique(named: Iterable[NamedAction]) -> Iterator[NamedAction]:
@@ -163,6 +193,16 @@ def match_scope(prompt: str, lists: ActionLists) -> Scope:
         lists: actions of the bundle that will read it.
     """
     return _matcher().match(prompt, lists)
+
+
+def match_as(prompt: str, action: str, lists: ActionLists) -> Scope:
+    """Return the scope of a prompt whose words name no action, read as an action of the vocabulary."""
+    return _matcher().read_as(prompt, action, lists)
+
+
+def match_as_thing(scope: Scope, prompt: str) -> Scope:
+    """Return the scope of a prompt whose nouns name things and no action."""
+    return Scope((_nothing(prompt),), (*scope.flags, "no-action"), by="encoder")
 
 
 def read_policy(text: str) -> ScopePolicy:

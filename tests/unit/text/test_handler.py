@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from uuid import UUID, uuid4
 
@@ -12,18 +13,19 @@ import pytest
 from marey.bundles import BundleWriter, TextSpec
 from marey.core.errors import InvalidBundle
 from marey.jobs import Claim, ClaimedItem, ItemStage
-from marey.runtime.handler import Batch, Failed, TextDone
+from marey.runtime.handler import Batch, Failed, Outcome, TextDone
 from marey.text.features import TextFeatures
-from marey.text.keys import feature_key, resolve
+from marey.text.keys import feature_key, resolve, scope_key
 from marey.text_service.handler import TextHandler, create_handler
+from marey.vocabulary.scope import ActionLists, ScopePolicy
 
 
-def write_bundle(path: Path, text: TextSpec | None) -> str:
+def write_bundle(path: Path, text: TextSpec | None, actions: ActionLists | None = None) -> str:
     with BundleWriter(path) as writer:
         writer.add_part("masked", {"weight": np.zeros((1, 1), np.float32)})
         writer.finish(
             name=path.name, version="1", kind="generator", model="hgm3", config="tiny", parameters={}, text=text,
-            licence="MIT",
+            licence="MIT", actions=actions,
         )  # fmt: skip
     return str(path)
 
@@ -121,3 +123,53 @@ def test_a_bundle_of_other_weights_is_refused_on_loading(tmp_path: Path) -> None
     path = write_bundle(tmp_path / "other", TextSpec(encoder_sha256="0" * 64))
     with pytest.raises(InvalidBundle, match="trained with encoder"):
         create_handler().load(path)
+
+
+# --- scope ---
+
+LISTS = ActionLists(("walk", "bow", "wave"), tried=("kick",))
+
+
+@pytest.fixture(scope="module")
+def listed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return write_bundle(tmp_path_factory.mktemp("models") / "listed", TextSpec(), LISTS)
+
+
+def judge(bundle: str, policy: ScopePolicy, *prompts: str) -> list[Outcome]:
+    made = create_handler()
+    made.load(bundle)
+    claimed = tuple(replace(item, bundle=bundle) for item in items(*prompts))
+    claim = Claim(
+        uuid4(), "default", uuid4(), "text", ItemStage.TEXT, "key", bundle, solo=False, items=claimed, scope=policy
+    )
+    return list(made.run(Batch(claim, claimed, {}), FakeControl()))
+
+
+def test_the_encoder_decides_what_the_words_leave(listed: str) -> None:
+    thing, act, clear = judge(listed, "warn", "a wave of nausea", "a low bow", "a person walks")
+    assert isinstance(thing, TextDone)
+    assert thing.scope is not None
+    assert (thing.scope.scope["by"], thing.scope.scope["verdict"]) == ("encoder", "unknown")
+    assert thing.scope.key == scope_key("a wave of nausea", listed, LISTS)
+    assert isinstance(act, TextDone)
+    assert act.scope is not None
+    assert act.scope.scope["verdict"] == "known"
+    assert isinstance(clear, TextDone)
+    assert clear.scope is None
+
+
+def test_refuse_fails_what_the_encoder_finds_unknown_for_good(listed: str) -> None:
+    failed, done = judge(listed, "refuse", "a wave of nausea", "a low bow")
+    assert isinstance(failed, Failed)
+    assert (failed.retryable, failed.problem.problem_type) == (False, "out-of-scope")
+    named = "names an action that the model does not know: 'a wave of nausea' (no-action)"
+    assert failed.problem.message == f"the prompt {named}"
+    assert failed.problem.hint == "listed knows: walk, bow, wave."
+    assert isinstance(done, TextDone)
+
+
+def test_prompts_that_are_not_examined_and_bundles_without_lists_get_no_verdict(listed: str, bundle: str) -> None:
+    for path, policy in ((listed, "ignore"), (bundle, "warn")):
+        (done,) = judge(path, policy, "a wave of nausea")
+        assert isinstance(done, TextDone)
+        assert done.scope is None

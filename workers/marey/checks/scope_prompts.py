@@ -1,23 +1,25 @@
 """Prompts for measuring scope, in sets by different authors: eight classes, one of them in scope.
 
-`development` is by the author of the words in `marey.vocabulary`; other sets are by other authors and are never used
-for choosing words.
+`development` is by the author of the words in `marey.vocabulary`, and so is `meaning`, for the limits of the encoder's
+verdict; `test` is by another author and is never used for choosing words or limits.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from marey.vocabulary.scope import ActionLists, Scope, match_scope
 
-ScopeSet = Literal["development", "test"]
+ScopeSet = Literal["development", "meaning", "test"]
 IN_SCOPE = "in-scope"
 OBJECTS = "objects"
 """Classes with rules of their own; the prompts of all others are out of scope."""
+Matcher = Callable[[str, ActionLists], Scope]
+"""Judges a prompt: `match_scope`, or `marey.text.meaning.MeaningJudge.judge`."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,14 @@ def scope_prompts(which: ScopeSet) -> tuple[ScopePrompt, ...]:
     return (*outside, *(ScopePrompt(text, IN_SCOPE, action) for text, action in named))
 
 
-def scope_rates(prompts: Sequence[ScopePrompt], lists: ActionLists) -> list[ScopeRate]:
+def scope_rates(prompts: Sequence[ScopePrompt], lists: ActionLists, match: Matcher = match_scope) -> list[ScopeRate]:
     """Return the rate of each class under a bundle's lists."""
-    groups = list(dict.fromkeys(prompt.group for prompt in prompts))
-    return [_rate(group, [prompt for prompt in prompts if prompt.group == group], lists) for group in groups]
+    groups = dict.fromkeys(prompt.group for prompt in prompts)
+    return [_rate(group, [prompt for prompt in prompts if prompt.group == group], lists, match) for group in groups]
 
 
-def _rate(group: str, prompts: Sequence[ScopePrompt], lists: ActionLists) -> ScopeRate:
-    right = sum(is_right(prompt, match_scope(prompt.text, lists)) for prompt in prompts)
+def _rate(group: str, prompts: Sequence[ScopePrompt], lists: ActionLists, match: Matcher) -> ScopeRate:
+    right = sum(is_right(prompt, match(prompt.text, lists)) for prompt in prompts)
     return ScopeRate(group, len(prompts), right)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
 from marey.registry import get_model, resolve
+from marey.vocabulary.scope import ActionLists, Scope, match_scope
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -42,7 +43,9 @@ class OneShot:
             NotFound, InvalidBundle: weights are missing or damaged.
         """
         try:
+            from marey.bundles.scope import judges_meaning
             from marey.text.keys import as_served
+            from marey.text.meaning import MeaningJudge
             from marey.text.pipeline import TextPipeline
 
             load = resolve(get_model(bundle.manifest.model, where=str(bundle.path)).load)
@@ -52,8 +55,17 @@ class OneShot:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
+        self._judge = MeaningJudge(self._text.pooled) if judges_meaning(bundle.manifest.text) else None
         threads = config.threads or max(1, len(os.sched_getaffinity(0)))
         self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads)
+
+    def match_scope(self, prompt: str, lists: ActionLists) -> Scope:
+        """Return the scope of a prompt: by its words, and by its meaning where they leave it undecided."""
+        return match_scope(prompt, lists) if self._judge is None else self._judge.judge(prompt, lists)
+
+    def _scope(self, prompt: str) -> dict[str, Any] | None:
+        lists = self.bundle.manifest.actions
+        return None if lists is None else self.match_scope(prompt, lists).as_json()
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
         """Yield each motion with its seconds of computation, in the order given.
@@ -67,7 +79,7 @@ class OneShot:
         features = self._text.features([w.prompt for w in wanted])
         fps = self._generator.limits.fps
         requests = [
-            Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps))
+            Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps), scope=self._scope(w.prompt))
             for w, text in zip(wanted, features, strict=True)
         ]
         requests = [self._generator.resolve_length(request) for request in requests]

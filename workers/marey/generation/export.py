@@ -31,7 +31,11 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
         "rewritten": text.rewritten,
         **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
         "graph": text.graph.to_json(),
-        **({} if lists is None or recording else {"scope": match_scope(text.prompt, lists).as_json()}),
+        **(
+            {}
+            if lists is None or recording
+            else {"scope": dict(request.scope or match_scope(text.prompt, lists).as_json())}
+        ),
         "model": bundle.manifest.model,
         "bundle": bundle.reference,
         "weights_sha256": bundle.weights_sha256,

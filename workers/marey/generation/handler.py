@@ -116,7 +116,7 @@ class GeneratorHandler(Generic[S]):
         frames = None if item.seconds is None else round(item.seconds * fps)
         recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
-        return Request(text, item.seed, frames, recording)
+        return Request(text, item.seed, frames, recording, item.scope)
 
 
 class _Rows:

@@ -27,6 +27,7 @@ class Request:
     seed: int
     frames: int | None = None  # at the model's fps; None = the model decides
     recording: StreamRecording | None = None  # of a live stream: tokens exist, only decoding is left
+    scope: Mapping[str, Any] | None = None  # of the prompt, for the manifest; None = by its words
 
 
 @dataclass(frozen=True)

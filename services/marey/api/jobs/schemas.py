@@ -105,7 +105,7 @@ class ScopeView(View):
 
     version: int
     by: str
-    """`words`: judged by the words of the prompt alone."""
+    """`words`: judged by the words of the prompt; `encoder`: by its meaning, where the words leave it undecided."""
     verdict: Verdict
     """The worst of its actions."""
     actions: list[NamedActionView]

@@ -22,7 +22,7 @@ SHOWN = 0.5
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
-    from marey.cli.roles.generating import Wanted
+    from marey.cli.roles.generating import OneShot, Wanted
     from marey.core.settings import Settings
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
@@ -81,11 +81,13 @@ def generate(
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)
-    _examine(reader, items, chosen, scope)
+    if scope is options.ScopeOption.REFUSE:
+        _refuse(reader, items, chosen)
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
     studio = OneShot(chosen, config)
+    _examine(reader, items, studio, scope)
     if chosen.manifest.random:
         console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")
     with console.bar() as bar:
@@ -177,24 +179,36 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
     return reader.located(problems)
 
 
-def _examine(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, policy: options.ScopeOption) -> None:
-    """Refuse prompts that the bundle does not know, or warn of them.
+def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, studio: OneShot | None = None) -> None:
+    """Refuse prompts that the bundle does not know; by words alone before it is loaded.
 
     Raises:
-        OutOfScope: with every such prompt, under `refuse`.
-        InvalidInput: the bundle lists no actions, under `refuse`.
+        OutOfScope: with every such prompt.
+        InvalidInput: the bundle lists no actions.
     """
     from marey.bundles.scope import refuse_unknown
+    from marey.vocabulary.scope import match_scope
+
+    lines = ((line, item.prompt, bundle) for line, item in zip(reader.lines, items, strict=True))
+    refuse_unknown(lines, where=reader.where, match=match_scope if studio is None else studio.match_scope)
+
+
+def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: options.ScopeOption) -> None:
+    """Refuse prompts that the bundle does not know, or warn of them, by words and meaning."""
     from marey.vocabulary.report import ScopeReport
 
+    manifest = studio.bundle.manifest
+    if policy is options.ScopeOption.IGNORE:
+        return
     if policy is options.ScopeOption.REFUSE:
-        lines = zip(reader.lines, items, strict=True)
-        refuse_unknown(((line, item.prompt, bundle) for line, item in lines), where=reader.where)
-    if policy is not options.ScopeOption.IGNORE:
-        report = ScopeReport()
-        for item in items:
-            report.judge(item.prompt, bundle.manifest.name, bundle.manifest.actions)
-        console.warn_all(report.warnings())
+        _refuse(reader, items, studio.bundle, studio)
+    report = ScopeReport()
+    if manifest.actions is not None:
+        scopes = {item.prompt: studio.match_scope(item.prompt, manifest.actions) for item in items}
+        report.decided = {(manifest.name, prompt): scope for prompt, scope in scopes.items()}
+    for item in items:
+        report.judge(item.prompt, manifest.name, manifest.actions)
+    console.warn_all(report.warnings())
 
 
 def _one_model(items: Iterable[Item], default: str) -> str:

@@ -48,7 +48,7 @@ class Scope(Result):
     """The scope of a prompt: what it names, compared with what the bundle supports.
 
     Attributes:
-        by: `words`: judged by the words of the prompt alone.
+        by: `words`, or `encoder` where the words leave it undecided.
         verdict: the worst of its actions.
         flags: such as negation, objects, counts, other-language.
     """
