@@ -315,6 +315,18 @@ def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
     assert {c.dataset for c in PreparedData.open(tmp_path / "out").clips} == {"cmu"}
 
 
+@pytest.mark.parametrize(("idles_of", "lengthened"), [("g1_moves", True), ("hdm05", False)])
+def test_a_short_action_without_an_idle_in_its_set_stands_between_those_of_its_tier(tmp_path, idles_of, lengthened):
+    """`cmu` and `g1_moves` allow commercial use, `hdm05` wants weights to be shared alike."""
+    terms = [known_set(name).terms for name in ("cmu", idles_of)]
+    action = PackClip("hand", "cmu", "raise-arm", "", "train", 0, 0, source="hand")
+    idle = PackClip("idle", idles_of, "idle", "", "train", 0, 0, source="idle")
+    clips = [(action, raiser("left", 1.2)), (idle, Body(4.0, speed=steady(0.0)).joints())]
+    build([JointsPack.of([(clip, joints.astype(np.float32)) for clip, joints in clips], terms)], tmp_path / "out")
+    (made,) = (clip for clip in PreparedData.open(tmp_path / "out").clips if clip.id == "hand")
+    assert (made.length > 24 + 20) == lengthened
+
+
 def test_a_failed_build_leaves_no_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("marey.data.build.compose", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):

@@ -28,8 +28,9 @@ def test_legs_that_never_touch_the_floor_give_no_travel() -> None:
     assert travelling(on_the_spot(walker(3.0)) + np.array([0.0, 0.3, 0.0])) is None
 
 
-def test_a_cycle_is_repeated_without_a_jump_and_goes_on() -> None:
-    cycle = walker(20.0, cadence=2.0)[20:41]  # two steps of half a second
+@pytest.mark.parametrize("end", [41, 40], ids=["ends as it begins", "ends a frame before"])
+def test_a_cycle_is_repeated_without_a_jump_and_goes_on(end: int) -> None:
+    cycle = walker(20.0, cadence=2.0)[20:end]  # two steps of half a second
     assert closes(cycle)
     longer = repeated(cycle)
     assert len(longer) >= 50
@@ -49,6 +50,10 @@ def test_a_short_action_stands_between_idles_unchanged() -> None:
     local = lambda j: j - j[:, :1] * [1.0, 0.0, 1.0]  # noqa: E731
     peak = int(made[:, 20, 1].argmax()) - int(action[:, 20, 1].argmax())
     assert np.abs(local(made)[peak + 4 : peak + 20] - local(action)[4:20]).max() < 0.01
+
+
+def test_half_a_cycle_does_not_close() -> None:
+    assert not closes(walker(20.0, cadence=2.0)[20:31])
 
 
 def test_nothing_is_put_beside_a_pose_that_no_idle_has() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -94,7 +94,7 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str], speed: float
     idles = _idles(packs)
     for pack in packs:
         for captured in pack.clips:
-            clip, whole = _lengthened(captured, pack.joints(captured), idles)
+            clip, whole = _lengthened(captured, pack.joints(captured), pack.terms_of(captured).tier, idles)
             yield from _windows_of(clip, whole, 1.0, held_out, left_out)
             if speed and clip.split == "train":
                 told = _said(clip, wording.retimed)
@@ -135,20 +135,24 @@ def _windows_of(
 
 
 IDLE = "idle"
+STANCES = (IDLE, "fight-stance")
+Idles = Mapping[tuple[str, str], Sequence[NDArray[np.float32]]]
 
 
-def _idles(packs: Sequence[JointsPack]) -> dict[tuple[str, str], list[NDArray[np.float32]]]:
-    """Joints of the idles of each set and split: what a short clip is put between is of its own terms and split."""
-    found: dict[tuple[str, str], list[NDArray[np.float32]]] = {}
+def _idles(packs: Sequence[JointsPack]) -> Idles:
+    """Joints of what short clips are put between, idles and guards: by data set and split, and by licence tier and
+    split for the clips of a set whose own poses are too far from theirs."""
+    found: defaultdict[tuple[str, str], list[NDArray[np.float32]]] = defaultdict(list)
     for pack in packs:
         for clip in pack.clips:
-            if clip.content == IDLE:
-                found.setdefault((clip.dataset, clip.split), []).append(pack.joints(clip))
+            if clip.content in STANCES:
+                for group in {clip.dataset, pack.terms_of(clip).tier}:
+                    found[group, clip.split].append(pack.joints(clip))
     return found
 
 
 def _lengthened(
-    clip: PackClip, joints: NDArray[np.float32], idles: dict[tuple[str, str], list[NDArray[np.float32]]]
+    clip: PackClip, joints: NDArray[np.float32], tier: str, idles: Idles
 ) -> tuple[PackClip, NDArray[np.float32]]:
     """The clip with travel where it is a gait on the spot, and no shorter than it can be made; see `lengthen`. Sets
     with fixed splits are left as they are."""
@@ -160,8 +164,11 @@ def _lengthened(
         return clip, joints
     if (cyclic or clip.content == IDLE) and closes(joints):
         return _said(clip, wording.repeated), repeated(joints).astype(np.float32)
-    made = between_idles(joints, idles.get((clip.dataset, clip.split), ()), clip.id)
-    return clip, joints if made is None or is_broken(made, FPS) else made.astype(np.float32)
+    for group in (clip.dataset, tier):
+        made = between_idles(joints, idles.get((group, clip.split), ()), clip.id)
+        if made is not None and not is_broken(made, FPS):
+            return clip, made.astype(np.float32)
+    return clip, joints
 
 
 _ONCE = re.compile(r"\b(once|twice|one (shot|blow))\b")

@@ -27,6 +27,7 @@ _STANDS = 0.03  # metres over the floor
 _CARRIERS = (10, 11, 7, 8, 4, 5, 20, 21)  # toes, ankles, knees, wrists
 _IDLE_FRAMES = (10, 24)
 _HELD_FRAMES = 8  # of the first pose, in which the idle goes over into it: the action itself stays as it was captured
+_LEVEL = np.array([1.0, 0.0, 1.0])
 _WORST_SEAM = 0.25  # see `splice.seam_costs`
 
 
@@ -49,18 +50,29 @@ def travelling(joints: Array) -> Array | None:
 
 
 def closes(joints: Array) -> bool:
-    """Return True if the last pose of a clip goes over into its first, travel apart."""
-    local = joints - joints[:, :1] * np.array([1.0, 0.0, 1.0])
-    return bool(np.linalg.norm(local[-1] - local[0], axis=-1).mean() < _CLOSES)
+    """Return True if the last pose of a clip goes over into its first, travel apart: they are the same, or no further
+    apart than one frame from the next."""
+    local = joints - joints[:, :1] * _LEVEL
+    step = np.median(np.linalg.norm(np.diff(local, axis=0), axis=-1).mean(-1))
+    return _gap(joints) < max(_CLOSES, float(step))
 
 
 def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
     """A cycle that closes, gone through until it has so many frames at least; each round goes on where the last one
     ended."""
-    advance = (joints[-1, 0] - joints[0, 0]) * np.array([1.0, 0.0, 1.0])
+    if _gap(joints) >= _CLOSES:  # its last pose is the one before the first
+        step = (joints[-1, 0] - joints[0, 0]) * _LEVEL / (len(joints) - 1)
+        joints = np.concatenate([joints, joints[:1] + step * len(joints)])
+    advance = (joints[-1, 0] - joints[0, 0]) * _LEVEL
     rounds = max(1, -(-(frames - 1) // (len(joints) - 1)))
     pieces = [joints[:-1] + k * advance for k in range(rounds)]
     return np.concatenate([*pieces, joints[-1:] + (rounds - 1) * advance])
+
+
+def _gap(joints: Array) -> float:
+    """Metres between the first pose and the last, travel apart, mean over joints."""
+    local = joints - joints[:, :1] * _LEVEL
+    return float(np.linalg.norm(local[-1] - local[0], axis=-1).mean())
 
 
 def between_idles(joints: Array, idles: Sequence[Array], seed: str) -> Array | None:
