@@ -6,9 +6,9 @@ STAMP  := $(VENV)/.installed
 # A CPU build where pip finds one locally, else the index's own: outside the lock, never hashed.
 TORCH  := torch==2.13.0
 
-# A file of tests at a time, or the folder tests/acceptance/served: its servers start once. Three processes on two cores,
-# because many tests wait. In the order of the folders (acceptance, clients, …, unit): what takes long comes first, and no
-# process ends long before another.
+# A file of tests at a time, or a folder whose tests share a server (tests/conftest.py): it starts once. Three processes
+# on two cores, because many tests wait. In the order of the folders (acceptance, clients, …, unit): what takes long comes
+# first, and no process ends long before another.
 PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate

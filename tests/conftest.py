@@ -53,20 +53,20 @@ def pytest_configure() -> None:
             )
 
 
-SERVED = "tests/acceptance/served/"
-"""The folder whose tests share a server."""
+SERVED = ("tests/acceptance/extended/", "tests/acceptance/served/")
+"""The folders whose tests share a server."""
 
 
 class _ServerAtATime(LoadFileScheduling):
-    """A file of tests in one process, as by `--dist loadfile`, and all files of `SERVED` in the same."""
+    """A file of tests in one process, as by `--dist loadfile`, and all files of a folder of `SERVED` in the same."""
 
     def _split_scope(self, nodeid: str) -> str:
-        return SERVED if nodeid.startswith(SERVED) else super()._split_scope(nodeid)
+        return next(filter(nodeid.startswith, SERVED), None) or super()._split_scope(nodeid)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling | None:
-    """Start the server of `SERVED` once, not in each process."""
+    """Start the server of each folder of `SERVED` once, not in each process."""
     return _ServerAtATime(config, log) if config.getoption("dist") == "loadfile" else None
 
 

@@ -143,6 +143,7 @@ def test_the_map_is_read_as_it_was_written(tmp_path: Path, known: LineMap) -> No
     assert vars(again) == vars(known)
 
 
+@pytest.mark.slow  # of a tool of developers
 def test_mutants_are_judged_by_tests_that_pass_without_them(root: Path, slot: Slot, tmp_path: Path) -> None:
     passes = _Baseline(tmp_path / "baseline.json", root)
 
@@ -159,6 +160,7 @@ def test_mutants_are_judged_by_tests_that_pass_without_them(root: Path, slot: Sl
     assert (root / PRODUCT).read_text() == SOURCE
 
 
+@pytest.mark.slow  # of a tool of developers
 def test_a_new_file_of_tests_is_recorded_on_its_own(root: Path, known: LineMap) -> None:
     known.save(root / "out/map.json")
     new = root / "tests/unit/test_new.py"

@@ -1,7 +1,8 @@
-"""`marey` commands as forks of one process that has imported the libraries and the command line: less CPU for each.
+"""`marey` commands and scripts as forks of one process that has imported the libraries and the command line: less CPU
+for each.
 
 A command is a process of its own, with its arguments, environment, folder and streams, and ends as `python -m
-marey.cli` does.
+marey.cli` or `python SCRIPT` does.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 IMPORTED = (
     *("torch", "numpy", "scipy", "safetensors.torch", "tokenizers", "httpx2", "sqlalchemy", "alembic", "fastapi"),
-    *("marey.cli.main", "marey.client.transport", "marey.core.settings"),
+    *("marey.cli.main", "marey.client.transport", "marey.client.fetching", "marey.core.settings", "rich.progress"),
+    *("marey.generate.oneshot", "marey.text.pipeline", "marey.text.light", "marey.text.minilm_encoder", "marey.db"),
 )
 REPOSITORY = Path(__file__).resolve().parents[2]
 LENGTH = 8
@@ -42,14 +44,28 @@ class Forks:
     connection: socket.socket
 
     def run(
-        self, arguments: Sequence[str], environment: Mapping[str, str], folder: Path, stdin: bytes, timeout: float
+        self,
+        arguments: Sequence[str],
+        environment: Mapping[str, str],
+        folder: Path,
+        stdin: bytes,
+        timeout: float,
+        script: Path | None = None,
     ) -> tuple[int, bytes, bytes]:
         """Run a command to its end; returns its exit code, stdout and stderr.
+
+        Args:
+            script: to run instead of `marey`.
 
         Raises:
             subprocess.TimeoutExpired: it ran for longer than `timeout` seconds, and was killed.
         """
-        asked = {"arguments": list(arguments), "environment": dict(environment), "folder": str(folder)}
+        asked = {
+            "arguments": [str(script or "marey"), *arguments],
+            "environment": dict(environment),
+            "folder": str(folder),
+            "script": script is not None,
+        }
         request = json.dumps(asked).encode()
         with contextlib.ExitStack() as files:
             streams = [files.enter_context(tempfile.TemporaryFile()) for _ in range(3)]
@@ -113,12 +129,12 @@ def _whole(file: int) -> bytes:
     return os.pread(file, os.fstat(file).st_size, 0)
 
 
-def _command(connection: socket.socket) -> bool:
-    """Fork for each request until the tests end; in a fork, take on what was asked for and return True."""
+def _command(connection: socket.socket) -> Callable[[], None] | None:
+    """Fork for each request until the tests end; in a fork, take on what was asked for and return what to run."""
     while True:
         head, files, _, _ = socket.recv_fds(connection, LENGTH, 3)
         if not head:
-            return False
+            return None
         asked = json.loads(_exactly(connection, int.from_bytes(head, "big")))
         process = os.fork()
         if not process:
@@ -128,13 +144,21 @@ def _command(connection: socket.socket) -> bool:
             os.environ.clear()
             os.environ.update(asked["environment"])
             os.chdir(asked["folder"])
-            sys.argv = ["marey", *asked["arguments"]]
-            return True
+            _find_packages()
+            sys.argv = asked["arguments"]
+            return _script if asked["script"] else _marey
         for file in files:
             os.close(file)
         connection.sendall(process.to_bytes(ANSWER, "big", signed=True))
         code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
         connection.sendall(code.to_bytes(ANSWER, "big", signed=True))
+
+
+def _find_packages() -> None:
+    """Find what the environment's `PYTHONPATH` names first, as a new interpreter would: plug-ins of a test."""
+    named = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
+    sys.path[1:] = [*named, *(path for path in sys.path[1:] if path not in named)]
+    importlib.invalidate_caches()
 
 
 _codes: list[int] = []
@@ -149,11 +173,21 @@ def _leave() -> None:
         os._exit(_codes[0])
 
 
-def _run() -> None:
-    """Run `marey` to its end."""
+def _marey() -> None:
+    runpy.run_module("marey.cli", run_name="__main__", alter_sys=True)
+
+
+def _script() -> None:
+    sys.path[0] = str(Path(sys.argv[0]).parent)
+    runpy.run_path(sys.argv[0], run_name="__main__")
+
+
+def _run(command: Callable[[], None]) -> None:
+    """Run a command to its end."""
     _codes.append(1)  # of an exception
     try:
-        runpy.run_module("marey.cli", run_name="__main__", alter_sys=True)
+        command()
+        _codes[0] = 0
     except SystemExit as end:
         _codes[0] = end.code if isinstance(end.code, int) else bool(end.code)
         raise
@@ -167,4 +201,4 @@ if __name__ == "__main__":
     with socket.socket(fileno=int(sys.argv[1])) as link:
         forked = _command(link)
     if forked:
-        _run()
+        _run(forked)

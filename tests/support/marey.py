@@ -27,8 +27,6 @@ from tests.support.models import add_text_bundles, random_bundle
 REPOSITORY = Path(__file__).resolve().parents[2]
 MIGRATIONS = REPOSITORY / "migrations" / "marey" / "migrations"
 COMMAND = (sys.executable, "-m", "marey.cli")
-WHOLE = frozenset({"api", "scheduler", "serve", "stream", "text", "train", "worker"})
-"""Commands that run from the first import on; the others are forks."""
 START_SECONDS = 300.0  # a bound for what hangs; a machine full of other work takes two minutes
 TINY = f"{defaults.MODEL}-tiny"
 
@@ -81,19 +79,8 @@ class Marey:
     ) -> Ran:
         """Run a command to its end."""
         words, content = list(map(str, arguments)), stdin.encode() if isinstance(stdin, str) else stdin
-        if "PYTHONPATH" not in self.environment and not WHOLE.intersection(words[:1]):
-            code, out, err = forks().run(words, self.environ(), REPOSITORY, content, timeout)
-            return Ran(code, out.decode(), err.decode())
-        done = subprocess.run(
-            [*COMMAND, *words],
-            input=content,
-            capture_output=True,
-            cwd=REPOSITORY,
-            env=self.environ(),
-            timeout=timeout,
-            check=False,
-        )
-        return Ran(done.returncode, done.stdout.decode(), done.stderr.decode())
+        code, out, err = forks().run(words, self.environ(), REPOSITORY, content, timeout)
+        return Ran(code, out.decode(), err.decode())
 
     def start(self, *arguments: object) -> subprocess.Popen[bytes]:
         """Start a command and do not wait for it; what it says is thrown away."""

@@ -21,6 +21,11 @@ from tests.support.marey import REPOSITORY
 SECONDS = 120.0
 DEVELOPMENT = Path(sysconfig.get_path("purelib"))
 """Packages of the development environment, without the editable install: a `.pth` file does not read another."""
+INSTALL = (
+    *(str(DEVELOPMENT.parents[2] / "bin" / "uv"), "pip", "install", "-q"),
+    *("--no-deps", "--no-index", "--no-cache", "--no-config"),
+)
+"""Install wheels: those of its arguments alone."""
 CLOSE = """
 import os, sys
 
@@ -103,9 +108,8 @@ def make_environment(folder: Path, wheels: Iterable[Path], *, borrow: bool) -> E
     """
     _run([sys.executable, "-m", "venv", "--without-pip", str(folder)])
     made = Environment(folder)
-    installer = [str(DEVELOPMENT.parents[2] / "bin" / "uv"), "pip", "install", "-q", "--no-deps", "--no-index"]
     if names := [str(wheel) for wheel in wheels]:
-        _run([*installer, "--no-cache", "--no-config", "--python", made.python, *names])
+        _run([*INSTALL, "--python", made.python, *names])
     if borrow:
         (made.packages / "borrowed.pth").write_text(f"{DEVELOPMENT}\n")
     else:
@@ -148,6 +152,11 @@ def _required(packages: Path, name: str) -> list[str]:
 def _run(command: list[str], seconds: float = SECONDS) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def install_into(folder: Path, wheels: Iterable[Path]) -> None:
+    """Install wheels into a folder that is no environment, for a path of Python."""
+    _run([*INSTALL, "--target", str(folder), *map(str, wheels)])
 
 
 def bundles_wheel(family: str, models: Path, folder: Path) -> Path:

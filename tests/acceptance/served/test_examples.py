@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 from marey.motion import load_npz, read_bvh
+from tests.support.forking import forks
 from tests.support.marey import REPOSITORY, TINY, Marey
 
 EXAMPLES = REPOSITORY / "examples"
@@ -14,12 +13,10 @@ EXAMPLES = REPOSITORY / "examples"
 
 def run(marey: Marey, folder: Path, script: str, *arguments: object, code: int = 0, timeout: float = 120) -> str:
     """Run a script in a folder; what it printed, on stderr if it is to fail."""
-    command = [sys.executable, str(EXAMPLES / script), *map(str, arguments)]
-    done = subprocess.run(
-        command, cwd=folder, env=marey.environ(), capture_output=True, text=True, timeout=timeout, check=False
-    )
-    assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
-    return done.stderr if code else done.stdout
+    words, path = list(map(str, arguments)), EXAMPLES / script
+    ended, out, err = forks().run(words, marey.environ(), folder, b"", timeout, script=path)
+    assert ended == code, f"exit {ended}\n{out.decode()}\n{err.decode()}"
+    return (err if code else out).decode()
 
 
 def test_a_csv_is_submitted_and_fetched(elsewhere: Marey, tmp_path: Path) -> None:

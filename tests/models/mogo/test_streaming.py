@@ -60,8 +60,8 @@ def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(confi
 @pytest.mark.parametrize("config", [TINY, JOINT, replace(JOINT, inference=GUIDED.inference)])
 def test_a_session_draws_the_same_tokens_beside_others(config: MOGOConfig) -> None:
     frames = 2 * WINDOW + 5
-    streams = opened(transformer(config), 5)
-    names = {streams.start(said(seed), seed): seed for seed in range(5)}
+    streams = opened(transformer(config), 3)
+    names = {streams.start(said(seed), seed): seed for seed in range(3)}
     for session, found in run(streams, frames).items():
         assert torch.equal(found, alone(names[session], frames, transformer(config)))
 
@@ -77,11 +77,11 @@ def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, 
         streams = opened(model, len(seeds), dtype=dtype, group=group)
         for seed in seeds:
             streams.start(said(seed), seed)
-        run(streams, 8)
+        run(streams, 3)
         return streams.states()
 
     together = states_of(*range(20))
-    for seed in (0, 1, 7, 19):
+    for seed in (0, 7, 19):
         assert torch.equal(states_of(seed)[0], together[seed])
     assert torch.equal(states_of(3, 4, 5), together[3:6])
 

@@ -12,7 +12,7 @@ import pytest
 import torch
 from safetensors.numpy import save
 
-from marey.bundles import Bundle, TextSpec
+from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
 from marey.data.prepared import PreparedData
@@ -22,7 +22,6 @@ from marey.evaluator.config import TINY, EvaluatorConfig
 from marey.evaluator.labels import label_of
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.reference import FILE, RealClips
-from marey.evaluator.sentences import open_encoder
 from marey.evaluator.stage_tmr import TMRStage
 from marey.evaluator.tmr import TMREvaluator
 from marey.evaluator.train import train_stage
@@ -32,6 +31,7 @@ from marey.training.motions import MotionData
 from marey.training.parts import load_part
 from marey.training.staging import TrainOptions
 from tests.support.prepared import farthest_move, write_prepared
+from tests.support.texts import shared_encoder
 
 ACTS = (
     "walk", "run", "wave", "bow", "kick", "punch", "jump", "sit", "stand", "turn",
@@ -49,7 +49,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
 
 @pytest.fixture(scope="module")
 def encoder() -> TextEncoder:
-    return open_encoder(TextSpec())
+    return shared_encoder()
 
 
 def options(prepared: PreparedData, run: Path, steps: int) -> TrainOptions[EvaluatorConfig]:
@@ -104,7 +104,7 @@ def test_the_loss_is_the_weighted_sum_of_its_terms(prepared: PreparedData, encod
 def test_the_evaluator_learns_which_caption_belongs_to_which_motion(prepared: PreparedData, tmp_path: Path) -> None:
     config = replace(TINY, network=replace(TINY.network, width=48, feedforward=96, heads=4))
     config = replace(config, train_tmr=replace(config.train_tmr, batch=32, learning_rate=5e-3))
-    found = train_stage("tmr", replace(options(prepared, tmp_path, 100), config=config))
+    found = train_stage("tmr", replace(options(prepared, tmp_path, 60), config=config))
     assert found["test/distinct_r1"] > 0.4  # 0.03 by chance; the clips are new, the actions are not
     assert found["test/median_rank"] < 5  # of 37; 19 by chance
 

@@ -16,9 +16,9 @@ from marey.text import openai_rewriter
 from marey.text.features import TextFeatures
 from marey.text.keys import as_served, feature_key
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
-from marey.text.pipeline import TextPipeline
 from marey.text.rewriters import NotRewritten
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
+from tests.support.texts import shared_pipeline
 
 PROMPT = "plz make him stroll to the left"
 CAPTION = "A person strolls to the left."
@@ -176,7 +176,7 @@ def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageMode
 def test_neither_key_nor_prompt_is_told_to_the_log(model: LanguageModel, caplog: pytest.LogCaptureFixture) -> None:
     model.answer = lambda asked, before: CompletionReply("", status=401)
     rewriter = rewriter_of(model)
-    pipeline = TextPipeline.load(TextSpec())
+    pipeline = shared_pipeline()
     pipeline.rewriter = rewriter
     with caplog.at_level(logging.DEBUG):
         for number in range(REST_AFTER + 1):
@@ -193,7 +193,7 @@ def test_neither_key_nor_prompt_is_told_to_the_log(model: LanguageModel, caplog:
 def test_a_caption_that_says_something_else_is_not_used(model: LanguageModel, caption: str, reason: str | None) -> None:
     prompt = "he strolls to the left"
     model.answer = lambda asked, before: CompletionReply(caption)
-    pipeline = TextPipeline.load(TextSpec())
+    pipeline = shared_pipeline()
     pipeline.rewriter = rewriter_of(model)
     (features,) = pipeline.features([prompt])
     assert features.prompt == prompt

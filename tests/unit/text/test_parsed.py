@@ -8,20 +8,22 @@ import pytest
 
 from marey.bundles import TextSpec
 from marey.cli.commands import text as command
+from marey.text.loading import load_rewriter
 from marey.text.parsed import NO_ACTION
 from marey.text.pipeline import TextPipeline
 from marey.text.words import EDGE_PUNCTUATION
+from tests.support.texts import shared_pipeline
 
 
 @pytest.fixture(scope="module")
 def plain() -> TextPipeline:
-    return TextPipeline.load(TextSpec())
+    return shared_pipeline()
 
 
 def variant(plain: TextPipeline, **changes: object) -> TextPipeline:
     """A pipeline of another specification that shares the loaded parts."""
     spec = TextSpec().model_copy(update=changes)
-    rewriter = TextPipeline.load(spec).rewriter if spec.rewriter != "none" else plain.rewriter
+    rewriter = load_rewriter(spec.rewriter, plain.labeller)
     return TextPipeline(spec, rewriter=rewriter, labeller=plain.labeller, encoder=plain.encoder)
 
 

@@ -19,13 +19,14 @@ from marey.core.errors import InvalidBundle, InvalidInput, NotFound
 from marey.text import pipeline as pipelines
 from marey.text.keys import feature_key, resolve
 from marey.text.pipeline import TextPipeline
+from tests.support.texts import shared_pipeline
 
 PROMPTS = ("a person walks forward", "someone waves the left hand, then bows.", "A MAN KICKS", "zombie")
 
 
 @pytest.fixture(scope="module")
 def pipeline() -> TextPipeline:
-    return TextPipeline.load(TextSpec())
+    return shared_pipeline()
 
 
 def test_features_have_a_row_a_node_and_the_sentence_first(pipeline: TextPipeline) -> None:
@@ -38,7 +39,7 @@ def test_features_are_equal_in_any_batch_and_order(pipeline: TextPipeline) -> No
     fresh = TextPipeline.load(TextSpec())
     together = [f.to_blob() for f in pipeline.features(PROMPTS)]
     backwards = [f.to_blob() for f in fresh.features(PROMPTS[::-1])][::-1]
-    alone = [TextPipeline.load(TextSpec()).features([PROMPTS[1]])[0].to_blob()]
+    alone = [shared_pipeline().features([PROMPTS[1]])[0].to_blob()]
     assert together == backwards
     assert together[1] == alone[0]
 

@@ -18,11 +18,12 @@ from marey.text.rewriters import PromptRewriter, RulesRewriter, expand_units
 from marey.text.roles import Frame
 from marey.text.spelling import Speller
 from marey.text.words import lemma, one_slip, third_person
+from tests.support.texts import shared_pipeline
 
 
 @pytest.fixture(scope="module")
 def pipeline() -> TextPipeline:
-    return TextPipeline.load(TextSpec(rewriter="rules"))
+    return shared_pipeline("rules")
 
 
 @pytest.mark.parametrize(

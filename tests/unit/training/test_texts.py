@@ -7,16 +7,15 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from marey.bundles import TextSpec
-from marey.text.pipeline import TextPipeline
 from marey.training import texts as module
 from marey.training.texts import CaptionTexts
+from tests.support.texts import shared_pipeline
 
 CAPTIONS = (("a person walks forward", "Someone walks, then waves the left hand."), ("a person bows deeply",))
 
 
 def test_every_caption_has_its_graph_and_each_text_is_encoded_once():
-    pipeline = TextPipeline.load(TextSpec())
+    pipeline = shared_pipeline()
     texts = CaptionTexts.build((*CAPTIONS, CAPTIONS[0]), pipeline)
     assert texts.first.tolist() == [0, 2, 3, 5]
     assert texts.node_start[2] - texts.node_start[1] == texts.node_start[5] - texts.node_start[4] > 4
@@ -27,7 +26,7 @@ def test_every_caption_has_its_graph_and_each_text_is_encoded_once():
 
 def test_two_processes_read_captions_as_one_does(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "CHUNK", 8)
-    pipeline = TextPipeline.load(TextSpec())
+    pipeline = shared_pipeline()
     captions = [(f"a person walks {k} steps",) for k in range(2 * module.CHUNK + 3)]
     steps: list[tuple[int, int]] = []
     alone = CaptionTexts.build(captions, pipeline)

@@ -4,42 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
-import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from marey.core import defaults
 from marey.motion.clip import load_npz
-from tests.support.marey import TINY, Marey, serving
-from tests.support.plugin_wheels import install_plugin
+from tests.support.marey import TINY, Marey
 
 SECRET = "zanzibar"
 PROMPT = f"a person walks to {SECRET}"
 
 
-@pytest.fixture(scope="module")
-def installed(models: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
-    """The command line with the plug-in."""
-    home = Path(tempfile.mkdtemp(prefix="marey-"))
-    environment = install_plugin("toy_format", tmp_path_factory.mktemp("plugin"))
-    yield Marey(home, models, {**environment, "MAREY_RETENTION_SECONDS": "1", "MAREY_LIVE_SLOTS": "0"})
-    shutil.rmtree(home, ignore_errors=True)
-
-
-@pytest.fixture(scope="module")
-def serving_with(installed: Marey) -> Iterator[Marey]:
-    """The same with a server, whose worker and scheduler have the plug-in."""
-    with serving(installed, "--with", f"{defaults.MODEL}+text"):
-        yield installed
-
-
-def test_it_is_written_fetched_converted_and_erased(serving_with: Marey, tmp_path: Path) -> None:
-    marey, folder = serving_with, tmp_path / "clips"
+def test_it_is_written_fetched_converted_and_erased(served: Marey, tmp_path: Path) -> None:
+    marey, folder = served, tmp_path / "clips"
     (line,) = marey("submit", PROMPT, "--bundle", TINY, "--seconds", 2, "--fetch", folder, "--json").ok().lines
     assert sorted(line["files"]) == ["bvh", "npz", "poses"]
     file = Path(line["files"]["poses"])

@@ -2,51 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from marey.motion.clip import load_npz
-from tests.support.marey import Marey, serving
-from tests.support.models import add_text_bundles
-from tests.support.plugin_wheels import install_plugin
-from tests.support.prepared import write_prepared
+from tests.support.marey import Marey
 
-BUNDLE = "sway-starter"
+from .conftest import TRAINED
 
 
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
-    """The command line with the plug-in and a bundle that it trained."""
-    folder = tmp_path_factory.mktemp("plugin")
-    home = Path(tempfile.mkdtemp(prefix="marey-"))
-    marey = Marey(home, folder / "models", install_plugin("toy_model", folder))
-    data = write_prepared(folder / "prepared")
-    trained = marey("train", "sway", "pose", data, "--run", folder / "run", "--side", "right", "--steps", 1).ok()
-    assert trained.out.startswith("height = ")
-    output = folder / "models" / BUNDLE
-    made = marey("train", "sway", "bundle", data, "--run", folder / "run", "-o", output, "--side", "right").ok()
-    assert made.out.startswith(f"{BUNDLE}@")
-    add_text_bundles(folder / "models")
-    yield marey
-    shutil.rmtree(home, ignore_errors=True)
-
-
-@pytest.fixture(scope="module")
-def served(trained: Marey) -> Iterator[Marey]:
-    """The command line with a server."""
-    with serving(trained) as server:
-        assert "worker" in server.children()
-        yield trained
-
-
-def test_the_product_alone_does_not_know_it(trained: Marey) -> None:
-    alone = Marey(trained.home, trained.models)
-    alone("generate", "a person stands", "--bundle", BUNDLE).refused(2, "which does not run here", "hgm3")
+def test_the_product_alone_does_not_know_it(installed: Marey) -> None:
+    alone = Marey(installed.home, installed.models)
+    alone("generate", "a person stands", "--bundle", TRAINED).refused(2, "which does not run here", "hgm3")
     alone("worker", "sway").refused(2, "there is no worker 'sway'")
 
 
@@ -89,22 +57,22 @@ def test_a_client_without_the_plugin_leaves_its_settings_to_the_server(served: M
     )
 
 
-def test_a_client_with_the_plugin_asks_no_server_for_ranges(trained: Marey, tmp_path: Path) -> None:
-    alone = Marey(tmp_path, trained.models, trained.environment)
+def test_a_client_with_the_plugin_asks_no_server_for_ranges(installed: Marey, tmp_path: Path) -> None:
+    alone = Marey(tmp_path, installed.models, installed.environment)
     alone("submit", "a person stands", "--model", "sway", "--set", "beats=2.5", "--seconds", 20).refused(
         2, "seconds: 20 is outside 0.8 to 9.8 seconds, the range of sway", "beats: is 2.5, not a whole number"
     )
 
 
-def test_it_generates_without_a_server(trained: Marey, tmp_path: Path) -> None:
-    made = trained(
+def test_it_generates_without_a_server(installed: Marey, tmp_path: Path) -> None:
+    made = installed(
         "generate", "a person stands", "--model", "sway", "--seed", 1, "--set", "width=0.3", "-o", tmp_path, "--json"
     ).ok()  # fmt: skip
     assert load_npz(made.lines[0]["files"]["npz"]).manifest["settings"] == {"width": 0.3, "beats": 2}
-    trained("generate", "a person stands", "--model", "sway", "--set", "width=3").refused(
+    installed("generate", "a person stands", "--model", "sway", "--set", "width=3").refused(
         2, "width: 3 is outside 0 to 0.5"
     )
 
 
-def test_what_it_cannot_do_is_told(trained: Marey) -> None:
-    trained("worker", "sway", "--only", "live").refused(2, "names 0 models that stream")
+def test_what_it_cannot_do_is_told(installed: Marey) -> None:
+    installed("worker", "sway", "--only", "live").refused(2, "names 0 models that stream")

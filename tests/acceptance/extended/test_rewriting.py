@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from marey.core import defaults
 from marey.motion.clip import load_npz
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
-from tests.support.marey import Marey, serving
+from tests.support.marey import Marey
 
 STROLL, RUN, LOST = "he strolls to the left", "he is running", "he jumps"
 CAPTION = "A person strolls to the left."
@@ -28,23 +25,15 @@ def answer(asked: ChatRequest, before: int) -> CompletionReply:
 
 
 @pytest.fixture
-def model() -> Iterator[LanguageModel]:
-    with LanguageModel(answer) as served:
-        yield served
-
-
-def rewriting(marey: Marey, model: LanguageModel) -> Marey:
-    own = {
-        "MAREY_REWRITER": "openai",
-        "MAREY_REWRITER_URL": model.url,
-        "MAREY_REWRITER_MODEL": "any",
-        "MAREY_LIVE_SLOTS": "0",
-    }
-    return replace(marey, environment={**marey.environment, **own})
+def model(language_model: LanguageModel, monkeypatch: pytest.MonkeyPatch) -> LanguageModel:
+    monkeypatch.setattr(language_model, "answer", answer)
+    monkeypatch.setattr(language_model, "asked", [])
+    return language_model
 
 
 def test_a_one_shot_tells_what_it_read(offline: Marey, model: LanguageModel, tmp_path: Path) -> None:
-    made = rewriting(offline, model)(
+    own = {"MAREY_REWRITER": "openai", "MAREY_REWRITER_URL": model.url, "MAREY_REWRITER_MODEL": "any"}
+    made = replace(offline, environment=own)(
         "generate", STROLL, RUN, LOST, "--seconds", 1, "-o", tmp_path / "out", "--format", "npz", "--json"
     ).ok()  # fmt: skip
     told = " ".join(made.err.split())
@@ -54,13 +43,10 @@ def test_a_one_shot_tells_what_it_read(offline: Marey, model: LanguageModel, tmp
     assert [load_npz(line["files"]["npz"]).manifest["rewritten"] for line in made.lines] == [CAPTION, RUN, LOST]
 
 
-def test_a_motion_of_the_queue_keeps_both_prompts(models: Path, model: LanguageModel, tmp_path: Path) -> None:
-    with tempfile.TemporaryDirectory(prefix="marey-", ignore_cleanup_errors=True) as home:
-        marey = rewriting(Marey(Path(home), models, {"MAREY_LIVE_SLOTS": "0"}), model)
-        with serving(marey, "--with", f"{defaults.MODEL}+text"):
-            made = marey("submit", STROLL, LOST, "--seconds", 1, "--fetch", tmp_path, "--json").ok().lines
-            with marey.client() as client:
-                shown = client.get(f"/v1/motions/{made[0]['motion']}")
+def test_a_motion_of_the_queue_keeps_both_prompts(served: Marey, model: LanguageModel, tmp_path: Path) -> None:
+    made = served("submit", STROLL, LOST, "--seconds", 1, "--fetch", tmp_path, "--json").ok().lines
+    with served.client() as client:
+        shown = client.get(f"/v1/motions/{made[0]['motion']}")
     first, second = (load_npz(line["files"]["npz"]).manifest for line in made)
     assert (first["prompt"], first["rewritten"]) == (STROLL, CAPTION)
     assert shown["metadata"]["rewritten"] == CAPTION

@@ -1,0 +1,35 @@
+"""The parts that read prompts, loaded once in a process of tests: a second each time."""
+
+from __future__ import annotations
+
+import functools
+
+from marey.bundles import TextSpec
+from marey.text.encoders import TextEncoder
+from marey.text.labellers import OneAtATime
+from marey.text.loading import load_encoder, load_labeller, load_rewriter
+from marey.text.pipeline import TextPipeline
+from marey.text.roles import RoleLabeller
+
+
+@functools.cache
+def shared_labeller() -> RoleLabeller:
+    """The shipped labeller, for one thread at a time."""
+    return OneAtATime(load_labeller("light"))
+
+
+@functools.cache
+def shared_encoder() -> TextEncoder:
+    """The shipped encoder."""
+    return load_encoder("minilm")
+
+
+def shared_pipeline(rewriter: str = "none") -> TextPipeline:
+    """A pipeline of its own around the shared parts."""
+    spec = TextSpec(rewriter=rewriter)
+    return TextPipeline(
+        spec,
+        rewriter=load_rewriter(rewriter, shared_labeller()),
+        labeller=shared_labeller(),
+        encoder=shared_encoder(),
+    )
