@@ -1,4 +1,7 @@
-"""Metrics that torchmetrics implements too give equal values: FID, KID, and R-precision as a hit rate of retrieval."""
+"""Metrics that torchmetrics implements too give equal values: FID, KID, and R-precision as a hit rate of retrieval.
+
+Its import takes two seconds, which only the process that runs these tests spends.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,6 @@ import numpy as np
 import pytest
 import torch
 from torch import nn
-from torchmetrics.image.fid import FrechetInceptionDistance
-from torchmetrics.image.kid import KernelInceptionDistance
-from torchmetrics.retrieval import RetrievalHitRate
 
 from marey.evaluator.metrics.distribution import fid, kid
 from marey.evaluator.metrics.retrieval import r_precision
@@ -33,6 +33,8 @@ def clouds(count: int = 96) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_fid_is_that_of_torchmetrics():
+    from torchmetrics.image.fid import FrechetInceptionDistance
+
     real, generated = clouds()
     other = FrechetInceptionDistance(feature=Embedded(), input_img_size=(WIDTH,)).set_dtype(torch.float64)
     other.update(torch.from_numpy(real), real=True)
@@ -42,6 +44,8 @@ def test_fid_is_that_of_torchmetrics():
 
 @pytest.mark.filterwarnings("ignore:Metric `Kernel Inception Distance` will save")
 def test_kid_of_whole_sets_is_that_of_torchmetrics():
+    from torchmetrics.image.kid import KernelInceptionDistance
+
     real, generated = clouds()
     other = KernelInceptionDistance(feature=Embedded(), subsets=1, subset_size=len(real))
     other.update(torch.from_numpy(real), real=True)
@@ -52,6 +56,8 @@ def test_kid_of_whole_sets_is_that_of_torchmetrics():
 
 @pytest.mark.parametrize("top", [1, 2, 3])
 def test_r_precision_is_the_hit_rate_of_torchmetrics(top: int):
+    from torchmetrics.retrieval import RetrievalHitRate
+
     text = np.random.default_rng(1).normal(size=(4 * POOL, WIDTH))
     motion = text + np.random.default_rng(2).normal(size=text.shape)
     found = r_precision(text, motion, pool=POOL, rng=np.random.default_rng(3))

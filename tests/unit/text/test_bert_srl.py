@@ -7,11 +7,11 @@ import json
 import pickle
 import tarfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import torch
-from transformers import BertConfig, BertModel
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidFile
@@ -19,6 +19,9 @@ from marey.text.bert_srl import BertLabeller
 from marey.text.convert import convert_encoder, import_bert_srl, main
 from marey.text.roles import Frame
 from marey.text.wordpiece import WordPieces
+
+if TYPE_CHECKING:
+    from transformers import BertModel
 
 LABELS = ["O", "B-V", "B-ARG0", "I-ARG0", "B-ARGM-DIR", "I-ARGM-DIR"]
 VOCABULARY = ["[PAD]", "[UNK]", "[CLS]", "[SEP]", "a", "person", "walk", "##s", "forward", "##.", "slowly"]
@@ -35,6 +38,8 @@ class Second:
 @pytest.fixture
 def bert(tmp_path: Path) -> Path:
     """The folder of a tiny BERT: its configuration and vocabulary."""
+    from transformers import BertConfig  # two seconds, which only the process that runs these tests spends
+
     folder = tmp_path / "bert"
     folder.mkdir()
     config = BertConfig(
@@ -46,13 +51,20 @@ def bert(tmp_path: Path) -> Path:
     return folder
 
 
+def bert_of(folder: Path) -> BertModel:
+    """A BERT of random weights with the configuration of a folder."""
+    from transformers import BertConfig, BertModel
+
+    return BertModel(BertConfig(**json.loads((folder / "config.json").read_text())))
+
+
 @pytest.fixture
 def archive(bert: Path, tmp_path: Path) -> Path:
     """An unpacked archive: config.json, weights.th, vocabulary/labels.txt."""
     folder = tmp_path / "archive"
     (folder / "vocabulary").mkdir(parents=True)
     torch.manual_seed(1)
-    model = BertModel(BertConfig(**json.loads((bert / "config.json").read_text())))
+    model = bert_of(bert)
     weights = {f"bert_model.{name}": value for name, value in model.state_dict().items()}
     weights["bert_model.embeddings.position_ids"] = torch.arange(64)[None]  # old checkpoints carry this buffer
     weights["tag_projection_layer.weight"] = torch.randn(len(LABELS), 32)
@@ -76,7 +88,7 @@ def reference_frame(archive: Path, bert: Path) -> Frame:
     """Result of the archive's own forward pass for WORDS, written out by hand: probabilities, best legal path by
     force."""
     weights = torch.load(archive / "weights.th", weights_only=True)
-    model = BertModel(BertConfig(**json.loads((bert / "config.json").read_text()))).eval()
+    model = bert_of(bert).eval()
     model.load_state_dict(
         {
             k.removeprefix("bert_model."): v
