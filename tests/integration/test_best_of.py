@@ -53,3 +53,14 @@ def test_numbers_out_of_range_are_refused(marey: Command, tmp_path: Path) -> Non
         assert ran.code == 2
         assert "is outside" in ran.err
     assert not (tmp_path / "out").exists()
+
+
+def test_variety_changes_the_settings_and_normal_changes_nothing(marey: Command, tmp_path: Path) -> None:
+    plain, normal, high = (
+        line_of(marey, tmp_path / level, "--seed", 4, *([] if level == "none" else ["--variety", level]))
+        for level in ("none", "normal", "high")
+    )
+    assert plain["motion"] == normal["motion"] != high["motion"]
+    settings = [load_npz(Path(line["files"]["npz"])).manifest["settings"] for line in (plain, high)]
+    assert settings[1]["temperature"] == pytest.approx(1.6 * settings[0]["temperature"])
+    assert marey(*PROMPT, "-o", tmp_path / "out", "--variety", "huge").code == 2

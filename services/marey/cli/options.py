@@ -50,6 +50,14 @@ class ScopeOption(StrEnum):
     IGNORE = "ignore"
 
 
+class VarietyOption(StrEnum):
+    """Levels of how much motions of one prompt differ."""
+
+    LOW = "low"
+    NORMAL = "normal"
+    HIGH = "high"
+
+
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
 PromptFile = Annotated[
     str | None,
@@ -96,6 +104,10 @@ BestOf = Annotated[
 Redraws = Annotated[
     int | None,
     typer.Option("--redraws", help=f"Further rounds of candidates while none is good. 0 to {MAX_REDRAWS}, default 0."),
+]
+Variety = Annotated[
+    VarietyOption | None,
+    typer.Option("--variety", help="How much motions of one prompt differ; default: normal, as the bundle ships."),
 ]
 Sampling = Annotated[
     list[str] | None,

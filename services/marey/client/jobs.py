@@ -36,6 +36,7 @@ class Defaults(TypedDict, total=False):
     fps: float | None
     best_of: int | None
     redraws: int | None
+    variety: str | None
     tags: Sequence[str] | None
     settings: Mapping[str, float] | None
 
@@ -127,7 +128,7 @@ class Jobs(Resource):
             idempotency_key: of all attempts; None = random. Give your own key to submit at most once even if your
                 program runs again.
             defaults: fields of rows that do not set them: model, bundle, seconds, seed, variants, fps,
-                best_of, redraws, tags,
+                best_of, redraws, variety, tags,
                 settings (of sampling, by name).
 
         Raises:

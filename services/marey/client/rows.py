@@ -133,7 +133,7 @@ def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Pr
 
 def _stand_in(values: Mapping[str, Any]) -> Item:
     """An item with the fields that depend on its model."""
-    own = {name: values[name] for name in ("model", "seconds", "settings") if name in values}
+    own = {name: values[name] for name in ("model", "seconds", "settings", "variety") if name in values}
     return Item(prompt=values.get("prompt", STAND_IN), **own)
 
 
@@ -147,6 +147,7 @@ def defaults_of(
     fps: float | None = None,
     best_of: int | None = None,
     redraws: int | None = None,
+    variety: str | None = None,
     tags: Sequence[str] | None = None,
     settings: Mapping[str, float] | None = None,
 ) -> Mapping[str, object]:
@@ -167,6 +168,7 @@ def defaults_of(
         ("seconds", "seconds", seconds),
         ("seed", "seed", seed),
         ("variants", "variants", variants),
+        ("variety", "variety", variety),
         ("settings" if settings else next(iter(named), "settings"), "settings", {**(settings or {}), **named} or None),
         ("tags", "tags", tags or None),
     )

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, outside_range
+from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, outside_range
 from marey.registry import Setting, find_model
 
 MAX_FRAMES = 2**53
@@ -76,6 +76,33 @@ def settings_of(bundle: Bundle) -> tuple[Setting, ...]:
     return tuple(
         Setting(name, -MAX_SETTING, MAX_SETTING, value, whole=isinstance(value, int)) for name, value in values.items()
     )
+
+
+def variety_settings(bundle: Bundle, level: str | None) -> dict[str, float]:
+    """Return the settings of a level of variety: factors of the model's on the defaults of this bundle, within range.
+
+    Args:
+        level: one of `VARIETIES`; None = as `normal`, which changes nothing.
+
+    Raises:
+        InvalidInput: the model has no such levels.
+    """
+    if level in (None, "normal"):
+        return {}
+    spec = find_model(bundle.manifest.model)
+    if spec is None or spec.variety is None:
+        raise InvalidInput(f"the model {bundle.manifest.model!r} has no variety {level!r}")
+    factors = spec.variety.low if level == "low" else spec.variety.high
+    known = {setting.name: setting for setting in settings_of(bundle)}
+    return {
+        name: round(min(max(known[name].default * factor, known[name].low), known[name].high), 6)
+        for name, factor in factors.items()
+    }
+
+
+def sampling_of(bundle: Bundle, item: Item) -> dict[str, float]:
+    """Return the settings that an item samples with: those of its variety, and its own before these."""
+    return {**variety_settings(bundle, item.variety), **check_settings(bundle, item.settings)}
 
 
 def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:

@@ -38,6 +38,8 @@ OUTPUT_FPS, BEST_OF, REDRAWS = "fps", "best_of", "redraws"
 becomes its motion, and the most further rounds of candidates while none is good."""
 MIN_OUTPUT_FPS, MAX_OUTPUT_FPS = 1.0, 240.0
 MAX_BEST_OF, MAX_REDRAWS = 8, 2
+VARIETIES = ("low", "normal", "high")
+"""Levels of how much motions of one prompt differ; a model maps them to its settings, `normal` to none."""
 PLATFORM_SETTINGS: Mapping[str, tuple[float, float]] = {
     OUTPUT_FPS: (MIN_OUTPUT_FPS, MAX_OUTPUT_FPS),
     BEST_OF: (1, MAX_BEST_OF),
@@ -98,6 +100,8 @@ class Item(ItemSpec):
     model: str | None = None
     """A model (`hgm3`), a bundle (`hgm3-starter`) or an exact bundle (`hgm3-starter@0123456789ab`)."""
     settings: Mapping[str, float] = field(default_factory=dict[str, float])
+    variety: str | None = None
+    """One of `VARIETIES`; settings of the item override what the model makes of it."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the item as a line of a request body, with the given fields only."""
@@ -395,6 +399,13 @@ def _settings(value: object) -> dict[str, float]:
     return checked
 
 
+def _variety(value: object) -> str:
+    text = _text(value)
+    if text not in VARIETIES:
+        raise InvalidInput(f"unknown variety {text[:40]!r}; known: {', '.join(VARIETIES)}")
+    return text
+
+
 def read_setting(text: str) -> tuple[str, float]:
     """Read `NAME=VALUE`, as `guidance=4.5`.
 
@@ -477,6 +488,7 @@ CHECKS: dict[str, Callable[[object], object]] = {
     "model": _model,
     "tags": _tags,
     "settings": _settings,
+    "variety": _variety,
 }
 """Check of each field's value, in the order of columns."""
 COLUMNS = tuple(CHECKS)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
-from marey.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
+from marey.bundles.limits import check_seconds, check_settings, sampling_of, seconds_of, settings_of, variety_settings
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
@@ -38,6 +38,10 @@ class GeneratorCapabilities:
     def check_settings(self, values: Mapping[str, float]) -> dict[str, float]:
         """See `check_settings`."""
         return check_settings(self.bundle, values)
+
+    def check_variety(self, level: str | None) -> None:
+        """See `variety_settings`."""
+        variety_settings(self.bundle, level)
 
     def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
         """Return the scope of a prompt, and count it; None if the bundle lists no actions."""
@@ -102,7 +106,7 @@ def new_items(
     batch_keys: dict[tuple[str, str], str] = {}
     for index, (item, generator) in enumerate(items):
         reference = generator.bundle.reference
-        values = generator.check_settings(item.settings) if item.settings else {}
+        values = sampling_of(generator.bundle, item) if item.settings or item.variety else {}
         settings = json.dumps(values, sort_keys=True)
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -61,6 +62,19 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Variety:
+    """Settings of sampling at two levels of how much motions of one prompt differ, as factors of a bundle's defaults.
+
+    Attributes:
+        low: by setting, where motions should differ less.
+        high: by setting, where motions should differ more.
+    """
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class LengthLimits:
     """The lengths of the motions that a model makes, in seconds, both ends included. A bundle may narrow them."""
 
@@ -104,6 +118,7 @@ class ModelSpec:
         load: `(bundle, *, device, threads) -> Generator` (`marey.generation.port`).
         settings: of sampling.
         best_of: True if its handler can choose among candidates, as `marey.generation.handler.GeneratorHandler` can.
+        variety: what `--variety low` and `high` change; None = it has no such levels.
         limits: lengths of motions; None = each bundle states its own.
         live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
         live_examples: `(reference) -> prompts` that this bundle performs well while it streams, for the page `/live`;
@@ -125,6 +140,7 @@ class ModelSpec:
     load: str
     settings: tuple[Setting, ...] = ()
     best_of: bool = False
+    variety: Variety | None = None
     limits: LengthLimits | None = None
     live: str | None = None
     training: Training | None = None
@@ -137,13 +153,16 @@ class ModelSpec:
     ablations: tuple[Ablation, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the name.
+        """Check the name and the settings that a variety changes.
 
         Raises:
-            ValueError: it cannot be that of a queue, or is one of the platform's own.
+            ValueError: the name cannot be a queue's or is one of the platform's own, or there is no such setting.
         """
         if not NAME.fullmatch(self.name) or self.name in RESERVED:
             raise ValueError(f"a model cannot be named {self.name!r}")
+        changed = {} if self.variety is None else {**self.variety.low, **self.variety.high}
+        if unknown := sorted(set(changed) - {setting.name for setting in self.settings}):
+            raise ValueError(f"the variety of {self.name!r} changes {unknown[0]!r}, which is none of its settings")
 
 
 MODELS = PlugIns(GROUP, ModelSpec, lambda spec: spec.name)

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from marey.bundles import Bundle, find_bundle
-from marey.bundles.limits import check_settings, settings_of
+from marey.bundles.limits import check_settings, sampling_of, settings_of, variety_settings
 from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
-from marey.items.item import Item
+from marey.items.item import Item, read_item
 from marey.jobs.generators import capabilities_of, new_items
+from marey.registry import get_model
 from tests.support.evaluations import write_generator
 
 FOREIGN, KNOWN = "toy-starter", "hgm3-starter"
@@ -80,3 +81,43 @@ def test_one_candidate_shares_the_batch_of_items_that_name_none(config: Settings
     plain, one, two = new_items((Item("walk", settings=s), generator) for s in ({}, {"best_of": 1}, {"best_of": 2}))
     assert plain.batch_key == one.batch_key != two.batch_key
     assert two.settings == {"best_of": 2}
+
+
+def test_a_variety_is_factors_on_the_defaults_of_the_bundle_within_the_ranges(config: Settings) -> None:
+    shipped = find_bundle("hgm3-starter")
+    assert variety_settings(shipped, None) == variety_settings(shipped, "normal") == {}
+    defaults = {each.name: each.default for each in settings_of(shipped)}
+    spec = get_model("hgm3")
+    assert spec.variety is not None
+    for level, factors in (("low", spec.variety.low), ("high", spec.variety.high)):
+        found = variety_settings(shipped, level)
+        assert found == {name: pytest.approx(defaults[name] * factor) for name, factor in factors.items()}
+        assert check_settings(shipped, found) == found
+    low, high = variety_settings(shipped, "low"), variety_settings(shipped, "high")
+    assert all(low[name] < defaults[name] < high[name] for name in low)
+    with pytest.raises(InvalidInput, match="the model 'toy' has no variety 'high'"):
+        variety_settings(bundle(config, FOREIGN), "high")
+    assert variety_settings(bundle(config, FOREIGN), "normal") == {}
+
+
+def test_own_settings_come_before_those_of_the_variety(config: Settings) -> None:
+    item = Item("walk", settings={"temperature": 2.0}, variety="high")
+    found = sampling_of(bundle(config, KNOWN), item)
+    assert (found["temperature"], found["top_k"]) == (2.0, 0.2)
+    (row,) = new_items([(item, capabilities_of(bundle(config, KNOWN), config))])
+    assert row.settings == found
+
+
+def test_normal_variety_is_that_of_a_row_without_one(config: Settings) -> None:
+    generator = capabilities_of(bundle(config, KNOWN), config)
+    plain, normal, low = new_items((Item("walk", variety=level), generator) for level in (None, "normal", "low"))
+    assert plain.settings == normal.settings == {}
+    assert plain.batch_key == normal.batch_key != low.batch_key
+
+
+def test_a_variety_is_one_of_three_words() -> None:
+    item, problems = read_item({"prompt": "walk", "variety": "high"})
+    assert (item and item.variety, problems) == ("high", [])
+    for wrong in ("huge", 3, ""):
+        _, (problem,) = read_item({"prompt": "walk", "variety": wrong})
+        assert problem.field == "variety"

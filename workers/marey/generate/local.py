@@ -51,6 +51,7 @@ class LocalModel:
         fps: float | None = None,
         best_of: int | None = None,
         redraws: int | None = None,
+        variety: str | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Sequence[MotionClip]:
         """Generate motions; equal prompts, seeds and settings give the same clips as a server.
@@ -63,6 +64,7 @@ class LocalModel:
             fps: frames a second of the clips; None = the model's.
             best_of: candidates of each motion, of which the best is kept, 1 to 8; None = 1.
             redraws: further rounds of candidates while none is good, 0 to 2; None = 0.
+            variety: how much motions of a prompt differ: low, normal or high; None = normal.
             settings: of sampling, as `{"guidance": 4.5}`.
 
         Returns:
@@ -74,7 +76,7 @@ class LocalModel:
         """
         made = self.stream(
             prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, best_of=best_of, redraws=redraws,
-            settings=settings,
+            variety=variety, settings=settings,
         )  # fmt: skip
         return [*made]
 
@@ -88,24 +90,33 @@ class LocalModel:
         fps: float | None = None,
         best_of: int | None = None,
         redraws: int | None = None,
+        variety: str | None = None,
         settings: Mapping[str, float] | None = None,
     ) -> Iterator[MotionClip]:
         """Generate motions as `generate` does, and yield each when it is ready."""
         platform = {OUTPUT_FPS: fps, BEST_OF: best_of, REDRAWS: redraws}
+        from marey.bundles.limits import sampling_of
+
         sampling = {**(settings or {}), **{name: value for name, value in platform.items() if value is not None}}
-        defaults = {"seed": seed, "seconds": seconds, "variants": variants, "settings": sampling or None}
+        defaults = {
+            "seed": seed,
+            "seconds": seconds,
+            "variants": variants,
+            "variety": variety,
+            "settings": sampling or None,
+        }
         rows = [prompts] if isinstance(prompts, str) else prompts
         raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))
         items = [*read_items(raws, where="prompts", check=self._check)]
-        wanted = [each for item in items for each in _wanted(item)]
+        wanted = [each for item in items for each in _wanted(item, sampling_of(self._bundle, item))]
         for _, clip, _ in self._studio.make(wanted):
             yield clip
 
     def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
         """Yield the problems of a row that concern this model: lengths out of its range, unknown settings."""
-        from marey.bundles.limits import check_seconds, check_settings
+        from marey.bundles.limits import check_seconds, check_settings, variety_settings
 
-        for field, check in (("seconds", check_seconds), ("settings", check_settings)):
+        for field, check in (("seconds", check_seconds), ("settings", check_settings), ("variety", variety_settings)):
             if values.get(field) is None:
                 continue
             try:
@@ -159,7 +170,7 @@ def _raw(row: Row, defaults: Mapping[str, object]) -> object:
     return whole
 
 
-def _wanted(item: Item) -> Iterator[Wanted]:
+def _wanted(item: Item, settings: Mapping[str, float]) -> Iterator[Wanted]:
     seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
     for variant in range(item.variants):
-        yield Wanted(item.prompt, seed + variant, item.seconds, item.settings)
+        yield Wanted(item.prompt, seed + variant, item.seconds, settings)

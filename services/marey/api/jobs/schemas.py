@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -50,6 +50,9 @@ class NewItemBody(BaseModel):
     tags: list[str] | None = Field(None, max_length=MAX_TAGS, json_schema_extra=TAGS)
     settings: dict[str, Any] | None = Field(
         None, description="Sampling settings, such as `guidance`.", json_schema_extra=SAMPLING
+    )
+    variety: Literal["low", "normal", "high"] | None = Field(
+        None, description="How much motions of the prompt differ; None = `normal`, as the bundle ships."
     )
 
 

@@ -153,7 +153,12 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
                 default_model.add(problem)
             return
         generator = generators[model]
-        for field, hold in (("seconds", generator.check_seconds), ("settings", generator.check_settings)):
+        checks = (
+            ("seconds", generator.check_seconds),
+            ("settings", generator.check_settings),
+            ("variety", generator.check_variety),
+        )
+        for field, hold in checks:
             try:
                 if field in values:
                     hold(values[field])

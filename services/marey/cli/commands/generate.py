@@ -52,6 +52,7 @@ def generate(
     fps: options.Fps = None,
     best_of: options.BestOf = None,
     redraws: options.Redraws = None,
+    variety: options.Variety = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -76,6 +77,7 @@ def generate(
         fps=fps,
         best_of=best_of,
         redraws=redraws,
+        variety=None if variety is None else variety.value,
         tags=tags,
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
@@ -158,7 +160,7 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
     """
-    from marey.bundles.limits import check_seconds, check_settings
+    from marey.bundles.limits import check_seconds, check_settings, variety_settings
     from marey.registry import find_model, model_names
 
     if find_model(bundle.manifest.model) is None:
@@ -169,7 +171,7 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
         )
     problems: list[Problem] = []
     for number, item in enumerate(items, 1):
-        for field, check in (("seconds", check_seconds), ("settings", check_settings)):
+        for field, check in (("seconds", check_seconds), ("settings", check_settings), ("variety", variety_settings)):
             try:
                 check(bundle, getattr(item, field))
             except InvalidBundle:
@@ -249,14 +251,16 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
     Raises:
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
     """
+    from marey.bundles.limits import sampling_of
     from marey.cli.roles.generating import Wanted
 
     names = FileNames(template)
 
     def of(index: int, item: Item) -> Iterator[Planned]:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+        settings = sampling_of(bundle, item)
         for variant in range(item.variants):
-            wanted = Wanted(item.prompt, seed + variant, item.seconds, item.settings)
+            wanted = Wanted(item.prompt, seed + variant, item.seconds, settings)
             name = item.name or slug(item.prompt)
             naming = Naming(
                 index,

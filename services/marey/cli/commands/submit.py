@@ -45,6 +45,7 @@ def submit(
     fps: options.Fps = None,
     best_of: options.BestOf = None,
     redraws: options.Redraws = None,
+    variety: options.Variety = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -79,6 +80,7 @@ def submit(
         fps=fps,
         best_of=best_of,
         redraws=redraws,
+        variety=None if variety is None else variety.value,
         tags=tags,
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import Ablation, Choice, LengthLimits, ModelSpec, Setting, Stage, Training
+from marey.registry import Ablation, Choice, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
 
 SPEC = ModelSpec(
     name="hgm3",
@@ -27,6 +27,10 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("residual_top_k", 0.001, 1.0, 0.1, "As top_k, for the residual levels."),
     ),
     best_of=True,
+    variety=Variety(
+        low={"temperature": 0.6, "residual_temperature": 0.6, "top_k": 0.5},
+        high={"temperature": 1.6, "residual_temperature": 1.3, "top_k": 2.0},
+    ),
     limits=LengthLimits(0.8, 9.8),
     training=Training(
         help="HGM³: stages in this order, then `bundle`.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import Ablation, LengthLimits, ModelSpec, Setting, Stage, Training
+from marey.registry import Ablation, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
 
 SPEC = ModelSpec(
     name="mogo",
@@ -25,6 +25,10 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("upper_top_k", 0.001, 1.0, 0.1, "As top_k, for all other levels."),
     ),
     best_of=True,
+    variety=Variety(
+        low={"temperature": 0.7, "upper_temperature": 0.8, "top_k": 0.5},
+        high={"temperature": 1.35, "upper_temperature": 1.2, "top_k": 2.0},
+    ),
     limits=LengthLimits(0.8, 9.8),
     live="marey.models.mogo.live:create_live_model",
     live_examples="marey.models.mogo.live_examples:prompts_of",
