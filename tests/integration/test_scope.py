@@ -15,7 +15,7 @@ from marey.takes import erase
 from marey.tenants import DEFAULT_TENANT
 from marey.vocabulary.scope import ActionLists
 from tests.support.command import Command
-from tests.support.live_api import BUNDLE, LiveApi, write_bundle
+from tests.support.live_api import BUNDLE, QUALITY, LiveApi, write_bundle
 
 UNLISTED = "hgm3-unlisted"
 NONSENSE = "asdf qwer zxcv"
@@ -159,3 +159,15 @@ def test_the_python_client_has_warnings_and_raises_out_of_scope(api: LiveApi) ->
             client.jobs.submit(["a person walks", NONSENSE], scope="refuse")
         assert [problem.line for problem in raised.value.problems] == [2]
         assert client.jobs.submit([NONSENSE], scope="ignore").warnings == ()
+
+
+def test_the_quality_of_a_job_is_counted_by_flag(api: LiveApi, http: httpx2.Client, marey: Command) -> None:
+    job = submit(http, "a person walks", "a person runs")
+    assert http.get(f"/v1/jobs/{job['id']}/quality").json() == {"measured": 0, "ok": 0, "flags": {}}
+    api.work()
+    flags = {str(flag): 2 for flag in QUALITY.flags}
+    counts = {"measured": 2, "ok": 2 * QUALITY.ok, "flags": flags}
+    assert http.get(f"/v1/jobs/{job['id']}/quality").json() == counts
+    listed = ", ".join(f"{count} {flag}" for flag, count in sorted(flags.items()))
+    line = f"{counts['ok']} of 2 ok{': ' if flags else ''}{listed}"
+    assert line in marey("jobs", "show", job["id"]).out

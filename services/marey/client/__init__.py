@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         JobEvent,
         JobItem,
         NamedAction,
+        QualityCounts,
         QueuePosition,
         Quota,
         Scope,
@@ -121,8 +122,8 @@ __getattr__ = lazy_names(
             "EvaluationRequest MetricChange MetricPair"
         ),
         "marey.client.types.jobs": (
-            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem NamedAction QueuePosition Quota Scope "
-            "ScopeExample ScopeReport Speed SubmittedJob"
+            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem NamedAction QualityCounts QueuePosition Quota "
+            "Scope ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
@@ -197,6 +198,7 @@ __all__ = [
     "Problem",
     "Progress",
     "PromptMatch",
+    "QualityCounts",
     "QueuePosition",
     "Quota",
     "QuotaUsedUp",

@@ -14,7 +14,17 @@ from marey.client.names import DEFAULT_TEMPLATE, check_template
 from marey.client.resources import Resource, identifier
 from marey.client.rows import Format, PromptReader, defaults_of, read_file, read_rows
 from marey.client.tables import ExtraColumns
-from marey.client.types.jobs import CheckedJob, Counters, Erasure, Job, JobEvent, JobItem, QueuePosition, SubmittedJob
+from marey.client.types.jobs import (
+    CheckedJob,
+    Counters,
+    Erasure,
+    Job,
+    JobEvent,
+    JobItem,
+    QualityCounts,
+    QueuePosition,
+    SubmittedJob,
+)
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
@@ -235,6 +245,10 @@ class Jobs(Resource):
     def queue(self, job: Job | str) -> QueuePosition:
         """Return the position of a job in the queue, with an estimate of the time until its end."""
         return QueuePosition.of(self._transport.get(f"{_path(job)}/queue"))
+
+    def quality(self, job: Job | str) -> QualityCounts:
+        """Return how many motions of a job have quality flags, and which."""
+        return QualityCounts.of(self._transport.get(f"{_path(job)}/quality"))
 
     def items(
         self,

@@ -148,6 +148,13 @@ class ScopeReport:
         return f"{count} of {self.total} prompts, first number {first.index + 1}, {first.prompt!r}{what}"
 
 
+def warn_of(prompt: str, bundle: str, lists: ActionLists | None) -> list[str]:
+    """Return the warnings of one prompt, by its words; none for a bundle that lists no actions."""
+    report = ScopeReport()
+    report.judge(prompt, bundle, lists)
+    return report.warnings()
+
+
 def says_known(bundle: str, actions: Sequence[str]) -> str:
     """Return a sentence with the actions that a bundle knows, the first ones if they are many."""
     shown = ", ".join(name.replace("-", " ") for name in actions[:MAX_NAMED])

@@ -162,13 +162,14 @@ def test_a_client_is_told_when_a_worker_takes_the_stream_and_of_each_new_prompt(
         while len(told["prompts"]) < 2:
             told = viewer.until("stream").of("stream")[-1]["stream"]
     assert told["prompts"] == [
-        {"number": 0, "frame": 0, "prompt": "a person walks", "rewritten": None, "not_rewritten": None},
+        {"number": 0, "frame": 0, "prompt": "a person walks", "rewritten": None, "not_rewritten": None, "warnings": []},
         {
             "number": 1,
             "frame": 20,
             "prompt": "a person jumps",
             "rewritten": "a person leaps",
             "not_rewritten": None,
+            "warnings": [],
         },
     ]
     assert told["skeleton"]["names"][0] == HUMANML3D.joint_names[0]

@@ -37,6 +37,7 @@ NAMES = {
     jobs.NamedAction: "NamedActionView",
     jobs.ScopeExample: "ScopeExampleView",
     jobs.ScopeReport: "ScopeReportView",
+    jobs.QualityCounts: "QualityCountsView",
     jobs.QueuePosition: "QueueView",
     jobs.Erasure: "ErasureView",
     motions.Review: "ReviewView",

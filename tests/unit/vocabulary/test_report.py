@@ -1,6 +1,6 @@
 """Report on the scope of many prompts."""
 
-from marey.vocabulary.report import MAX_EXAMPLES, MAX_NAMED, MAX_SHOWN, ScopeReport, refusal, says_known
+from marey.vocabulary.report import MAX_EXAMPLES, MAX_NAMED, MAX_SHOWN, ScopeReport, refusal, says_known, warn_of
 from marey.vocabulary.scope import ActionLists, match_scope
 
 LISTS = ActionLists(supported=("walk", "run", "walk-backward"), tried=("kick",))
@@ -11,6 +11,14 @@ def report_of(*prompts: str) -> ScopeReport:
     for prompt in prompts:
         report.judge(prompt, "tiny", LISTS)
     return report
+
+
+def test_a_single_prompt_is_warned_of_with_what_the_bundle_knows() -> None:
+    lists = ActionLists(("walk",))
+    (warning,) = warn_of("asdf qwer zxcv", "tiny", lists)
+    assert warning.endswith("the motion is arbitrary. tiny knows: walk.")
+    assert warn_of("a person walks", "tiny", lists) == []
+    assert warn_of("asdf qwer zxcv", "tiny", None) == []
 
 
 def test_nonsense_is_answered_with_what_the_model_knows() -> None:

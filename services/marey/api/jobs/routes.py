@@ -27,6 +27,7 @@ from marey.api.jobs.schemas import (
     JobView,
     NewItemBody,
     NewJobBody,
+    QualityCountsView,
     SubmittedView,
     report_fields,
 )
@@ -38,6 +39,7 @@ from marey.http import schemas
 from marey.http.bodies import kept_body
 from marey.http.problems import RESPONSES, QuotaBody
 from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
+from marey.jobs.quality_counts import count_quality
 from marey.jobs.states import ENDED
 from marey.runtime.logs import logger
 from marey.vocabulary.scope import ScopePolicy
@@ -191,6 +193,13 @@ def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
 def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
     """Get the queue position of the job's items, and when it may be done: from measurements here, or no number."""
     return QueueView.of(jobs.place_of(conn, key.tenant, job))
+
+
+@router.get("/{job}/quality")
+@deadline(db.SEARCH)
+def get_quality(job: UUID, conn: Connection, key: Reader) -> QualityCountsView:
+    """Count the job's motions by their quality: how many have a flag, and which."""
+    return QualityCountsView.of(count_quality(conn, key.tenant, job))
 
 
 @router.patch("/{job}")

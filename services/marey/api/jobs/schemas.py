@@ -25,6 +25,7 @@ from marey.jobs import (
     JobRow,
     JobState,
 )
+from marey.jobs.quality_counts import QualityCounts
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import ScopePolicy, Verdict
 
@@ -171,6 +172,19 @@ class CountersView(View):
     failed: int
     dead: int
     cancelled: int
+
+
+class QualityCountsView(View):
+    """Motions of a job by their quality."""
+
+    measured: int = Field(description="Motions with a quality record.")
+    ok: int = Field(description="Motions without a flag, of these.")
+    flags: dict[str, int] = Field(description="Motions with each flag.")
+
+    @classmethod
+    def of(cls, counts: QualityCounts) -> QualityCountsView:
+        """Convert counts."""
+        return cls(measured=counts.measured, ok=counts.ok, flags=dict(counts.flags))
 
 
 class JobView(View):

@@ -20,6 +20,8 @@ from marey.http.schemas import View
 from marey.items.item import MAX_SEED
 from marey.motion.skeleton import Skeleton
 from marey.streams import StreamPrompt, StreamRow, StreamState
+from marey.vocabulary.report import warn_of
+from marey.vocabulary.scope import ActionLists
 
 MIN_SECONDS, MAX_SECONDS = 1.0, 600.0
 DIGITS = 6
@@ -73,13 +75,15 @@ class BundleFacts:
     licence: str | None = None
     fps: float | None = None
     skeleton: SkeletonView | None = None
+    name: str = ""
+    actions: ActionLists | None = None
 
     @classmethod
     def by(cls, bundle: Bundle) -> BundleFacts:
         """Read a bundle."""
         manifest = bundle.manifest
         skeleton = None if manifest.layout is None else SkeletonView.of(body_of(manifest).skeleton)
-        return cls(licence=manifest.licence, fps=manifest.fps, skeleton=skeleton)
+        return cls(manifest.licence, manifest.fps, skeleton, manifest.name, manifest.actions)
 
 
 class PromptView(View):
@@ -90,13 +94,19 @@ class PromptView(View):
     prompt: str
     rewritten: str | None = Field(description="Text that the model received; null if not recorded.")
     not_rewritten: str | None = Field(description="Reason why a rewrite was not used.")
+    warnings: list[str] = Field(description="Sentences on what the model does not know of it, by its words.")
 
     @classmethod
-    def of(cls, number: int, recorded: StreamPrompt) -> PromptView:
+    def of(cls, number: int, recorded: StreamPrompt, made: BundleFacts) -> PromptView:
         """Convert a recorded prompt."""
         rewritten, reason = (None, None) if recorded.read is None else recorded.read
         return cls(
-            number=number, frame=recorded.frame, prompt=recorded.prompt, rewritten=rewritten, not_rewritten=reason
+            number=number,
+            frame=recorded.frame,
+            prompt=recorded.prompt,
+            rewritten=rewritten,
+            not_rewritten=reason,
+            warnings=warn_of(recorded.prompt, made.name, made.actions) if recorded.prompt else [],
         )
 
 
@@ -137,7 +147,7 @@ class StreamDetailView(StreamView):
     @classmethod
     def detail(cls, row: StreamRow, made: BundleFacts, prompts: Sequence[StreamPrompt]) -> StreamDetailView:
         """Convert a row, and its prompts with the frame each is in force from."""
-        recorded = [PromptView.of(number, prompt) for number, prompt in enumerate(prompts)]
+        recorded = [PromptView.of(number, prompt, made) for number, prompt in enumerate(prompts)]
         return cls(prompts=recorded, skeleton=made.skeleton, **_fields(row, made))
 
 

@@ -11,11 +11,11 @@ import typer
 
 from marey.cli import bulk, console
 from marey.cli.references import FORMS, find, of_view
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
     from marey.cli.references import Reference
-    from marey.client import Client, JobChanges
+    from marey.client import Client, JobChanges, QualityCounts
     from marey.client import Job as JobResult
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
@@ -70,19 +70,36 @@ def show(job: Job, as_json: console.Json = False) -> None:
         job = find(client, "job", job).id
         found = client.jobs.get(job).raw
         place = client.jobs.queue(job).raw
+        quality = _quality(client, job)
         if as_json:
-            console.result_json({**found, "queue": place})
+            console.result_json({**found, "queue": place, "quality": None if quality is None else quality.raw})
             return
         for field in FIELDS:
             if found[field] is not None:
                 console.result(f"{field:<10} {found[field]}")
         counts = ", ".join(f"{found['counters'][name]} {name}" for name in COUNTERS if found["counters"][name])
         console.result(f"{'items':<10} {found['total']}: {counts}")
+        if quality is not None and quality.measured:
+            console.result(f"{'quality':<10} {_describe(quality)}")
         if found["counters"]["ready"] + found["counters"]["leased"]:
             _show_place(place)
         for state in ("failed", "dead"):
             if found["counters"][state]:
                 _show_failures(client, job, state)
+
+
+def _quality(client: Client, job: str) -> QualityCounts | None:
+    """Return how many motions have flags; None from servers of earlier releases."""
+    try:
+        return client.jobs.quality(job)
+    except NotFound:
+        return None
+
+
+def _describe(quality: QualityCounts) -> str:
+    """Return one line, as `8 of 10 ok: 2 floating, 1 skating`."""
+    flags = ", ".join(f"{count} {flag}" for flag, count in sorted(quality.flags.items()))
+    return f"{quality.ok} of {quality.measured} ok{': ' if flags else ''}{flags}"
 
 
 @app.command()

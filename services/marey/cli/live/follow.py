@@ -24,7 +24,7 @@ MESSAGE_SECONDS = 0.1
 """Seconds between two messages, so that the server does not take a file piped into stdin for a flood."""
 DEFAULT_FPS = 20.0
 STYLES = {"live": "bold green", "waiting": "yellow", "paused": "yellow"}
-PROMPT_FIELDS = ("number", "frame", "prompt", "rewritten", "not_rewritten")
+PROMPT_FIELDS = ("number", "frame", "prompt", "rewritten", "not_rewritten", "warnings")
 
 
 class Follower:
@@ -131,6 +131,7 @@ class Follower:
             self._event("state", None if known else text, state=state, position=position, reason=reason)
         for prompt in stream.prompts[self._prompts :]:
             text = f"From frame {prompt.frame} on: {prompt.prompt}{_rewritten(prompt)}"
+            text = "\n".join([text, *(f"Warning: {warning}" for warning in prompt.warnings)])
             self._event("prompt", text, **{name: prompt.raw[name] for name in PROMPT_FIELDS if name in prompt.raw})
         self._prompts = max(self._prompts, len(stream.prompts))
 

@@ -246,6 +246,21 @@ class CheckedJob(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class QualityCounts(Result):
+    """The motions of a job by their quality.
+
+    Attributes:
+        measured: motions with a quality record.
+        ok: of these, those without a flag.
+        flags: motions with each flag.
+    """
+
+    measured: int = 0
+    ok: int = 0
+    flags: Mapping[str, int] = field(default_factory=dict[str, int])
+
+
+@dataclass(frozen=True, kw_only=True)
 class QueuePosition(Result):
     """The place of a job in the queue."""
 

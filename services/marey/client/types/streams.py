@@ -23,6 +23,8 @@ class StreamPrompt(Result):
     """As it was read; None where that is not on record."""
     not_rewritten: str | None = None
     """Why what the rewriter made of it was not used."""
+    warnings: tuple[str, ...] = ()
+    """Sentences on parts of it that the model does not know, by its words."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,6 +75,9 @@
     return reason ? ` (read as it is: ${reason})` : "";
   }
 
+  // What the model does not know of a prompt.
+  const warned = ({ warnings = [] }) => warnings.map((warning) => ` – Warning: ${warning}`).join("");
+
   function listPrompts() {
     const rows = [...session.prompts.values()].sort((a, b) => a.number - b.number);
     const item = (text, from, current) => {
@@ -86,7 +89,7 @@
       return row;
     };
     $("prompts").replaceChildren(
-      ...rows.map((row) => item(row.prompt + readAs(row), `from ${row.frame}`, row.number === session.inForce)),
+      ...rows.map((row) => item(row.prompt + readAs(row) + warned(row), `from ${row.frame}`, row.number === session.inForce)),
       ...session.pending.map((prompt) => item(prompt, "sent", null)),
     );
     $("prompts").querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });

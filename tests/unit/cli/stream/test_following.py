@@ -68,6 +68,14 @@ def test_what_a_rewriter_made_of_a_prompt_is_told(serve: Any, read: dict[str, st
     assert {name: event[name] for name in read} == read
 
 
+def test_a_warning_of_a_prompt_is_told_under_it(serve: Any) -> None:
+    ran = run(serve(frames=4, read={0: {"warnings": ["nothing is known of it"]}}), "--json").ok()
+    lines = ran.err.splitlines()
+    assert lines[lines.index(f"From frame 0 on: {PROMPT}") + 1] == "Warning: nothing is known of it"
+    (event,) = [line for line in ran.lines if line["type"] == "prompt"]
+    assert event["warnings"] == ["nothing is known of it"]
+
+
 def test_without_json_stdout_has_one_line_and_stderr_the_words(serve: Any) -> None:
     ran = run(serve(frames=4, gaps={2: 1})).ok()
     assert ran.out == f"{STREAM}\t{JOB}\tended\t4\t20\t1\t\n"
