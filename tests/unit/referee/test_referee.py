@@ -101,6 +101,47 @@ def test_a_mirrored_movement_shows_the_same_action(name: str) -> None:
     assert not any(shows(action, mirrored) for action in not_shown)
 
 
+def _showing() -> Joints:
+    """Lift the straight left arm to the side and hold it there; the right one hangs."""
+    share = np.clip(seconds(3.0) - 0.5, 0, 1)
+    return arm_to(standing(3.0), "L", _between(_hanging(3.0), np.array([0.5, -0.1, 0.1]), share))
+
+
+def _dancing() -> Joints:
+    """Swing both arms and step from side to side for five seconds."""
+    time = seconds(5.0)
+    joints = standing(5.0)
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        hand = np.array([sign * 0.3, 0.0, 0.25]) + 0.25 * np.sin(2 * np.pi * time)[:, None] * [1.0, 1.0, 0.0]
+        joints = arm_to(joints, side, hand)
+    joints[..., 0] += (0.3 * np.sin(np.pi * time))[:, None]
+    return joints
+
+
+def test_a_loop_of_two_steps_is_a_walk() -> None:
+    assert shows("walk", body(walking(1.5, 1.3)))
+
+
+def test_an_arm_that_shows_the_way_rises_and_stays_while_the_other_hangs() -> None:
+    assert shows("guide", body(_showing()))
+    assert not shows("guide", body(_showing()[50:]))  # held all the time, as a spear is
+    assert not shows("guide", body(_waving()))
+
+
+@pytest.mark.parametrize(
+    "action", ["talk", "signal", "block", "cast-spell", "dodge", "flinch", "shoot", "wave", "slash"]
+)
+def test_a_dance_is_no_single_gesture(action: str) -> None:
+    assert shows("dance", body(_dancing()))
+    assert not shows(action, body(_dancing()))
+
+
+@pytest.mark.parametrize("name", ["walk", "run", "bow", "wave"])
+@pytest.mark.parametrize("action", ["dodge", "flinch", "kick-ball", "shoot", "block", "dance", "fight-stance"])
+def test_rules_of_combat_do_not_pass_everyday_movements(name: str, action: str) -> None:
+    assert not shows(action, body(CASES[name][0]))
+
+
 def test_several_actions_are_looked_for_in_their_order() -> None:
     first, second = _bowing(), _waving()
     both = body(np.concatenate([first, second]))

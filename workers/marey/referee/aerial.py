@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marey.referee.body import CHEST, HIPS, SIDES, Body, Floats, runs, swings
-from marey.referee.gaits import OFF_FLOOR, gait, travel
+from marey.referee.body import HIPS, SIDES, Body, Floats, runs, swings
+from marey.referee.gaits import OFF_FLOOR, gait, passage, planted, travel
 from marey.referee.rules import rule
 
 OTHER = {"L": "R", "R": "L"}
 
 
 @dataclass(frozen=True)
-class Flight:
+class AirborneTime:
     """A time with both feet off the floor."""
 
     begin: int
@@ -32,7 +32,7 @@ class Flight:
     """The foot that landed first, or `both`."""
 
 
-def flights(body: Body) -> Iterator[Flight]:
+def flights(body: Body) -> Iterator[AirborneTime]:
     """Yield the times with both feet off the floor that begin and end upright on it."""
     for begin, end in runs(body.lowest_foot > OFF_FLOOR):
         if begin == 0 or end >= len(body) or end - begin < max(2, round(0.08 * body.fps)):
@@ -40,7 +40,7 @@ def flights(body: Body) -> Iterator[Flight]:
         wide = slice(max(0, begin - body.frames(0.25)), min(len(body), end + body.frames(0.25)))
         path = body.at("pelvis")[:, [0, 2]]
         yaw = body.yaw[wide]
-        yield Flight(
+        yield AirborneTime(
             begin=begin,
             end=end,
             height=float(body.lowest_foot[begin:end].max()),
@@ -60,7 +60,7 @@ def _foot(body: Body, edge: int, direction: int) -> str:
     return "both" if len(down) != 1 else down[0]
 
 
-def _upright(body: Body, flight: Flight) -> bool:
+def _upright(body: Body, flight: AirborneTime) -> bool:
     low, high = max(flight.begin - 1, 0), min(flight.end, len(body) - 1)
     return body.height("pelvis")[[low, high]].min() > 0.45 * HIPS and body.lean[flight.begin : flight.end].max() < 80
 
@@ -153,10 +153,12 @@ def climb_ladder(body: Body) -> bool:
     over = [body.height(f"{s}_wrist") > body.height(f"{s}_shoulder") - 0.25 for s in SIDES]
     hips = body.smooth(body.height("pelvis"), 0.3)
     moves = sum(len(swings(body.own(f"{s}_wrist")[:, 1], 0.12)) for s in SIDES)
-    climbs = float(np.ptp(hips)) >= 0.3
-    in_place = min(len(swings(body.own(f"{s}_ankle")[:, 1], 0.12)) for s in SIDES) >= 2
+    climbs = abs(float(hips[-1] - hips[0])) >= 0.3
+    feet = min(float(np.ptp(body.height(f"{s}_ankle"))) for s in SIDES) >= 0.3
+    high = max(float(np.percentile(body.height(f"{s}_wrist") - body.height(f"{s}_shoulder"), 80)) for s in SIDES)
+    in_place = min(len(swings(body.own(f"{s}_ankle")[:, 1], 0.12)) for s in SIDES) >= 2 and high > 0.1
     flat = float(np.linalg.norm(np.ptp(body.at("pelvis")[:, [0, 2]], axis=0))) < 1.0
-    return body.most(over[0] | over[1], 0.5) and (climbs or in_place) and moves >= 2 and flat
+    return body.most(over[0] | over[1], 0.5) and ((climbs and feet) or in_place) and moves >= 2 and flat
 
 
 @rule("climb-onto")
@@ -263,8 +265,19 @@ def roll(body: Body) -> bool:
 
 @rule("dodge")
 def dodge(body: Body) -> bool:
-    way = body.within(body.at("head"), 0.6)
-    upright = body.height("pelvis").min() > 0.3 * HIPS
+    """Nearly still before; the head goes 0.25 m at 0.8 m/s or more, not upward; no hand reaches for the floor."""
     found = gait(body)
-    gone = found.distance > 2.5 and found.steps > 5
-    return bool(way.max() >= 0.25) and upright and not gone and body.height("head").min() > 0.4 * CHEST
+    gone = travel(body) > 1.8 or found.steps > 5 or passage(body) or not planted(body)
+    hands = min(float(body.height(f"{side}_wrist").min()) for side in SIDES)
+    if gone or body.height("pelvis").min() < 0.5 * HIPS or hands < 0.45:
+        return False
+    head, speed = body.at("head"), body.speed("head")
+    for frame in np.flatnonzero(body.within(head, 0.6) >= 0.25):
+        part = slice(frame, frame + body.frames(0.6) + 1)
+        way = head[part] - head[frame]
+        far = way[int(np.linalg.norm(way, axis=-1).argmax())]
+        before = speed[max(0, frame - body.frames(0.2)) : frame + 1].min()
+        still = frame < body.frames(0.2) or before < 0.3
+        if still and speed[part].max() >= 0.8 and far[1] < 0.1:
+            return True
+    return False

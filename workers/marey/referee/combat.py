@@ -6,7 +6,7 @@ import numpy as np
 
 from marey.referee.aerial import OTHER
 from marey.referee.body import HIPS, SIDES, Body, Floats, Mask, runs, swings
-from marey.referee.gaits import gait, travel
+from marey.referee.gaits import gait, passage, planted, travel
 from marey.referee.rules import rule
 
 
@@ -20,19 +20,22 @@ def _standing(body: Body, share: float = 0.6) -> bool:
 
 
 def _guard(body: Body) -> Mask:
-    hands = []
+    """Return where both hands are held between waist and face, one of them ahead of the trunk, over a ready stance."""
+    held, ahead = np.ones(len(body), np.bool_), np.zeros(len(body), np.bool_)
     for side in SIDES:
         hand = body.own(f"{side}_wrist")
-        hands.append((hand[:, 1] > 0.05) & (hand[:, 1] < 0.72) & (hand[:, 2] > 0.1) & (body.bend(side, "elbow") > 40))
-    stance = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1) > 0.25
+        held &= (hand[:, 1] > 0.0) & (hand[:, 1] < 0.85) & (hand[:, 2] > -0.1) & (body.bend(side, "elbow") > 40)
+        ahead |= hand[:, 2] > 0.15
+    stance = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1) > 0.3
     knees = np.maximum(body.bend("L", "knee"), body.bend("R", "knee")) > 20
-    return hands[0] & hands[1] & (stance | knees)
+    return held & ahead & (stance | knees) & (body.height("pelvis") > 0.7 * HIPS)
 
 
 @rule("fight-stance")
 def fight_stance(body: Body) -> bool:
     strikes = np.maximum(*(np.linalg.norm(body.own_velocity(f"{s}_wrist"), axis=-1) for s in SIDES))
-    return _standing(body) and body.most(_guard(body)) and float(np.percentile(strikes, 95)) < 2.0
+    stays = travel(body) < 0.6 and planted(body, 0.1)
+    return stays and _standing(body) and body.most(_guard(body)) and float(np.percentile(strikes, 95)) < 2.0
 
 
 def _strikes(body: Body, side: str) -> int:
@@ -81,6 +84,7 @@ def kick(body: Body) -> bool:
 
 @rule("kick-ball")
 def kick_ball(body: Body) -> bool:
+    peaks = {side: float(body.own_velocity(f"{side}_foot", window=0.06)[:, 2].max()) for side in SIDES}
     for side in SIDES:
         velocity = body.own_velocity(f"{side}_foot", window=0.06)
         foot = body.own(f"{side}_foot")
@@ -88,7 +92,9 @@ def kick_ball(body: Body) -> bool:
         for begin, end in runs(swing):
             part = slice(max(0, begin - body.frames(0.2)), min(len(body), end + body.frames(0.25)))
             stands = (body.lift(OTHER[side])[begin:end] < 0.1).all()
-            if foot[part][:, 2].min() < -0.1 and foot[part][:, 2].max() > 0.3 and stands:
+            # A step swings both feet alike.
+            swung = velocity[begin:end, 2].max() >= max(1.3 * peaks[OTHER[side]], 3.5)
+            if foot[part][:, 2].min() < -0.1 and foot[part][:, 2].max() > 0.35 and stands and swung:
                 return True
     return False
 
@@ -110,11 +116,13 @@ def _sweeps(body: Body) -> int:
 
 @rule("slash")
 def slash(body: Body) -> bool:
-    return _standing(body, 0.5) and _sweeps(body) > 0
+    return _standing(body, 0.5) and not passage(body) and _sweeps(body) > 0
 
 
 @rule("stab")
 def stab(body: Body) -> bool:
+    if passage(body) or travel(body) > 2.5:
+        return False
     for side in SIDES:
         hand = body.own(f"{side}_wrist", "spine3")
         velocity = body.own_velocity(f"{side}_wrist", "spine3")
@@ -128,15 +136,18 @@ def stab(body: Body) -> bool:
 
 @rule("block")
 def block(body: Body) -> bool:
+    if passage(body) or travel(body) > 0.8 or not planted(body) or not _standing(body, 0.5):
+        return False
     for side in SIDES:
         hand, elbow = body.own(f"{side}_wrist"), body.bend(side, "elbow")
-        up = (hand[:, 1] > 0.22) & (hand[:, 2] > 0.08) & (elbow > 35)
+        up = (hand[:, 1] > 0.22) & (hand[:, 1] < 0.75) & (hand[:, 2] > 0.12) & (elbow > 50)
         calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 1.0
         for begin, end in runs(up & calm):
             before = slice(max(0, begin - body.frames(0.5)), begin + 1)
-            risen = float(np.linalg.norm(hand[begin] - hand[before], axis=-1).max()) > 0.15
-            if (end - begin) / body.fps >= 0.2 and (risen or begin == 0):
-                return _standing(body, 0.5)
+            risen = hand[begin, 1] - hand[before][:, 1].min() > 0.12
+            held = begin == 0 and hand[begin, 2] > 0.2
+            if (end - begin) / body.fps >= 0.2 and (risen or held):
+                return True
     return False
 
 
@@ -151,23 +162,26 @@ def _aiming(body: Body) -> Mask:
 
 @rule("aim")
 def aim(body: Body) -> bool:
-    return body.longest(_aiming(body)) >= 1.0
+    return body.longest(_aiming(body)) >= 1.0 and body.most(body.standing)
 
 
 @rule("shoot")
 def shoot(body: Body) -> bool:
-    """Aims; the hands jerk back by 0.02 m and more within 0.15 s."""
+    """Aims; the hands jerk back by 0.015 m and more within 0.15 s and come ahead again."""
+    if passage(body) or travel(body) > 1.0 or not planted(body) or not _standing(body, 0.5):
+        return False
+    step = body.frames(0.15)
     for side in SIDES:
         hand = body.own(f"{side}_wrist", "spine3")
         ahead = (hand[:, 2] > 0.28) & (hand[:, 1] > -0.2)
         distance = np.linalg.norm(hand, axis=-1)
-        step = body.frames(0.15)
-        if len(body) <= step or body.seconds(ahead) < 0.3:
-            continue
-        window = np.lib.stride_tricks.sliding_window_view(distance, step + 1)
-        jerk = window[:, 0] - window.min(axis=1)
-        if ((jerk >= 0.015) & ahead[: len(jerk)]).any():
-            return _standing(body, 0.5)
+        for frame in range(len(body) - step):
+            before = slice(max(0, frame - body.frames(0.2)), frame + 1)
+            held = ahead[before].all() and float(np.ptp(distance[before])) < 0.03
+            back = distance[frame] - distance[frame : frame + step + 1].min()
+            later = distance[frame + step : frame + step + body.frames(0.6)]
+            if held and 0.015 <= back < 0.25 and later.max() - distance[frame : frame + step + 1].min() >= 0.5 * back:
+                return True
     return False
 
 
@@ -188,17 +202,19 @@ def draw_bow(body: Body) -> bool:
 
 @rule("cast-spell")
 def cast_spell(body: Body) -> bool:
+    if passage(body) or travel(body) > 0.8 or not planted(body) or not _standing(body, 0.5):
+        return False
     for side in SIDES:
         reach = body.smooth(_reach(body, side), 0.1)
         height = body.height(f"{side}_wrist")
         calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6
         hand = body.own(f"{side}_wrist", "spine3")
-        away = ((hand[:, 2] > 0.25) & (hand[:, 1] > -0.2)) | (height > body.height("head"))
+        away = ((hand[:, 2] > 0.3) & (hand[:, 1] > -0.1)) | (height > body.height("head"))
         way = body.within(hand, 0.8)
         for begin, end in runs(away & calm):
             before = slice(max(0, begin - body.frames(0.8)), begin + 1)
             if (end - begin) / body.fps >= 0.15 and way[before].max() >= 0.3 and reach[begin:end].max() > 0.35:
-                return _standing(body, 0.5)
+                return True
     return False
 
 
@@ -220,12 +236,22 @@ def throw(body: Body) -> bool:
 
 @rule("flinch")
 def flinch(body: Body) -> bool:
-    chest = body.within(body.own("spine3"), 0.3)
-    head = body.within(body.own("head"), 0.3)
-    world = np.minimum(body.within(body.at("head"), 0.3), body.within(body.at("spine3"), 0.3))
-    jerk = np.maximum(np.minimum(chest, head), world)
-    stays = bool(body.height("pelvis").min() > 0.5 * HIPS and body.standing[-body.frames(0.2) :].any())
-    return bool(jerk.max() >= 0.08) and stays and travel(body) < 1.5 and gait(body).steps < 6
+    """Still before; head and chest jerk to a side, forward or back; the body comes back and has not gone down."""
+    hips, head = body.height("pelvis"), body.at("head")
+    stays = travel(body) < 0.8 and gait(body).steps < 6 and hips.min() > 0.75 * HIPS and planted(body)
+    if not stays or passage(body) or not body.standing[-body.frames(0.2) :].any():
+        return False
+    level = np.array([1.0, 0.3, 1.0])
+    jerk = np.minimum(body.within(head * level, 0.3), body.within(body.at("spine3") * level, 0.3) / 0.6)
+    speed = body.speed("head")
+    for frame in np.flatnonzero(jerk >= 0.08):
+        before = speed[max(0, frame - body.frames(0.2)) : frame + 1]
+        later = head[frame : frame + body.frames(2.0)]
+        away = np.linalg.norm(later - head[frame], axis=-1)
+        still = frame < body.frames(0.2) or before.min() < 0.2
+        if still and away[-1] < 0.6 * away.max() and away.max() < 0.3:
+            return True
+    return False
 
 
 @rule("die")

@@ -14,6 +14,8 @@ MOVING = 0.3
 """Speed of the hips above which the body travels, m/s."""
 FOOT_MOVES = 0.7
 """Speed of a foot that does not stand, m/s."""
+PASSAGE_S = 2.5
+"""Time for which hands and hips move without a break in a passage of movements, such as a dance."""
 OFF_FLOOR = 0.05
 """Height over which a foot is off the floor, m."""
 
@@ -69,11 +71,18 @@ def gait(body: Body) -> Gait:
         sideways=float(sideways.mean()),
         speed=float(speed[inner].mean()),
         distance=float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum()),
-        turn=float(yaw[-1] - yaw[0]),
+        turn=_turn(yaw, travels=end - begin < len(body) or float(speed.mean()) > MOVING),
         course=_course(velocity[inner]),
         flight=float(airborne[inner].mean()),
         cadence=steps / seconds,
     )
+
+
+def _turn(yaw: Floats, *, travels: bool) -> float:
+    """Return degrees turned; of a gait in place by the trend, since its hips swing to and fro with every step."""
+    if travels:
+        return float(yaw[-1] - yaw[0])
+    return float(np.polyfit(np.arange(len(yaw)), yaw, 1)[0] * (len(yaw) - 1))
 
 
 def _bridged(mask: Mask, gap: int) -> Mask:
@@ -90,8 +99,9 @@ def _steps(body: Body, begin: int, end: int) -> int:
     apart = body.smooth(body.lift("L") - body.lift("R"), 0.1)[begin:end]
     lifted = len(swings(apart, 0.05))
     along = (body.at("L_ankle") - body.at("R_ankle"))[begin:end]
-    velocity = body.velocity("pelvis", SLOW_S)[begin:end]
-    heading = velocity / np.maximum(np.linalg.norm(velocity, axis=-1, keepdims=True), 1e-6)
+    velocity = (body.velocity("pelvis", SLOW_S) * [1.0, 0.0, 1.0])[begin:end]
+    speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
+    heading = np.where(speed > MOVING, velocity / np.maximum(speed, 1e-6), body.forward[begin:end])
     passed = len(swings(body.smooth((along * heading).sum(-1), 0.1), 0.15))
     return min(lifted, max(passed, 0)) if passed >= 2 else lifted
 
@@ -102,6 +112,19 @@ def _course(velocity: Floats) -> float:
         return 0.0
     angle = np.unwrap(np.arctan2(velocity[moving, 0], velocity[moving, 2]))
     return float(np.rad2deg(angle[-1] - angle[0]))
+
+
+def passage(body: Body) -> bool:
+    """Return True if the whole body moves on and on, as in a dance or a form of karate, and shows no single gesture."""
+    hands = np.max([np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) for side in SIDES], axis=0)
+    hips = np.linalg.norm(body.velocity("pelvis", SLOW_S) * [1.0, 0.0, 1.0], axis=-1)
+    moving = (body.smooth(hands, SLOW_S) > 0.45) & (hips > 0.15)
+    return body.longest(_bridged(moving, body.frames(0.3))) >= PASSAGE_S
+
+
+def planted(body: Body, height: float = 0.35) -> bool:
+    """Return True if no foot is lifted so high; 0.35 m is the shin, over which kicks and high steps go."""
+    return max(float(body.lift(side).max()) for side in SIDES) < height
 
 
 def travel(body: Body) -> float:
@@ -140,12 +163,23 @@ def _spread(body: Body, joint: str) -> float:
 @rule("walk")
 def walk(body: Body) -> bool:
     found = gait(body)
-    upright = body.height("pelvis")[found.begin : found.end].mean() > 0.6 * HIPS
+    part = slice(found.begin, found.end)
+    upright = body.height("pelvis")[part].mean() > 0.6 * HIPS and float(np.median(body.lean[part])) < 45
     if not upright or abs(found.turn) >= 45 or found.flight > 0.15:
         return False
-    return (_ahead(found) and found.steps >= 3 and 0.4 <= found.forward <= 2.2) or (
-        _in_place(body, found) and found.cadence < 3.2
-    )
+    ahead = _ahead(found) and found.steps >= _least_steps(body, found) and 0.4 <= found.forward <= 2.2
+    return ahead or (_in_place(body, found) and 0.8 <= found.cadence < 3.2 and _treads(body))
+
+
+def _least_steps(body: Body, found: Gait) -> int:
+    """Return how many steps a walk has at least; a loop of one cycle holds two."""
+    return 2 if (found.end - found.begin) / body.fps < 1.8 else 3
+
+
+def _treads(body: Body) -> bool:
+    """Return True if both feet are lifted as in walking: alike, and not as high as a knee."""
+    lifts = [float(np.percentile(body.lift(side), 95)) for side in SIDES]
+    return min(lifts) > 0.05 and max(lifts) < 0.4 and min(lifts) > 0.4 * max(lifts)
 
 
 @rule("walk-backward")
@@ -160,7 +194,9 @@ def run(body: Body) -> bool:
     found = gait(body)
     if found.steps < 2 or abs(found.turn) >= 45 or found.flight < 0.05:
         return False
-    return (_ahead(found) and found.forward >= 1.8) or (_in_place(body, found) and found.cadence >= 2.2)
+    ahead = body.smooth((body.velocity("pelvis", SLOW_S) * body.forward).sum(-1), SLOW_S)
+    fast = _ahead(found) and float(ahead[found.begin : found.end].max()) >= 1.8
+    return fast or (_in_place(body, found) and found.cadence >= 2.2)
 
 
 @rule("sprint")
@@ -256,12 +292,16 @@ def sneak(body: Body) -> bool:
 
 @rule("crouch")
 def crouch(body: Body) -> bool:
+    """Low for 0.4 s at least; on bent knees, the ways down and up counted, for about half of the clip."""
     hands = np.minimum(body.height("L_wrist"), body.height("R_wrist")) > 0.08
     feet = (body.lift("L") < 0.12) & (body.lift("R") < 0.12)
     bent = np.minimum(body.bend("L", "knee"), body.bend("R", "knee")) > 45
     knees = np.minimum(body.height("L_knee"), body.height("R_knee")) > 0.12
-    low = body.height("pelvis") <= 0.75 * HIPS
-    return bool((low & hands & feet & bent & knees).mean() >= 0.5)
+    # Who sits has both feet ahead of the hips all the time.
+    over = np.minimum(body.own("L_ankle")[:, 2], body.own("R_ankle")[:, 2]) < 0.12
+    down = hands & feet & bent & knees & (body.height("pelvis") < 0.9 * HIPS)
+    low = down & (body.height("pelvis") <= 0.75 * HIPS)
+    return body.longest(low) >= 0.4 and bool((low & over).any()) and float(down.mean()) >= 0.42
 
 
 @rule("crawl")
@@ -279,7 +319,9 @@ def crawl(body: Body) -> bool:
 def carry(body: Body) -> bool:
     found = gait(body)
     part = slice(found.begin, found.end)
-    walks = found.steps >= 3 and found.flight <= 0.15 and (_ahead(found) or _in_place(body, found))
+    walks = (
+        found.steps >= _least_steps(body, found) and found.flight <= 0.15 and (_ahead(found) or _in_place(body, found))
+    )
     for side in SIDES:
         hand = body.own(f"{side}_wrist")[part]
         held = np.linalg.norm(body.own_velocity(f"{side}_wrist")[part], axis=-1) < 0.35

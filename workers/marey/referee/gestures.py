@@ -5,17 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from marey.referee.body import CHEST, HEAD, HIPS, SIDES, Body, Floats, Mask, runs, swings
-from marey.referee.gaits import gait, travel
+from marey.referee.gaits import gait, passage, planted, travel
 from marey.referee.rules import rule
 
 SEAT_DROP = 0.1
 """Least way of the hips onto a seat; a high stool is 0.8 m high."""
+DANCE_S = 3.0
+"""Shortest clip in which movements can be told to be a dance."""
 KNEES = 0.5
 """Height of the knees, m."""
 
 
 def _stays(body: Body) -> bool:
     return travel(body) < 0.8
+
+
+def _gestures(body: Body) -> bool:
+    """Return True if the body stays near its place and neither kicks nor dances, so that a gesture is what it does."""
+    return travel(body) < 1.2 and planted(body) and not passage(body)
 
 
 def _hand(body: Body, side: str) -> Floats:
@@ -43,7 +50,7 @@ def _half_swings(body: Body, side: str, mask: Mask, size: float) -> int:
 def wave(body: Body) -> bool:
     for side in SIDES:
         high = body.height(f"{side}_wrist") > body.height("spine3") - 0.05
-        if _stays(body) and _half_swings(body, side, high, 0.07) >= 3:
+        if _gestures(body) and _half_swings(body, side, high, 0.07) >= 3:
             return True
     return False
 
@@ -55,7 +62,7 @@ def raise_arm(body: Body) -> bool:
         calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6
         held = body.longest((high > 0.0) & calm) >= 0.25
         low = float(high.min()) < -0.1 or float(np.median(high)) > 0.1
-        if held and low and travel(body) < 1.5:
+        if held and low and _gestures(body):
             return True
     return False
 
@@ -64,6 +71,8 @@ def raise_arm(body: Body) -> bool:
 def bow(body: Body) -> bool:
     tip, head = body.smooth(body.tip, 0.1), body.smooth(body.height("head"), 0.1)
     hands = np.minimum(body.height("L_wrist"), body.height("R_wrist"))
+    if not _stays(body) or not _gestures(body):
+        return False
     for begin, end in swings(tip, 12.0):
         if tip[end] <= tip[begin]:
             continue
@@ -71,7 +80,7 @@ def bow(body: Body) -> bool:
         tipped = tip[end] - tip[begin] >= 15 or tip[end] >= 18
         down = head[begin : end + 1].max() - head[end] >= 0.05
         rises = tip[end] - up >= 0.4 * (tip[end] - tip[begin])
-        if tipped and down and rises and body.height("pelvis")[end] > 0.7 * HIPS and hands[end] > 0.35 and _stays(body):
+        if tipped and down and rises and body.height("pelvis")[end] > 0.7 * HIPS and hands[end] > 0.35:
             return True
     return False
 
@@ -85,17 +94,23 @@ def clap(body: Body) -> bool:
 
 @rule("cheer")
 def cheer(body: Body) -> bool:
+    """A hand thrown up over the head, or two pumps of a fist between chest and head, at 1 m/s and more."""
+    if travel(body) > 1.2 or passage(body):
+        return False
     for side in SIDES:
-        speed = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1)
         up = body.own_velocity(f"{side}_wrist")[:, 1]
-        over = body.height(f"{side}_wrist") > body.height("head") - 0.02
+        over = body.height(f"{side}_wrist") > body.height("head") + 0.05
+        before = (_hand(body, side)[:, 2] > 0.1) & (_hand(body, side)[:, 1] > -0.1)
+        pumps = 0
         for begin, end in runs(up > 0.4):
             later = slice(begin, min(len(body), end + body.frames(0.3)))
-            thrown = speed[begin:end].max() >= 1.0 and over[later].any()
-            pumped = speed[begin:end].max() >= 1.0 and body.bend(side, "elbow")[later].max() > 60
-            ahead = _hand(body, side)[later][:, 2].max() > 0.1 and _hand(body, side)[later][:, 1].max() > -0.1
-            if travel(body) < 1.5 and (thrown or (pumped and ahead)):
+            if up[begin:end].max() < 0.9:
+                continue
+            if over[later].any():
                 return True
+            pumps += bool(before[later].any() and body.bend(side, "elbow")[later].max() > 60)
+        if pumps >= 2:
+            return True
     return False
 
 
@@ -106,7 +121,9 @@ def laugh(body: Body) -> bool:
     shakes = shoulders - body.smooth(shoulders, 0.4)
     return (
         _stays(body)
+        and planted(body)
         and body.most(body.height("pelvis") > 0.4 * HIPS)
+        and float(np.ptp(body.smooth(body.height("pelvis"), 0.2))) < 0.25
         and rocks >= 2
         and len(swings(shakes, 0.006)) >= 4
     )
@@ -143,17 +160,23 @@ def _signs(body: Body) -> int:
 
 @rule("signal")
 def signal(body: Body) -> bool:
-    return travel(body) < 1.2 and body.most(body.standing) and _signs(body) >= 3
+    return _gestures(body) and body.most(body.standing) and gait(body).steps < 4 and _signs(body) >= 3
 
 
 @rule("guide")
 def guide(body: Body) -> bool:
-    for side in SIDES:
+    """One arm rises from beside the body, nearly straight, and stays; the other hangs."""
+    for side, other in (("L", "R"), ("R", "L")):
         hand = body.own(f"{side}_wrist")
         level = (body.height(f"{side}_wrist") > 0.85 * HIPS) & (body.height(f"{side}_wrist") < HEAD + 0.05)
-        out = np.linalg.norm(hand[:, [0, 2]], axis=-1) >= 0.38
+        out = (np.linalg.norm(hand[:, [0, 2]], axis=-1) >= 0.42) & (body.bend(side, "elbow") < 75)
         calm = body.smooth(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 0.2) < 0.5
-        if body.longest(level & out & calm) >= 0.5:
+        hangs = body.own(f"{other}_wrist")[:, 1] < 0.1
+        if (
+            _gestures(body)
+            and body.longest(level & out & calm & hangs & body.standing) >= 0.5
+            and not (level & out).all()
+        ):
             return True
     return False
 
@@ -172,13 +195,16 @@ def shiver(body: Body) -> bool:
 
 @rule("talk")
 def talk(body: Body) -> bool:
-    gestures = np.zeros(len(body), np.bool_)
+    gestures, speed = np.zeros(len(body), np.bool_), np.zeros(len(body))
     for side in SIDES:
         hand = body.own(f"{side}_wrist")
         between = (hand[:, 1] > -0.05) & (body.height(f"{side}_wrist") < body.height(f"{side}_shoulder") + 0.1)
-        gestures |= between & (body.smooth(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 0.3) >= 0.2)
-    feet = travel(body) < 0.4
-    return feet and body.share(gestures) >= 1 / 3
+        moves = body.smooth(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 0.3)
+        gestures |= between & (moves >= 0.2) & (hand[:, 2] > 0.05)
+        speed = np.maximum(speed, moves)
+    small = float(np.percentile(speed, 90)) < 1.5
+    steady = float(np.ptp(body.smooth(body.height("pelvis"), 0.2))) < 0.12 and planted(body, 0.1)
+    return travel(body) < 0.4 and steady and small and body.share(gestures) >= 1 / 3
 
 
 # -- everyday ---------------------------------------------------------------------------------------------------------
@@ -202,7 +228,7 @@ def wash(body: Body) -> bool:
         if _half_swings(body, side, np.ones(len(body), np.bool_), 0.1) < 5:
             continue
         low, high = np.percentile(hand, [10, 90], axis=0)
-        if float((high - low).max()) <= 0.7 and travel(body) < 1.2:
+        if float((high - low).max()) <= 0.7 and _gestures(body):
             return True
     return False
 
@@ -222,7 +248,7 @@ def reach_up(body: Body) -> bool:
     for side in SIDES:
         over = body.height(f"{side}_wrist") - body.height("head")
         peak = float(over.max())
-        if peak > 0.17 and (over.min() < 0.1 or over[-1] < peak - 0.05):
+        if not passage(body) and peak > 0.17 and (over.min() < 0.1 or over[-1] < peak - 0.05):
             return True
     return False
 
@@ -236,7 +262,7 @@ def reach_forward(body: Body) -> bool:
         out = level & (hand[:, 2] >= 0.38) & calm & body.standing
         back = hand[:, 2] < 0.3
         for begin, end in runs(out):
-            if (end - begin) / body.fps >= 0.12 and back.any():
+            if (end - begin) / body.fps >= 0.12 and back.any() and _gestures(body):
                 return True
     return False
 
@@ -248,7 +274,8 @@ def push(body: Body) -> bool:
         hand = body.own(f"{side}_wrist")
         hands &= (hand[:, 2] > 0.28) & (hand[:, 1] > -0.1) & (hand[:, 1] < 0.7)
     slow = body.speed("pelvis", 0.5) < 1.3
-    return body.most(hands & (body.tip >= 10) & slow)
+    level = float(np.ptp(body.smooth(body.height("pelvis"), 0.2))) < 0.25
+    return level and body.most(hands & (body.tip >= 10) & slow)
 
 
 @rule("drive")
@@ -262,16 +289,21 @@ def drive(body: Body) -> bool:
     return _seated(body).mean() >= 0.6 and body.most(hands) and float(np.ptp(body.smooth(wheel, 0.2))) >= 10
 
 
-def _seated(body: Body) -> Mask:
-    """Return where the body sits on a seat: thighs near level, and the feet ahead of the hips or free of the floor."""
+def _seated(body: Body, *, hanging: bool = False) -> Mask:
+    """Return where the body sits on a seat: thighs near level, and the feet ahead of the hips or free of the floor.
+
+    Args:
+        body: what to measure.
+        hanging: one thigh may hang, as at the edge of a high stool.
+    """
     hips = body.height("pelvis") / HIPS
     behind = body.lowest_foot > 0.3
-    level = np.ones(len(body), np.bool_)
+    steep = []
     for side in SIDES:
         thigh = body.at(f"{side}_knee") - body.at(f"{side}_hip")
-        steep = np.rad2deg(np.arcsin(np.clip(np.abs(thigh[:, 1]) / np.linalg.norm(thigh, axis=-1), 0, 1)))
-        level &= steep < 45
+        steep.append(np.rad2deg(np.arcsin(np.clip(np.abs(thigh[:, 1]) / np.linalg.norm(thigh, axis=-1), 0, 1))))
         behind |= body.own(f"{side}_ankle")[:, 2] > 0.08
+    level = np.minimum(*steep) < 45 if hanging else np.maximum(*steep) < 45
     low = (hips > 0.33) & (hips < 0.92)
     return (low | (body.lowest_foot > 0.3)) & level & behind & (body.lean < 50)
 
@@ -283,23 +315,23 @@ def sit(body: Body) -> bool:
 
 @rule("sit-down")
 def sit_down(body: Body) -> bool:
-    seated = _seated(body)
+    hips, seated = body.height("pelvis"), _seated(body)
     last = slice(-body.frames(0.3), None)
-    hips = body.height("pelvis")
-    first = float(hips[: max(1, len(body) // 2)].max())
-    return bool(seated[last].mean() > 0.5 and first - float(np.median(hips[last])) >= SEAT_DROP and first > 0.8 * HIPS)
+    high = int(hips[: max(1, len(body) // 2)].argmax())
+    if hips[high] <= 0.8 * HIPS or seated[last].mean() <= 0.5:
+        return False
+    return float(hips[high] - np.median(hips[last])) >= SEAT_DROP
 
 
 @rule("stand-up")
 def stand_up(body: Body) -> bool:
-    seated = _seated(body)
-    first, last = slice(0, body.frames(0.5)), slice(-body.frames(0.2), None)
     hips = body.height("pelvis")
-    return bool(
-        seated[first].any()
-        and float(np.median(hips[last])) - float(hips[first].min()) >= SEAT_DROP
-        and float(np.median(hips[last])) > 0.85 * HIPS
-    )
+    first, last = slice(0, body.frames(0.5)), slice(-body.frames(0.2), None)
+    begins = float(hips[: body.frames(0.2)].min())
+    # On a high seat one foot stands on the floor, and that thigh hangs.
+    rests = _seated(body, hanging=True)[first].any() and begins < 0.93 * HIPS
+    rise = float(np.median(hips[last])) - float(hips[first].min())
+    return bool(rests and rise >= SEAT_DROP and float(np.median(hips[last])) > 0.85 * HIPS)
 
 
 @rule("sit-floor")
@@ -389,7 +421,7 @@ def twist(body: Body) -> bool:
     shoulders = body.own("L_shoulder", "R_shoulder")
     angle = body.smooth(np.rad2deg(np.arctan2(-shoulders[:, 2], shoulders[:, 0])), 0.1)
     turns = [abs(angle[b] - angle[a]) for a, b in swings(angle, 20.0)]
-    return len(turns) >= 3 and travel(body) < 0.6
+    return len(turns) >= 3 and travel(body) < 0.6 and _gestures(body)
 
 
 @rule("arm-circles")
@@ -422,6 +454,8 @@ def knee_to_elbow(body: Body) -> bool:
 
 @rule("dance")
 def dance(body: Body) -> bool:
+    """Arms, legs and hips move for three seconds or more, without a steady walk or run, straight or in a curve."""
+
     def busy(joints: tuple[str, ...], least: float) -> float:
         speeds = [body.smooth(np.linalg.norm(body.own_velocity(joint), axis=-1), 0.5) for joint in joints]
         return body.share(np.max(speeds, axis=0) > least)
@@ -430,12 +464,13 @@ def dance(body: Body) -> bool:
     legs = busy(("L_ankle", "R_ankle", "L_knee", "R_knee"), 0.15)
     hips = body.share(body.smooth(body.speed("pelvis"), 0.5) > 0.08)
     found = gait(body)
-    steady = found.steps >= 4 and found.distance > 1.5 and abs(found.course) < 45 and abs(found.turn) < 45
-    steady = steady and (found.end - found.begin) > 0.7 * len(body) and found.forward > 0.5
+    steady = found.steps >= 4 and found.distance > 1.5 and found.forward > 0.5
+    steady = steady and (found.end - found.begin) > 0.7 * len(body)
     rhythm = max(
         len(swings(body.smooth(body.own(f"{s}_wrist")[:, axis], 0.1), 0.15)) for s in SIDES for axis in range(3)
     )
-    return arms >= 0.5 and legs + hips >= 0.7 and not steady and rhythm >= 3 and body.most(body.height("pelvis") > 0.4)
+    moving = arms >= 0.5 and legs + hips >= 0.7 and rhythm >= 3
+    return len(body) / body.fps >= DANCE_S and moving and not steady and body.most(body.height("pelvis") > 0.4)
 
 
 @rule("dribble")
