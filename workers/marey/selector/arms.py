@@ -58,7 +58,8 @@ def raise_arm(m: Motion, side: str) -> float:
     """Lift a hand and hold it."""
     hands = _arms(m)
     ups = _up(hands[0]), _up(hands[1])
-    grades = min(ups[0], most(hands[0].swings, 5, 1.5)), min(ups[1], most(hands[1].swings, 5, 1.5))
+    over = [min(up, least(hand.peak, 0.0, 0.12)) for up, hand in zip(ups, hands, strict=True)]
+    grades = min(over[0], most(hands[0].swings, 5, 1.5)), min(over[1], most(hands[1].swings, 5, 1.5))
     return min(_of_side(grades, ups, side), _stays(m))
 
 

@@ -55,7 +55,7 @@ def _on_spot(m: Motion) -> float:
 
 def run(m: Motion, side: str) -> float:
     """Run."""
-    there = min(_forward(m, 0.5), _running(m), least(float(np.median(m.flow[:, 0])), 1.2, 0.4))
+    there = min(_forward(m, 0.5), _running(m), least(float(np.percentile(m.flow[:, 0], 75)), 1.8, 0.4))
     on_spot = min(
         _on_spot(m), least(_steps(m) / m.seconds, 2.2, 0.4), least(best([f.seconds for f in m.flights]), 0.08, 0.06)
     )
