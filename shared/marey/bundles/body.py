@@ -9,6 +9,7 @@ import numpy as np
 from marey.bundles.manifest import BundleManifest
 from marey.core.errors import InvalidBundle
 from marey.motion.body import NamedBody, standard_body
+from marey.motion.body_files import read_body
 from marey.motion.features import FeatureLayout, layout
 
 
@@ -35,6 +36,12 @@ def layout_of(manifest: BundleManifest) -> FeatureLayout:
 def body_of(manifest: BundleManifest) -> NamedBody:
     """Return the body `standard` of a generator's bundle; see `layout_of` for errors."""
     return standard_body(layout_of(manifest).skeleton)
+
+
+def read_body_for(manifest: BundleManifest, given: str) -> NamedBody:
+    """Return the body `standard` of a generator's bundle, or that of a file; see `layout_of` and `read_body` for
+    errors."""
+    return read_body(given, layout_of(manifest).skeleton)
 
 
 @lru_cache(maxsize=16)

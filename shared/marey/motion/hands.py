@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from marey.motion.body import STATURE, stature
 from marey.motion.kinematics import facing
 from marey.motion.legs import two_bone_knee
 from marey.motion.rotations import Array, length, normalize
 from marey.motion.skeleton import Skeleton
 
 MEET, APART = 0.18, 0.30
-"""Metres between wrists: nearer than the first hands meet, and from the second on they are left alone."""
+"""Metres between wrists of a body of `STATURE`: nearer than the first hands meet, and from the second on they are left
+alone."""
 
 
 def wrist_distance(joints: Array, skeleton: Skeleton) -> Array:
@@ -43,7 +45,8 @@ def join_hands(joints: Array, wanted: Array, skeleton: Skeleton) -> Array:
         wanted: (T,) distance of the wrists, as decoded and scaled to the body, metres.
         skeleton: with known shoulders.
     """
-    near = np.clip((APART - wanted) / (APART - MEET), 0.0, 1.0)
+    size = round(stature(skeleton) / STATURE, 3)
+    near = np.clip((size * APART - wanted) / (size * (APART - MEET)), 0.0, 1.0)
     if not near.any():
         return joints
     share = near * near * (3.0 - 2.0 * near)

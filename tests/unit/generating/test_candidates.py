@@ -95,7 +95,8 @@ def choose(
     """Choose among candidates with these records (ok, match), by their number."""
     known = {candidate_seed(seed, number): record for seed in seeds for number, record in enumerate(records)}
 
-    def finish(generator: Any, request: Request, made: FakeGenerated, settings: Any, *, fps: float | None) -> FakeClip:
+    def finish(generator: Any, request: Request, made: FakeGenerated, settings: Any, **options: Any) -> FakeClip:
+        assert options == {"body": None, "fps": plan.fps}
         ok, match = known[made.seed]
         flags = [] if ok else [Flag.SKATING]
         record = RECORD.model_copy(update={"ok": ok, "flags": flags, "match": PromptMatch(value=match)})

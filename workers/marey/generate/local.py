@@ -127,20 +127,29 @@ class LocalModel:
                 yield Problem(line, field, error.message)
 
 
-def load(bundle: str | os.PathLike[str], *, device: str | None = None, threads: int | None = None) -> LocalModel:
+def load(
+    bundle: str | os.PathLike[str],
+    *,
+    body: str | os.PathLike[str] | None = None,
+    device: str | None = None,
+    threads: int | None = None,
+) -> LocalModel:
     """Load a model into this process.
 
     Args:
         bundle: a model (`hgm3`), a bundle (`hgm3-starter`), an exact bundle, or the path of its folder.
+        body: of the motions: `standard`, or a BVH or npz file with other proportions; None = standard.
         device: `cpu`, `cuda` or `auto`; None = that of MAREY_DEVICE.
         threads: of the CPU; None = that of MAREY_THREADS, by default all cores.
 
     Raises:
         InvalidInput: the extra `worker` is not installed, or the device is unknown.
         NotFound, InvalidBundle: the bundle is unknown, damaged, or not a generator.
+        NotFound, InvalidFile: the file of the body is missing, or no human body.
     """
     try:
         from marey.bundles import choose_bundle
+        from marey.bundles.body import read_body_for
         from marey.core.settings import settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
@@ -153,7 +162,8 @@ def load(bundle: str | os.PathLike[str], *, device: str | None = None, threads: 
             where=str(found.path),
             hint=f"Models that run here: {', '.join(model_names())}.",
         )
-    return LocalModel(found, OneShot(found, config))
+    chosen = None if body is None else read_body_for(found.manifest, os.fspath(body))
+    return LocalModel(found, OneShot(found, config, body=chosen))
 
 
 def _raw(row: Row, defaults: Mapping[str, object]) -> object:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from marey.core.settings import Settings
     from marey.generation.candidates import DrawPlan
     from marey.generation.port import Generator, Request
+    from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
 
 
@@ -35,8 +36,8 @@ class Wanted:
 class OneShot:
     """A model in this process, as `marey generate` and `marey.generate` run it."""
 
-    def __init__(self, bundle: Bundle, config: Settings) -> None:
-        """Load the bundle and its text pipeline.
+    def __init__(self, bundle: Bundle, config: Settings, *, body: NamedBody | None = None) -> None:
+        """Load the bundle and its text pipeline; motions have the given body, by default the standard one.
 
         Raises:
             InvalidInput: the extra `worker` is not installed, or the device is unknown.
@@ -54,6 +55,7 @@ class OneShot:
         if bundle.manifest.text is None:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
+        self._body = body
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
         self._judge = MeaningJudge(self._text.pooled) if judges_meaning(bundle.manifest.text) else None
         threads = config.threads or max(1, len(os.sched_getaffinity(0)))
@@ -103,10 +105,12 @@ class OneShot:
         from marey.generation.export import finish
 
         if not plan.is_single:
-            return filter(None, best_clips(self._generator, requests, settings, plan))  # nothing was dropped
+            return filter(
+                None, best_clips(self._generator, requests, settings, plan, body=self._body)
+            )  # nothing was dropped
         made = self._generator.generate(requests, settings)
         return (
-            finish(self._generator, request, generated, settings, fps=plan.fps)
+            finish(self._generator, request, generated, settings, body=self._body, fps=plan.fps)
             for request, generated in zip(requests, made, strict=True)
             if generated is not None
         )

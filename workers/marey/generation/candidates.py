@@ -14,6 +14,7 @@ from typing import Any
 from marey.generation.export import finish
 from marey.generation.port import GenerationControl, Generator, NoControl, Request, S
 from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
+from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
 from marey.quality.record import read_quality
 from marey.quality.selection import KEY, Candidate, Selection
@@ -65,6 +66,7 @@ def best_clips(
     settings: S,
     plan: DrawPlan,
     *,
+    body: NamedBody | None = None,
     control: GenerationControl | None = None,
 ) -> list[MotionClip | None]:
     """Draw candidates of each request, and return the best of each; None where `control` dropped the request.
@@ -84,7 +86,8 @@ def best_clips(
                 draws[row].best = None
                 continue
             draws[row].fix_length(len(generated.features))
-            draws[row].consider(number, finish(generator, draws[row].asked, generated, settings, fps=plan.fps))
+            clip = finish(generator, draws[row].asked, generated, settings, body=body, fps=plan.fps)
+            draws[row].consider(number, clip)
             kept.append(row)
         number += 1
         round_ended = number % plan.best_of == 0

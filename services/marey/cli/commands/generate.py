@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from marey.cli.roles.generating import OneShot, Wanted
     from marey.core.settings import Settings
     from marey.exporters import Exporter
+    from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
 
 
@@ -53,6 +54,7 @@ def generate(
     best_of: options.BestOf = None,
     redraws: options.Redraws = None,
     variety: options.Variety = None,
+    body: options.Body = "standard",
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -83,12 +85,13 @@ def generate(
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)
+    shaped = _body_of(chosen, body)
     if scope is options.ScopeOption.REFUSE:
         _refuse(reader, items, chosen)
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
-    studio = OneShot(chosen, config)
+    studio = OneShot(chosen, config, body=shaped)
     _examine(reader, items, studio, scope)
     if chosen.manifest.random:
         console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")
@@ -105,6 +108,14 @@ def generate(
             else:
                 for path in line["files"].values():
                     console.result(console.home_relative(path))
+
+
+def _body_of(bundle: Bundle, given: str) -> NamedBody | None:
+    """Return the body that `--body` names, None for the standard one; it is read before the bundle is loaded."""
+    from marey.bundles.body import read_body_for
+    from marey.motion.body import STANDARD
+
+    return None if given == STANDARD else read_body_for(bundle.manifest, given)
 
 
 def _report_rewrite(clip: MotionClip) -> None:
