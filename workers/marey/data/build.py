@@ -7,7 +7,7 @@ import shutil
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from marey.core.hashing import sha256_of
 from marey.data import manifest as names
 from marey.data import wording
 from marey.data.captions import captions, phrasings
-from marey.data.compose import COUNTS, compose
+from marey.data.compose import COMPOSED, COUNTS, compose
 from marey.data.describe import ACTS, Facts, describe, describe_text
 from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
@@ -29,6 +29,7 @@ from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
 from marey.data.splice import with_bones
 from marey.data.splits import Sourced, actions_of, splits_by_source
+from marey.data.text_sequences import compose_texts, joined_texts
 from marey.motion.features import HUMANML3D_263
 
 Array = NDArray[np.floating]
@@ -243,6 +244,7 @@ class FolderWriter:
         self._local.write(np.ascontiguousarray(local, "<f2").tobytes())
         self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
         walked = acts[0].gait
+        told = _choose_texts(acts, name)
         self.clips.append(
             Clip(
                 id=name,
@@ -266,11 +268,13 @@ class FolderWriter:
                     steps=walked.steps,
                     side=acts[0].side,
                 ),
-                captions=captions(acts, name, phrasings(acts, spliced=bool(spliced))),
-                authors=tuple(map(len, acts[0].text)),
+                captions=tuple(chain(*told)) or captions(acts, name, phrasings(acts, spliced=bool(spliced))),
+                authors=tuple(map(len, told)),
                 seams=seams,
                 act_captions=tuple(
-                    captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(acts) if len(acts) > 1
+                    facts.text[0][0] if facts.text else captions([facts], f"{name}/{k}", 1)[0]
+                    for k, facts in enumerate(acts)
+                    if len(acts) > 1
                 ),
             )
         )
@@ -351,6 +355,13 @@ class FolderWriter:
         )
 
 
+def _choose_texts(acts: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:
+    """Captions of a clip by each author of its source's own ones; none where it has none."""
+    if not acts[0].text:
+        return ()
+    return acts[0].text if len(acts) == 1 else joined_texts(acts, name)
+
+
 def _kind(clip: Clip) -> str:
     if clip.spliced:
         return "spliced" if len(clip.acts) > 1 else "looped"
@@ -388,7 +399,8 @@ def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progres
     packs = with_splits(packs, left_out)
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
     total = (6 if speed else 2) * sum(len(pack.clips) for pack in packs)
-    total += sum(sum(vars(counts).values()) for counts in COUNTS.values())
+    if any(clip.dataset == COMPOSED for pack in packs for clip in pack.clips):
+        total += sum(sum(vars(counts).values()) for counts in COUNTS.values())
     with FolderWriter(out) as writer:
         for part in parts_of(packs, left_out, speed):
             if part.speed == 1:
@@ -397,9 +409,9 @@ def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progres
             if progress:
                 progress(len(writer.clips), total)
         for split, parts in by_split.items():
-            for made in compose(parts, split):
+            for made in chain(compose(parts, split), compose_texts(parts, split)):
                 ids = tuple(part.id for part in made.parts)
                 writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids, seams=made.seams)
                 if progress:
-                    progress(len(writer.clips), total)
+                    progress(len(writer.clips), max(total, len(writer.clips)))
         return writer.finish(packs, left_out)

@@ -148,8 +148,13 @@ def _act_alone(facts: Facts, rng: random.Random) -> str:
         text = (rng.random() < HUMAN_SHARE and human_caption(facts, rng)) or short_caption(facts, rng)
         text = text.removesuffix(".")
         if "." not in text and len(text.split()) <= SEPARATE_WORDS:
-            return text if text.startswith("I ") else text[:1].lower() + text[1:]
+            return lower_first(text)
     return short_caption(facts, rng).removesuffix(".")
+
+
+def lower_first(text: str) -> str:
+    """A sentence as it stands within another."""
+    return text if text.startswith("I ") else text[:1].lower() + text[1:]
 
 
 _THEN = (", then ", ", and then ", " and then ", ". Then ", ". After that, ", ", after that ", ", and afterwards ")
@@ -234,8 +239,6 @@ def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ..
         seed: the clip's id: the same clip has the same captions everywhere.
         count: how many.
     """
-    if parts[0].text:
-        return tuple(text for said in parts[0].text for text in said)
     rng = seeded("captions", seed)
     out: dict[str, None] = {}
     wanted = count

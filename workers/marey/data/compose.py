@@ -26,6 +26,9 @@ from marey.data.splice import join_clips
 
 Array = NDArray[np.floating]
 
+COMPOSED = "bandai-namco"
+"""The set whose clips are composed here: its captions come from the grammar."""
+
 # How often an action is drawn for a sequence. Travel and greetings are what prompts ask for; the actions of one or two
 # clips stay rare, or the model would memorise those clips.
 SEQUENCE_WEIGHTS: dict[str, float] = {
@@ -108,7 +111,7 @@ class Composer:
         self.by_act: dict[str, list[Part]] = defaultdict(list)
         self.by_style: dict[tuple[str, str], list[Part]] = defaultdict(list)
         for part in parts:
-            if part.source.dataset == "bandai-namco" and part.facts.act in SEQUENCE_WEIGHTS:
+            if part.source.dataset == COMPOSED and part.facts.act in SEQUENCE_WEIGHTS:
                 self.by_act[part.facts.act].append(part)
                 self.by_style[part.facts.act, part.facts.style].append(part)
         self.acts = sorted(self.by_act)

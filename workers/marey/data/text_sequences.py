@@ -1,0 +1,164 @@
+"""Sequences of two and three actions from clips that have captions of their own.
+
+Studios ask for "bow, then run"; captures hold one action each. Two clips of different actions are joined where their
+poses are near, and what is said of both is what their authors said of each, in order.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from marey.data.captions import lower_first, seeded
+from marey.data.compose import TRIES, Composed
+from marey.data.cuts import best_cut
+from marey.data.describe import FREE_TEXT, Facts, describe_text
+from marey.data.part import FPS, MIN_FRAMES, Part
+from marey.data.retime import LIMIT
+from marey.data.soundness import is_broken
+from marey.data.splice import join_clips
+from marey.vocabulary.entries import load_vocabulary
+
+PAIRS = {"train": 1.2, "val": 0.2, "test": 0.2}
+"""Pairs for each clip of a split that can be joined; an eighth as many sequences of three."""
+CANDIDATES = 12
+"""Clips of an action among which the best seam is taken."""
+WORST_SEAM = 0.35
+"""As `cuts.WORST_SEAM`: lying down goes over to standing nowhere below it."""
+LEAST_FRAMES = 24
+ANYWHERE = ("idle", "walk", "walk-backward", "run", "sprint", "sidestep", "crawl", "sneak", "limp", "fight-stance")
+"""Actions that may be entered and left at any frame; others are shown whole."""
+ENDS = 8
+"""Frames of a whole action that may be cut off at its beginning and at its end."""
+WORDS = 24
+"""A caption with more words is not joined to another."""
+THEN = (", then ", ", then ", ", and then ", " and then ", "; then ", ", after that ", ". Then ")
+SUBJECT = re.compile(
+    r"^(?:(?:an?|the|one|this) (?:\w+ )?(?:person|man|woman|figure|character|dancer|fighter|actor|body|boy|girl|boxer"
+    r"|guy|lady|subject|performer|player)|someone|somebody|he|she|it) (?=\w+s\b)",
+    re.IGNORECASE,
+)
+
+
+def compose_texts(parts: Sequence[Part], split: str) -> Iterator[Composed]:
+    """Sequences of a split, from parts of that split alone."""
+    composer = _Composer(parts)
+    pairs = round(PAIRS.get(split, 0.0) * composer.size)
+    for letter, count, wanted in (("T2", 2, pairs), ("T3", 3, pairs // 8)):
+        if len(composer.actions) < count:
+            continue
+        made = 0
+        for attempt in range(TRIES * wanted):
+            if made >= wanted:
+                break
+            composed = composer.sequence(f"{letter}-{split}-{attempt:05}", count)
+            if composed is not None:
+                made += 1
+                yield composed
+
+
+def joined_texts(acts: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], ...]:
+    """Captions of a sequence by each author who wrote short ones of all its actions, two at most."""
+    rng = seeded("texts", seed)
+    told = []
+    for author in range(min(len(facts.text) for facts in acts)):
+        short = [[text for text in facts.text[author] if len(text.split()) <= WORDS] for facts in acts]
+        if all(short):
+            chosen = (_joined([rng.choice(texts) for texts in short], rng) for _ in range(2))
+            told.append(tuple(dict.fromkeys(chosen)))
+    return tuple(told)
+
+
+def _joined(texts: Sequence[str], rng: random.Random) -> str:
+    first, *others = (text.strip().rstrip(".") for text in texts)
+    said = first
+    for other in others:
+        join = rng.choice([words for words in THEN if "." not in words or first[:1].isupper()])
+        said += join + lower_first(SUBJECT.sub("", other))
+    return f"{said}." if texts[-1].rstrip().endswith(".") else said
+
+
+class _Composer:
+    """Draws clips of one split and joins them."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self._by_action: dict[str, list[Part]] = defaultdict(list)
+        known = load_vocabulary().actions
+        for part in parts:
+            if part.facts.act == FREE_TEXT and part.content in known and len(part.joints) >= LEAST_FRAMES:
+                self._by_action[part.content].append(part)
+        self.actions = sorted(self._by_action)
+        self.size = sum(map(len, self._by_action.values()))
+        self._weights = [len(self._by_action[action]) ** 0.5 for action in self.actions]
+
+    def sequence(self, name: str, count: int) -> Composed | None:
+        """Different actions, each told by some author of all; None where what was drawn does not fit."""
+        rng = seeded("text sequence", name)
+        first = rng.choice(self._by_action[self._draw(rng, ())])
+        chosen, starts, stops = [first], [0], list[int]()
+        frames = 0
+        while len(chosen) < count:
+            room = LIMIT - frames - LEAST_FRAMES * (count - len(chosen))
+            leave = _leaving(chosen[-1], starts[-1], room)
+            action = self._draw(rng, [part.content for part in chosen])
+            found = self._best(rng, chosen[-1], leave, action) if len(leave) else None
+            if found is None:
+                return None
+            following, left, entered = found
+            stops.append(left)
+            frames += left + 1 - starts[-1]
+            chosen.append(following)
+            starts.append(entered)
+        last = _leaving(chosen[-1], starts[-1], LIMIT - frames)
+        if not len(last):
+            return None
+        stops.append(last[-1])
+        return _join(name, chosen, starts, stops)
+
+    def _draw(self, rng: random.Random, before: Sequence[str]) -> str:
+        while True:
+            action = rng.choices(self.actions, self._weights)[0]
+            if not before or action != before[-1]:
+                return action
+
+    def _best(self, rng: random.Random, current: Part, leave: range, action: str) -> tuple[Part, int, int] | None:
+        pool = self._by_action[action]
+        best, least = None, WORST_SEAM
+        for part in rng.sample(pool, min(CANDIDATES, len(pool))):
+            last = len(part.joints) - LEAST_FRAMES
+            enter = range(last + 1) if part.content in ANYWHERE else range(min(ENDS, last) + 1)
+            i, j, cost = best_cut(current, leave, part, enter)
+            if cost < least:
+                best, least = (part, i, j), cost
+        return best
+
+
+def _leaving(part: Part, start: int, room: int) -> range:
+    """Frames after which a clip that was entered at `start` may be left, with room for so many; empty where it has to
+    be shown whole and is too long."""
+    stop = min(len(part.joints), start + room)
+    if part.content in ANYWHERE:
+        return range(start + LEAST_FRAMES - 1, stop)
+    return range(max(len(part.joints) - 1 - ENDS, start + LEAST_FRAMES - 1), stop)
+
+
+def _join(name: str, parts: Sequence[Part], starts: Sequence[int], stops: Sequence[int]) -> Composed | None:
+    """One motion of the pieces, told and sound, or None."""
+    joints = np.empty((0, 22, 3))
+    seams = [0]
+    for part, start, stop in zip(parts, starts, stops, strict=True):
+        piece = part.joints[start : stop + 1].astype(np.float64)
+        joints = join_clips(joints, piece, FPS) if len(joints) else piece
+        seams.append(len(joints))
+    facts = tuple(
+        describe_text(part.facts.text, joints[a:b], FPS)
+        for part, a, b in zip(parts, seams, seams[1:], strict=False)
+        if b - a >= MIN_FRAMES
+    )
+    if len(facts) < len(parts) or len(joints) > LIMIT or is_broken(joints, FPS) or not joined_texts(facts, name):
+        return None
+    return Composed(name, tuple(parts), joints, facts, tuple(seams[1:-1]))
