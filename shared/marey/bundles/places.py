@@ -19,7 +19,7 @@ from marey.registry import find_model, model_names
 GROUP = "marey.bundles"
 OPEN, STARTER = "marey-bundles-open", "marey-bundles-starter"
 STARTER_ENDING = "-starter"
-_OF_THE_PLATFORM = {"minilm-l6": OPEN, "srl-light": OPEN, "evaluator-starter": STARTER}
+_OF_THE_PLATFORM = {"minilm-l6": OPEN, "srl-light": OPEN, "srl-open": OPEN, "evaluator-starter": STARTER}
 
 log = logging.getLogger(__name__)
 

@@ -23,7 +23,12 @@ from marey.vocabulary.scope import ActionLists
 from tests.support.marey import REPOSITORY
 from tests.support.models import STARTERS
 
-SHIPPED = {"evaluator-starter": "54df3f67fce4", "minilm-l6": "71b2f824e524", "srl-light": "2728a1a195b0"}
+SHIPPED = {
+    "evaluator-starter": "54df3f67fce4",
+    "minilm-l6": "71b2f824e524",
+    "srl-light": "2728a1a195b0",
+    "srl-open": "fb336c22b109",
+}
 """Those of models are recorded with the models (`tests/contracts`)."""
 MANIFESTS = sorted(REPOSITORY.glob("models/*/manifest.json"))
 
