@@ -91,6 +91,10 @@ def _jobs(engine: sa.Engine) -> None:
                    idempotency_key="once", body_sha256="0" * 64),
         ).id  # fmt: skip
     parse_texts(engine)
+    with transaction(engine) as conn:
+        text_key = conn.execute(sa.select(job_tables.text_features.c.key).limit(1)).scalar_one()
+        verdict = {"key": "judged", "text_key": text_key, "scope": {"verdict": "known"}}
+        conn.execute(sa.insert(job_tables.prompt_scope).values(verdict))
     commit_all(engine, claim_some(engine, limit=4))
     with transaction(engine) as conn:
         motions = [item.motion.id for item in list_items(conn, DEFAULT_TENANT, job).rows if item.motion]

@@ -17,7 +17,7 @@ from marey.registry import get_model, model_names, resolve, streaming_models
 
 STARTERS = tuple(f"{name}-starter" for name in model_names())
 """The shipped bundles, by name."""
-TEXT_BUNDLES = ("minilm-l6", "srl-light")
+TEXT_BUNDLES = ("minilm-l6", "srl-light", "srl-open")
 """The shipped bundles that read prompts."""
 OTHERS = tuple(name for name in model_names() if name != defaults.MODEL)
 """The models that are not the default."""
@@ -42,7 +42,7 @@ def is_of(model: str, name: str) -> bool:
 
 
 def add_text_bundles(folder: Path) -> None:
-    """Copy the encoder and the labeller of the product into a folder of bundles."""
+    """Copy the encoder and the labellers of the product into a folder of bundles."""
     models = Path(__file__).resolve().parents[2] / "models"
     for name in TEXT_BUNDLES:
         shutil.copytree(models / name, folder / name)
