@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import random
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import cast, get_args
 
 import numpy as np
@@ -323,11 +324,10 @@ def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
     for letter, acts, wanted, make in makers:
         if len(composer.acts) < acts:
             continue
-        made = 0
-        for attempt in range(TRIES * wanted):
-            if made >= wanted:
-                break
-            composed = make(f"{letter}-{split}-{attempt:05}")
-            if composed is not None:
-                made += 1
-                yield composed
+        yield from attempts(f"{letter}-{split}", wanted, make)
+
+
+def attempts(name: str, wanted: int, make: Callable[[str], Composed | None]) -> Iterator[Composed]:
+    """Compose so many clips, each under a name of its own, in at most `TRIES` attempts for each."""
+    made = (make(f"{name}-{attempt:05}") for attempt in range(TRIES * wanted))
+    return islice((composed for composed in made if composed is not None), wanted)

@@ -10,11 +10,12 @@ import random
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from marey.data.captions import lower_first, seeded
-from marey.data.compose import TRIES, Composed
+from marey.data.compose import Composed, attempts
 from marey.data.cuts import best_cut
 from marey.data.describe import FREE_TEXT, Facts, describe_text
 from marey.data.part import FPS, MIN_FRAMES, Part
@@ -49,16 +50,8 @@ def compose_texts(parts: Sequence[Part], split: str) -> Iterator[Composed]:
     composer = _Composer(parts)
     pairs = round(PAIRS.get(split, 0.0) * composer.size)
     for letter, count, wanted in (("T2", 2, pairs), ("T3", 3, pairs // 8)):
-        if len(composer.actions) < count:
-            continue
-        made = 0
-        for attempt in range(TRIES * wanted):
-            if made >= wanted:
-                break
-            composed = composer.sequence(f"{letter}-{split}-{attempt:05}", count)
-            if composed is not None:
-                made += 1
-                yield composed
+        if len(composer.actions) >= count:
+            yield from attempts(f"{letter}-{split}", wanted, partial(composer.sequence, count=count))
 
 
 def joined_texts(acts: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], ...]:
