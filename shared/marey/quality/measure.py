@@ -87,6 +87,21 @@ class Measures:
     self_contact: float
 
 
+def check_joints(joints: NDArray[np.floating], shortest: int, *, where: str) -> NDArray[np.float64]:
+    """Return joints (T >= `shortest`, 22, 3) in double precision.
+
+    Raises:
+        InvalidInput: another shape, or numbers that are not finite.
+    """
+    joints = np.asarray(joints, np.float64)
+    if joints.ndim != 3 or joints.shape[1:] != (len(HUMANML3D), 3) or len(joints) < shortest:
+        wanted = f"(T >= {shortest}, {len(HUMANML3D)}, 3)"
+        raise InvalidInput(f"joints have shape {joints.shape}, not {wanted}", where=where)
+    if not np.isfinite(joints).all():
+        raise InvalidInput("joints hold numbers that are not finite", where=where)
+    return joints
+
+
 def measure(joints: NDArray[np.floating], fps: float) -> Measures:
     """Measure a motion.
 
@@ -97,12 +112,7 @@ def measure(joints: NDArray[np.floating], fps: float) -> Measures:
     Raises:
         InvalidInput: another shape, or numbers that are not finite.
     """
-    joints = np.asarray(joints, np.float64)
-    if joints.ndim != 3 or joints.shape[1:] != (len(HUMANML3D), 3) or len(joints) < SHORTEST:
-        wanted = f"(T >= {SHORTEST}, {len(HUMANML3D)}, 3)"
-        raise InvalidInput(f"joints have shape {joints.shape}, not {wanted}", where="quality")
-    if not np.isfinite(joints).all():
-        raise InvalidInput("joints hold numbers that are not finite", where="quality")
+    joints = check_joints(joints, SHORTEST, where="quality")
     return Measures(
         float_s=round(float_seconds(joints, fps), 3),
         skate=round(skate(joints, fps), 4),

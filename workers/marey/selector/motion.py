@@ -25,10 +25,10 @@ from marey.checks.kinematics import (
     trunk_up,
     velocity,
 )
-from marey.core.errors import InvalidInput
 from marey.motion.body import STATURE, stature
 from marey.motion.feet import runs
 from marey.motion.skeleton import HUMANML3D
+from marey.quality.measure import check_joints
 
 Array = NDArray[np.floating]
 Bool = NDArray[np.bool_]
@@ -92,12 +92,7 @@ class Motion:
         Raises:
             InvalidInput: another shape, or numbers that are not finite.
         """
-        joints = np.asarray(joints, np.float64)
-        if joints.ndim != 3 or joints.shape[1:] != (len(HUMANML3D), 3) or len(joints) < SHORTEST:
-            wanted = f"(T >= {SHORTEST}, {len(HUMANML3D)}, 3)"
-            raise InvalidInput(f"joints have shape {joints.shape}, not {wanted}", where="selector")
-        if not np.isfinite(joints).all():
-            raise InvalidInput("joints hold numbers that are not finite", where="selector")
+        joints = check_joints(joints, SHORTEST, where="selector")
         legs = [
             np.median(np.linalg.norm(joints[:, a] - joints[:, b], axis=-1))
             for pair in (zip(HIPS, KNEES, strict=True), zip(KNEES, ANKLES, strict=True))
