@@ -20,6 +20,7 @@ from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COMPOSED, COUNTS, compose
 from marey.data.describe import ACTS, Facts, describe, describe_text
+from marey.data.gestures import made_gestures
 from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
 from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
@@ -235,6 +236,7 @@ class FolderWriter:
         name: str,
         spliced: tuple[str, ...],
         seams: tuple[int, ...] = (),
+        made: bool = False,
     ) -> None:
         """Encode and append one clip; joints (T, 22, 3)."""
         placed = LAYOUT.canonicalize(joints)
@@ -257,6 +259,7 @@ class FolderWriter:
                 style=part.source.style,
                 mirrored=part.mirrored,
                 speed=part.speed,
+                made=made,
                 spliced=spliced,
                 acts=tuple(facts.act for facts in acts),
                 sides=tuple(facts.side for facts in acts),
@@ -365,6 +368,8 @@ def _choose_texts(acts: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ..
 def _kind(clip: Clip) -> str:
     if clip.spliced:
         return "spliced" if len(clip.acts) > 1 else "looped"
+    if clip.made:
+        return "made"
     if clip.speed != 1:
         return "retimed"
     return "mirrored" if clip.mirrored else "captured"
@@ -408,10 +413,22 @@ def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progres
             writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
             if progress:
                 progress(len(writer.clips), total)
+        for part in list(made_gestures(by_split["train"])):
+            by_split["train"].append(part)
+            writer.add(part, part.joints, (part.facts,), name=part.id, spliced=(), made=True)
+            if progress:
+                progress(len(writer.clips), max(total, len(writer.clips)))
         for split, parts in by_split.items():
-            for made in chain(compose(parts, split), compose_texts(parts, split)):
-                ids = tuple(part.id for part in made.parts)
-                writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids, seams=made.seams)
+            for joined in chain(compose(parts, split), compose_texts(parts, split)):
+                writer.add(
+                    joined.parts[0],
+                    joined.joints,
+                    joined.facts,
+                    name=joined.name,
+                    spliced=tuple(part.id for part in joined.parts),
+                    seams=joined.seams,
+                    made=any(part.made for part in joined.parts),
+                )
                 if progress:
                     progress(len(writer.clips), max(total, len(writer.clips)))
         return writer.finish(packs, left_out)

@@ -63,7 +63,7 @@ class Manifest(BaseModel):
     lengths: dict[str, dict[str, int]]
     """By split, how many clips have so many seconds (`0-1`, `1-2`, …)."""
     kinds: dict[str, int]
-    """captured, mirrored, retimed, looped, spliced."""
+    """captured, mirrored, retimed, made, looped, spliced."""
     captions: int
     caption_files: dict[str, str] = {}
     """Files with captions by people, as `set/captions-author.csv`, with the sha256 of each."""
@@ -98,7 +98,8 @@ class Clip(BaseModel):
     its first part. `speed` is how much faster it is than captured. `acts` are the actions in order, as the caption
     grammar calls them, `sides` the measured side of each: left, right, both, or empty. Where several actions were
     joined, `seams` are the first frames of all but the first action, and `act_captions` say each action alone.
-    `authors` counts the captions of each author, in their order; empty: all by one.
+    `authors` counts the captions of each author, in their order; empty: all by one. `made` says that a gesture in it
+    was not captured (`marey.data.gestures`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -113,6 +114,7 @@ class Clip(BaseModel):
     style: str
     mirrored: bool
     speed: float = 1.0
+    made: bool = False
     spliced: tuple[str, ...]
     acts: tuple[str, ...]
     sides: tuple[str, ...] = ()

@@ -26,6 +26,7 @@ class Part:
         joints: (T, 22, 3) float32 metres at 20 fps.
         facts: what it shows.
         speed: how much faster it is than captured.
+        made: whether its gesture was put onto a captured idle; see `marey.data.gestures`.
     """
 
     id: str
@@ -35,3 +36,4 @@ class Part:
     joints: NDArray[np.float32]
     facts: Facts
     speed: float = 1.0
+    made: bool = False

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     shared out within the class by count^-0.5 of the style: a class with 100 times fewer clips is drawn 10 times
     more rarely, not 100 times; some actions count more (`ACT_WEIGHT`). A class is an action, whatever data set its
     clips come from; a clip whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences
-    have a fixed share (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights.
+    have a fixed share (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights. Made clips are at
+    most half of what is drawn of a class.
     """
     weights = np.zeros(len(clips))
     single = [k for k, clip in enumerate(clips) if len(clip.acts) == 1]
@@ -50,12 +52,25 @@ def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
     styles: dict[str, float] = {}
     for (name, _), count in per_key.items():
         styles[name] = styles.get(name, 0.0) + count**0.5
-    weights = np.zeros(len(clips))
+    shares: dict[str, dict[int, float]] = defaultdict(dict)
     for k, (clip, names) in enumerate(zip(clips, classes, strict=True)):
         for name in names:
-            weights[k] += per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
-        weights[k] *= ACT_WEIGHT.get(clip.acts[0], 1.0)
+            shares[name][k] = per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
+    weights = np.zeros(len(clips))
+    for of_class in shares.values():
+        for k, share in _made_halved(of_class, clips).items():
+            weights[k] += share * ACT_WEIGHT.get(clips[k].acts[0], 1.0)
     return weights / weights.sum() if len(weights) else weights
+
+
+def _made_halved(shares: Mapping[int, float], clips: Sequence[Clip]) -> Mapping[int, float]:
+    """Shares of the clips of a class, with at most half of their sum for made ones where there are captured ones."""
+    made = sum(share for k, share in shares.items() if clips[k].made)
+    captured = sum(shares.values()) - made
+    if not captured or made <= captured:
+        return shares
+    half = (made + captured) / 2
+    return {k: share * half / (made if clips[k].made else captured) for k, share in shares.items()}
 
 
 def draw_captions(authors: NDArray[np.int64], draws: NDArray[np.floating]) -> NDArray[np.int64]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 
 OWN, PACK = "own", "pack"
+LABELLER = "srl-open"
+"""Reads captions and, in the bundles trained on them, prompts: its terms allow production use."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
         from marey.training.texts import CaptionTexts
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    spec = TextSpec() if model is None else choose_bundle(model).manifest.text
+    spec = TextSpec(labeller=LABELLER, in_order=True) if model is None else choose_bundle(model).manifest.text
     if spec is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="--model")
     data = PreparedData.open(folder)

@@ -1,0 +1,214 @@
+"""Gestures put onto a body that stands: arms moved along smooth ways, the trunk bent, the feet left where they are.
+
+Captures for commercial use hold two waves, two raised arms and a bow. `marey.data.gestures` draws more of them on
+captured idles with what is here. Directions are in the frame of the body: outward (away from the body on the arm's own
+side), up, forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import heading
+from marey.data.part import FPS
+from marey.data.splice import with_bones
+from marey.motion.rotations import from_rotvec, normalize, rotate
+from marey.motion.skeleton import HUMANML3D
+
+Array = NDArray[np.floating]
+
+LEFT, RIGHT = "left", "right"
+ARMS = {LEFT: (13, 16, 18, 20), RIGHT: (14, 17, 19, 21)}
+"""Collar, shoulder, elbow and wrist."""
+_SIGN = {LEFT: 1.0, RIGHT: -1.0}
+_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
+_LEGS = (1, 2, 4, 5, 7, 8, 10, 11)
+_CARRIED = [j for j in range(22) if j not in _LEGS[2:]]
+"""Joints that move with the hips."""
+_SPINE = (3, 6, 9)
+_NECK = 12
+_COLLAR_LIFT = np.radians(22.0)  # of a shoulder whose arm points straight up
+_LIFT_FROM, _LIFT_TO = np.radians(-20.0), np.radians(80.0)
+_VIA = {"upper": (35.0, -25.0), "fore": (20.0, 25.0)}  # an arm goes up past the front of the body, the elbow bent
+_BACK = 0.12  # metres by which hips go back as the trunk comes level
+_DOWN = 0.03  # metres by which they go down meanwhile
+_PELVIS_SHARE = 0.45  # of a bow, by the hips; the spine has the rest
+_SWING_FROM = 0.7  # of the way up, from which a hand swings
+
+
+def eased(x: Array) -> Array:
+    """0 to 1 with neither speed nor acceleration at both ends."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x * x)
+
+
+def envelope(frames: int, start: float, rise: float, hold: float, fall: float) -> Array:
+    """(frames,) 0 before `start`, 1 while held, 0 after; all in seconds."""
+    t = np.arange(frames) / FPS - start
+    return eased(t / rise) * (1 - eased((t - rise - hold) / fall))
+
+
+def direction(azimuth: float, elevation: float) -> Array:
+    """(3,) outward, up, forward; azimuth in degrees from forward to outward, elevation in degrees over the level."""
+    a, e = np.radians(azimuth), np.radians(elevation)
+    return np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
+
+
+class Body:
+    """A standing motion (T, 22, 3) at 20 fps whose poses are changed; metres, Y up."""
+
+    def __init__(self, joints: Array) -> None:
+        self.joints = np.array(joints, np.float64)
+        angle = np.radians(heading(self.joints, FPS))
+        zero, one = np.zeros_like(angle), np.ones_like(angle)
+        self._left = np.stack([np.cos(angle), zero, -np.sin(angle)], axis=-1)
+        self._forward = np.stack([np.sin(angle), zero, np.cos(angle)], axis=-1)
+        self._up = np.stack([zero, one, zero], axis=-1)
+
+    def _axes(self, side: str) -> Array:
+        """(T, 3, 3) rows: outward, up, forward."""
+        return np.stack([_SIGN[side] * self._left, self._up, self._forward], axis=1)
+
+    def local(self, vectors: Array, side: str) -> Array:
+        """Vectors (T, 3) of the world, in the body's frame."""
+        return np.einsum("tij,tj->ti", self._axes(side), vectors)
+
+    def world(self, vectors: Array, side: str) -> Array:
+        """The inverse of `local`."""
+        return np.einsum("tij,ti->tj", self._axes(side), vectors)
+
+    def turn(self, joint: int, axis: str, degrees: Array, *, besides: Sequence[int] = ()) -> None:
+        """Rotate everything beyond a joint, and `besides`, about it.
+
+        Args:
+            joint: its number.
+            axis: `left` (positive: forward and down), `forward` (positive: towards the body's right) or `up`
+                (positive: towards its left).
+            degrees: (T,).
+            besides: more joints.
+        """
+        along = {"left": self._left, "forward": self._forward, "up": self._up}[axis]
+        turned = from_rotvec(along * np.radians(degrees)[:, None])
+        moved = [*_beyond(joint), *besides]
+        pivot = self.joints[:, joint : joint + 1]
+        self.joints[:, moved] = pivot + rotate(turned[:, None], self.joints[:, moved] - pivot)
+
+    def move_arm(self, side: str, way: Array, upper: Array, fore: Array, lag: float) -> None:
+        """Move an arm from where it is to another direction and back.
+
+        Args:
+            side: of the arm.
+            way: (T,) how far it has gone, 0 to 1.
+            upper, fore: (T, 3) or (3,) directions of upper arm and forearm at 1, in the body's frame.
+            lag: seconds by which the forearm follows the upper arm.
+        """
+        collar, shoulder, elbow, wrist = ARMS[side]
+        later = np.interp(np.arange(len(way)) - lag * FPS, np.arange(len(way)), way)
+        bones = []
+        for (a, b), weight, target, via in (
+            ((shoulder, elbow), way, upper, direction(*_VIA["upper"])),
+            ((elbow, wrist), np.minimum(later, 1.0), fore, direction(*_VIA["fore"])),
+        ):
+            here = self.local(normalize(self.joints[:, b] - self.joints[:, a]), side)
+            w = weight[:, None]
+            bones.append(normalize((1 - w) ** 2 * here + 2 * w * (1 - w) * via + w**2 * target).astype(np.float64))
+        elevation = np.arcsin(np.clip(bones[0][:, 1], -1, 1))
+        hanging = normalize(self.joints[:, elbow] - self.joints[:, shoulder])[:, 1]
+        rest = np.arcsin(np.clip(hanging, -1, 1))
+        lifted = _COLLAR_LIFT * (_lift(elevation) - _lift(rest))
+        clavicle = self.local(self.joints[:, shoulder] - self.joints[:, collar], side)
+        cos, sin = np.cos(lifted), np.sin(lifted)
+        clavicle = np.stack(
+            [clavicle[:, 0] * cos - clavicle[:, 1] * sin, clavicle[:, 0] * sin + clavicle[:, 1] * cos, clavicle[:, 2]],
+            axis=-1,
+        )
+        self.joints[:, shoulder] = self.joints[:, collar] + self.world(clavicle, side)
+        self.joints[:, elbow] = self.joints[:, shoulder] + _LENGTH[elbow] * self.world(bones[0], side)
+        self.joints[:, wrist] = self.joints[:, elbow] + _LENGTH[wrist] * self.world(bones[1], side)
+
+    def reach(self, side: str, target: Array) -> tuple[Array, Array]:
+        """Directions (T, 3) of upper arm and forearm that bring the wrist to a place, the elbow down and outward.
+
+        Args:
+            side: of the arm.
+            target: (T, 3) the wrist seen from the shoulder, in the body's frame, metres.
+        """
+        _, _, elbow, wrist = ARMS[side]
+        upper, lower = _LENGTH[elbow], _LENGTH[wrist]
+        distance = np.linalg.norm(target, axis=-1, keepdims=True)
+        axis = target / distance
+        distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
+        pole = np.array([0.7, -1.0, -0.3]) - axis * (axis @ np.array([0.7, -1.0, -0.3]))[:, None]
+        along = (distance**2 + upper**2 - lower**2) / (2 * distance)
+        bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * normalize(pole)
+        return normalize(bent), normalize(distance * axis - bent)
+
+    def from_shoulder(self, side: str, points: Array) -> Array:
+        """Points (T, 3) of the world, seen from a shoulder in the body's frame."""
+        return self.local(points - self.joints[:, ARMS[side][1]], side)
+
+    def lean(self, degrees: Array, axis: str, joints: Sequence[int] = _SPINE) -> None:
+        """Bend the spine by `degrees` (T,) in all; see `turn`."""
+        for joint in joints:
+            self.turn(joint, axis, degrees / len(joints))
+
+    def bow(self, degrees: Array, *, arms_hang: float, head: float) -> None:
+        """Bend forward over feet that stay.
+
+        Args:
+            degrees: (T,) of the trunk.
+            arms_hang: 0: the arms keep their place at the trunk; 1: they hang straight down.
+            head: degrees of the neck for each of the trunk; negative: the eyes stay ahead.
+        """
+        hips = self.joints[:, [1, 2]].copy()
+        self.turn(0, "left", _PELVIS_SHARE * degrees, besides=(1, 2))
+        self.joints[:, _CARRIED] += (hips - self.joints[:, [1, 2]]).mean(1, keepdims=True)
+        self.lean((1 - _PELVIS_SHARE) * degrees, "left")
+        self.turn(_NECK, "left", head * degrees)
+        for _, shoulder, _, _ in ARMS.values():
+            self.turn(shoulder, "left", -arms_hang * degrees)
+        sine = np.sin(np.radians(degrees))[:, None, None]
+        self.joints[:, _CARRIED] -= _BACK * sine * self._forward[:, None] + _DOWN * sine * self._up[:, None]
+
+    def solved(self) -> Array:
+        """(T, 22, 3): the poses, bones of the skeleton's lengths, knees solved between hips and feet."""
+        return with_bones(self.joints)
+
+
+def _lift(elevation: Array) -> Array:
+    return eased((elevation - _LIFT_FROM) / (_LIFT_TO - _LIFT_FROM))
+
+
+def _beyond(joint: int) -> list[int]:
+    """Joints whose place depends on a joint; not the legs, which are solved."""
+    found = [joint]
+    for j, parent in enumerate(HUMANML3D.parents):
+        if parent in found and j not in _LEGS:
+            found.append(j)
+    return found[1:]
+
+
+def swung(vectors: Array, degrees: Array) -> Array:
+    """Directions (3,) or (T, 3), swung outward (positive) and inward by `degrees` (T,) in the plane of the chest."""
+    vectors = np.broadcast_to(vectors, (len(degrees), 3))
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.stack(
+        [vectors[:, 0] * cos + vectors[:, 1] * sin, vectors[:, 1] * cos - vectors[:, 0] * sin, vectors[:, 2]], axis=-1
+    )
+
+
+def swings(way: Array, rate: Callable[[Array], Array] | float) -> Array:
+    """(T,) -1 to 1: to and fro while the way is nearly done.
+
+    Args:
+        way: (T,) see `Body.move_arm`.
+        rate: swings to and fro in a second.
+    """
+    t = np.arange(len(way)) / FPS
+    begin = t[int(np.argmax(way >= _SWING_FROM))]
+    rates = np.broadcast_to(rate(t) if callable(rate) else rate, t.shape)
+    phase = np.cumsum(np.where(t >= begin, rates, 0.0)) / FPS
+    return np.sin(2 * np.pi * phase) * eased((way - _SWING_FROM) / (1 - _SWING_FROM))
