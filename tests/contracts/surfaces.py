@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from marey.registry import model_names
+from marey.registry import get_model, model_names
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
@@ -331,8 +331,12 @@ def database(pg_dump: Path, url: str) -> list[str]:
 
 
 def of_model(model: str) -> Any:
-    """The part of a model: its trainings, its bundles, and the log events of its own code."""
+    """The part of a model: its settings, configurations, trainings and bundles, and the log events of its own code."""
+    spec = get_model(model)
+    configs = importlib.import_module(spec.training.config.partition(":")[0]).CONFIGS if spec.training else {}
     return {
+        "settings": {s.name: [s.low, s.high, s.default, s.whole] for s in spec.settings},
+        "configurations": {name: dataclasses.asdict(config) for name, config in configs.items()},
         "command_line": _all_commands()["commands"]["train"]["commands"].get(model),
         "bundle_tensors": _tensors()[model],
         "log_events": _events(modules((MODELS / model).rglob("*.py"))),

@@ -17,7 +17,11 @@ from tests.mutants.recording import SOURCES
 BUDGET_S = 20.0
 """Seconds that a mutant's tests took when they were recorded: a third of the limit, so that only a hang reaches it."""
 
-WHOLE = {"tables.py": "tests/integration/test_migrations.py"}
+WHOLE = {
+    "tables.py": "tests/integration/test_migrations.py",
+    "config.py": "tests/contracts/test_contracts.py",
+    "spec.py": "tests/contracts/test_contracts.py",
+}
 """Tests that hold a whole kind of file, by its name, to something else, without a use of any name in it."""
 
 
@@ -36,7 +40,13 @@ class Selector:
         tree = _parse(self.root / mutation.path)
         chain_of_nodes = _enclosing(tree, mutation.line)
         if chain_of_nodes and isinstance(chain_of_nodes[0], ast.FunctionDef | ast.AsyncFunctionDef):
-            return self.map.covering(mutation.path, _lines_of(tree, mutation.line))
+            found = self.map.covering(mutation.path, _lines_of(tree, mutation.line))
+            name = chain_of_nodes[0].name
+            if _is_cached(chain_of_nodes[0]):  # recorded for the first test alone that asked
+                return found | self._users_of(name)
+            if not found and name in _names_at_import(tree):
+                return self.map.covering(mutation.path, _runtime_lines(tree))
+            return found
         # The line runs once, when its module is imported: tests that run what uses it stand in.
         if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
             return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
@@ -50,7 +60,7 @@ class Selector:
 
     def _stand_ins(self, tree: ast.Module, mutation: Mutation, around: list[ast.AST]) -> Iterator[set[str]]:
         for name in _bound_names(tree, mutation.line):
-            yield set(chain.from_iterable(self.map.covering(path, lines) for path, lines in self._uses[name].items()))
+            yield self._users_of(name)
         for node in [*around, tree]:
             yield self.map.covering(mutation.path, _runtime_lines(node))
         package = str(Path(mutation.path).parent)
@@ -59,6 +69,10 @@ class Selector:
                 self.map.covering(path, self.map.lines[path]) for path in self.map.lines if path.startswith(package)
             )
         )
+
+    def _users_of(self, name: str) -> set[str]:
+        """Tests that run a line, inside a function, that names something."""
+        return set(chain.from_iterable(self.map.covering(path, lines) for path, lines in self._uses[name].items()))
 
     @cached_property
     def _uses(self) -> defaultdict[str, dict[str, set[int]]]:
@@ -123,6 +137,16 @@ def _enclosing(tree: ast.AST, line: int) -> list[ast.AST]:
             elif node.lineno <= line < node.body[0].lineno and not isinstance(node, ast.ClassDef):
                 return [node.args, node]
     return found
+
+
+def _is_cached(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    return any("cache" in ast.unparse(decorator) for decorator in function.decorator_list)
+
+
+def _names_at_import(tree: ast.Module) -> set[str]:
+    """Names that a module reads outside functions."""
+    inside = {id(node) for each in ast.walk(tree) if isinstance(each, ast.FunctionDef) for node in ast.walk(each)}
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in inside}
 
 
 def _statement_at(tree: ast.Module, line: int) -> ast.stmt | None:

@@ -19,8 +19,25 @@ from tests.mutants.selection import Selector
 PRODUCT = "shared/marey/toy.py"
 SOURCE = """\
 import time
+from functools import cache
 
 LIMIT = 10
+
+
+def at_import():
+    return 1
+
+
+@cache
+def known():
+    return 5
+
+
+def asks():
+    return known()
+
+
+ONE = at_import()
 
 
 def double(x, times=2):
@@ -58,6 +75,12 @@ def test_capped():
 
 def test_waits():
     assert toy.waits(False)
+
+def test_asks_first():
+    assert toy.asks() == 5
+
+def test_asks_again():
+    assert toy.asks() == 5
 
 def test_broken():
     assert toy.capped(0) == 1
@@ -126,6 +149,12 @@ def test_a_line_that_runs_on_import_gets_the_tests_of_its_users(root: Path, know
     select = Selector(root, known).select
     assert set(select(mutant(root, "LIMIT = 11").mutation)) == names("test_capped")
     assert set(select(mutant(root, "def double(x, times=3):").mutation)) == names("test_wide", "test_only_elsewhere")
+
+
+def test_what_runs_once_gets_the_tests_of_all_that_ask(root: Path, known: LineMap) -> None:
+    select = Selector(root, known).select
+    assert set(select(mutant(root, "return 6").mutation)) == names("test_asks_first", "test_asks_again")
+    assert set(select(mutant(root, "return 2").mutation)) >= names("test_capped", "test_waits")
 
 
 def test_a_table_is_held_to_the_migrated_schema(tmp_path: Path) -> None:

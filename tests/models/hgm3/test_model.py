@@ -8,7 +8,16 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
+from marey.models.hgm3.conditions import (
+    ACTION,
+    LEVELS,
+    MOTION,
+    SPECIFIC,
+    Condition,
+    GraphAttention,
+    TextNormalizer,
+    graph_batch,
+)
 from marey.models.hgm3.config import PAPER, STARTER, TINY, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
@@ -138,9 +147,9 @@ def test_padding_is_computed_only_without_trim() -> None:
     for model in (masked, residual):
         transformer = model.sequence.transformer
         transformer.register_forward_pre_hook(lambda _, given: lengths.append(given[0].shape[1]))
-    for trim in (True, False):
-        masked(torch.zeros(1, 40, dtype=torch.long), valid, torch.randn(1, 25, 32), visible, valid, trim=trim)
-        residual(torch.randn(1, 40, 16), valid, torch.tensor([1]), residual.sentence(torch.randn(1, 384)), trim=trim)
+    for options in ({}, {"trim": False}):
+        masked(torch.zeros(1, 40, dtype=torch.long), valid, torch.randn(1, 25, 32), visible, valid, **options)
+        residual(torch.randn(1, 40, 16), valid, torch.tensor([1]), residual.sentence(torch.randn(1, 384)), **options)
     multiple = masked.sequence.transformer.multiple
     assert lengths == [pad_length(size, multiple) for size in (5 + 3, 5 + 2, 40 + 25, 40 + 2)]
 
@@ -181,6 +190,22 @@ def test_residual_inputs_are_sums_of_lower_levels_and_nothing_above() -> None:
     tokens = torch.randint(32, (1, 4, 3))
     expected = sum(model.codebooks[v][tokens[..., v]] * model.code_std[v] / model.code_std[0] for v in (0, 1))
     torch.testing.assert_close(model.embed(tokens[..., 0], 0) + model.embed(tokens[..., 1], 1), expected)
+
+
+def test_without_the_codes_of_the_tokenizer_each_level_has_an_embedding_of_its_own() -> None:
+    model = ResidualTransformer(replace(TINY, compact=False)).eval()
+    tokens = torch.randint(32, (1, 4))
+    for level in (0, 1):
+        torch.testing.assert_close(model.embed(tokens, level), model.embedding[level][tokens])
+    assert not torch.equal(model.embed(tokens, 0), model.embed(tokens, 1))
+
+
+@torch.inference_mode()
+def test_a_sentence_is_standardised_by_the_statistics_of_sentences() -> None:
+    normalizer = TextNormalizer(TINY.condition).eval()
+    normalizer.mean.copy_(torch.arange(LEVELS)[:, None].expand(-1, 384) + 1.0)
+    normalizer.std.fill_(2.0)
+    torch.testing.assert_close(normalizer.sentence(torch.full((1, 384), 4.0)), torch.full((1, 384), (4.0 - 1.0) / 2.0))
 
 
 @pytest.mark.parametrize("compact", [True, False])

@@ -16,7 +16,7 @@ from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.spec import SPEC
-from marey.models.mogo.streaming import Streams
+from marey.models.mogo.streaming import StreamBatch
 from tests.support.card import CARD, waits
 from tests.support.card_checks import REQUESTS, main, train
 from tests.support.prepared import text_features, write_prepared
@@ -52,7 +52,7 @@ def rollouts(folder: Path) -> None:
 
 def _step_never_waits(config: MOGOConfig) -> None:
     packed = PackedModel(RQHCTransformer(config).to(CARD), dtype=torch.bfloat16)
-    streams = Streams(packed, 3)
+    streams = StreamBatch(packed, 3)
     for seed in range(2):
         streams.start(torch.randn(config.condition.text_width).to(CARD), seed)
     waits.clear()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from marey.bundles import find_bundle
-from marey.checks.prompts import evaluation_prompts
-from marey.models.mogo.examples import LEAST, SETS, act_of
+from marey.checks.judge import Expectation
+from marey.checks.prompts import HeldOutPrompt, evaluation_prompts
+from marey.models.mogo.examples import LEAST, SETS, act_of, choose
 from marey.models.mogo.live_examples import measured, prompts_of
 from tests.support.marey import REPOSITORY
 
@@ -20,6 +21,21 @@ def test_examples_are_prompts_that_the_bundle_was_measured_to_obey() -> None:
     acts = [act_of(prompts[prompt]) for prompt in offered]
     assert len(set(acts)) == len(acts)
     assert not any(prompts[prompt].separate for prompt in offered)
+
+
+def test_the_best_prompt_of_each_action_is_chosen_and_none_that_is_rarely_obeyed() -> None:
+    def prompt(text: str, act: str, side: str = "") -> HeldOutPrompt:
+        return HeldOutPrompt(text, act, (Expectation(act, side),), False)  # pyright: ignore[reportArgumentType]
+
+    asked = [
+        prompt("waves left", "wave", "left"), prompt("waves its left hand", "wave", "left"),
+        prompt("waves right", "wave", "right"), prompt("bows", "bow"), prompt("walks", "walk"),
+    ]  # fmt: skip
+    obeyed = {"waves left": 19, "waves its left hand": 20, "waves right": 20, "bows": 17, "walks": 18}
+    rows = choose(asked, {text: [True] * n + [False] * (20 - n) for text, n in obeyed.items()})
+    # one for each action, other sides after all actions, "bows" under nine of ten
+    assert [row["prompt"] for row in rows] == ["waves its left hand", "walks", "waves right"]
+    assert rows[0] == {"prompt": "waves its left hand", "obeyed": 20, "sessions": 20}
 
 
 def test_a_bundle_without_measurements_has_none() -> None:

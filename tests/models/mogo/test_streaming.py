@@ -9,6 +9,7 @@ import torch
 
 from marey.core.errors import InvalidInput
 from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.models.mogo.depth import DepthFrame, DepthStep
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.streaming import StreamBatch
 from marey.nn.sampling import guide
@@ -361,3 +362,18 @@ def test_a_saved_session_still_has_its_acts_to_come_and_a_steer_drops_them() -> 
     run(other, 4)
     other.steer(plain, said(1))
     assert torch.equal(run(streams, 16)[dropped], run(other, 16)[plain])
+
+
+@torch.inference_mode()
+def test_levels_after_the_second_branch_is_dropped_are_those_of_the_first_alone() -> None:
+    model = transformer()
+    assert model.depth is not None
+    step = DepthStep(model.depth)
+    states = torch.randn(3, 2, model.lanes, TINY.transformer.width)
+    both, alone = DepthFrame(model.depth, step, states), DepthFrame(model.depth, step, states[:, :1])
+    torch.testing.assert_close(both.next(None)[:, :1], alone.next(None))
+    both.keep_first_branch()
+    below = torch.randn(3, TINY.transformer.width)
+    found, expected = both.next(below), alone.next(below)
+    assert found.shape == expected.shape == (3, 1, TINY.transformer.width)
+    torch.testing.assert_close(found, expected)

@@ -94,6 +94,13 @@ def test_the_same_motion_is_read_however_it_is_written(change):
     assert (clip.skeleton.joint_names, clip.fps, clip.notes) == (("Hips", "Chest"), 30, ())
 
 
+def test_a_joint_without_channels_keeps_its_offset():
+    still = SMALL.replace("CHANNELS 3 Zrotation Xrotation Yrotation", "CHANNELS 0").replace(" 0 90 0\n", "\n")
+    clip = parse(still)
+    joints = forward_kinematics(clip.skeleton, clip.rotations, clip.root)
+    np.testing.assert_allclose(joints[:, 1] - joints[:, 0], [[-0.2, 0, 0]] * 2, atol=1e-6)
+
+
 def test_names_may_hold_spaces_and_other_encodings():
     clip = parse_bvh(SMALL.replace("Chest", "Left Arm é").encode("latin-1"))
     assert clip.skeleton.joint_names[1] == "Left Arm é"
@@ -281,7 +288,7 @@ BROKEN = {
     "unknown channel": (SMALL.replace("3 Zrotation X", "3 Zrotation W"), 9, "Wrotation"),
     "channels missing": (SMALL.replace("3 Zrotation Xrotation Yrotation", "3 Zrotation Xrotation"), 9, "2 named"),
     "channel count": (SMALL.replace("CHANNELS 3", "CHANNELS many"), 9, "many"),
-    "too many channels": (SMALL.replace("CHANNELS 3", "CHANNELS 7"), 9, "7 channels"),
+    "too many channels": (SMALL.replace("CHANNELS 3", "CHANNELS 7"), 9, "7 channels; allowed: 0 to 6"),
     "second root": (SMALL.replace("MOTION", "ROOT b\n{\n}\nMOTION"), 16, "second ROOT"),
     "joint outside": (SMALL.replace("ROOT", "JOINT"), 2, "outside"),
     "joint in end site": (SMALL.replace("\t\t\tOFFSET 0.0 30.0 0.0", "\t\t\tJOINT x"), 12, "inside of an End Site"),
@@ -329,6 +336,10 @@ def test_a_missing_file_is_not_found_and_a_folder_is_no_file(tmp_path):
 
 
 def test_sizes_are_bounded(tmp_path, monkeypatch):
+    with monkeypatch.context() as small:
+        small.setattr(bvh, "MAX_BYTES", 100)
+        with pytest.raises(TooLarge, match="MiB, over the limit"):
+            parse(SMALL)
     path = tmp_path / "a.bvh"
     path.write_text(SMALL)
     monkeypatch.setattr(bvh, "MAX_FRAMES", 1)

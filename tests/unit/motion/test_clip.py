@@ -4,6 +4,7 @@ import io
 import json
 import pickle
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,8 @@ def test_the_file_is_the_contract(tmp_path):
 
 def test_equal_clips_give_equal_bytes():
     assert walker().to_npz() == walker().to_npz()
+    one, other = ({"prompt": "walk", "seed": 7}, {"seed": 7, "prompt": "walk"})
+    assert replace(walker(), manifest=one).to_npz() == replace(walker(), manifest=other).to_npz()
 
 
 def test_seconds_and_frames():

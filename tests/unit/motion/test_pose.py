@@ -56,6 +56,19 @@ def test_rotations_of_bodies_and_of_limbs_with_a_bend_come_back(seed):
         assert off[bent, HUMANML3D.index(hip)].mean() < 6
 
 
+def test_elbows_bent_ahead_of_a_t_pose_turn_about_the_vertical_on_both_sides():
+    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (3, 22, 1))
+    for side, sign in (("L", -1), ("R", 1)):  # towards +Z
+        rotations[:, HUMANML3D.index(f"{side}_elbow")] = about("y", np.radians(sign * 80.0))
+    joints = forward_kinematics(HUMANML3D, rotations, np.zeros((3, 3)))
+    assert (joints[:, [20, 21], 2] > joints[:, [18, 19], 2] + 0.2).all()
+    solved = solve_pose(joints, HUMANML3D).rotations
+    for side in ("L", "R"):
+        for joint in (f"{side}_shoulder", f"{side}_elbow"):
+            off = angle_between(solved[:, HUMANML3D.index(joint)], rotations[:, HUMANML3D.index(joint)])
+            assert np.degrees(off).max() < 1, joint
+
+
 def test_a_bent_knee_turns_about_its_hinge():
     joints = joints_of(*dancer(1, 80))
     knee = to_rotvec(solve_pose(joints, HUMANML3D).rotations[:, HUMANML3D.index("L_knee")])
