@@ -40,7 +40,7 @@ def parse(prompt: str) -> TextFeatures:
     if len(acts) == 1:
         return text
     rows = np.concatenate([act.nodes[:1] for act in acts])
-    return replace(text, acts=tuple(prompt.split(", then ")), act_rows=rows)
+    return replace(text, actions=tuple(prompt.split(", then ")), action_rows=rows)
 
 
 class LiveWorker:

@@ -105,8 +105,8 @@ def _edge(text: Clause) -> int | None:
     if edge is None:
         return None
     said = text.bares[1:edge]
-    acts = text.verbs & set(range(edge)) or _NOUNS & set(said) or any(word.endswith("ing") for word in said)
-    return edge if acts else None
+    acting = text.verbs & set(range(edge)) or _NOUNS & set(said) or any(word.endswith("ing") for word in said)
+    return edge if acting else None
 
 
 def _joins(text: Clause, at: int, join: tuple[str, ...]) -> bool:

@@ -29,9 +29,9 @@ _ASIDE, _LETTING, _OF_WHAT, _PEOPLE, _UNFINITE = (
 _PERSONS = SUBJECTS - {"his", "her", "their", "this", "that"}
 
 
-def join_in_order(acts: tuple[str, ...]) -> str:
+def join_in_order(sentences: tuple[str, ...]) -> str:
     """Join actions into one sentence, in order of time."""
-    return ", and then ".join([acts[0], *(act[:1].lower() + act[1:] for act in acts[1:])]) + "."
+    return ", and then ".join([sentences[0], *(one[:1].lower() + one[1:] for one in sentences[1:])]) + "."
 
 
 def normalize_clause(clause: Clause) -> str:

@@ -29,8 +29,8 @@ class TextFeatures:
     graph: SemanticGraph  # of the rewritten prompt
     nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
     not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
-    acts: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
-    act_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
+    actions: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
+    action_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
 
     @property
     def sentence(self) -> NDArray[np.float16]:
@@ -38,9 +38,9 @@ class TextFeatures:
         return self.nodes[0]
 
     @property
-    def act_vectors(self) -> NDArray[np.float16]:
+    def action_vectors(self) -> NDArray[np.float16]:
         """Pooled encodings of the actions in order, (A, W); that of the whole sentence if there is one action."""
-        return self.nodes[:1] if self.act_rows is None else self.act_rows
+        return self.nodes[:1] if self.action_rows is None else self.action_rows
 
     def to_blob(self) -> bytes:
         """Encode as safetensors fp16 with prompt, rewritten prompt, graph and actions in the metadata."""
@@ -54,9 +54,9 @@ class TextFeatures:
             about["not_rewritten"] = self.not_rewritten
         # one entry: safetensors writes several in random order, and equal features should be equal bytes
         rows = self.nodes
-        if self.act_rows is not None:
-            about["acts"] = list(self.acts)
-            rows = np.concatenate([self.nodes, self.act_rows])
+        if self.action_rows is not None:
+            about["acts"] = list(self.actions)
+            rows = np.concatenate([self.nodes, self.action_rows])
         metadata = {"features": json.dumps(about, ensure_ascii=False)}
         return save({"nodes": np.ascontiguousarray(rows, dtype=np.float16)}, metadata=metadata)
 
@@ -73,12 +73,12 @@ class TextFeatures:
             if about["format"] != FORMAT:
                 raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
             graph = SemanticGraph.from_json(about["graph"])
-            acts, count = tuple(about.get("acts", ())), len(graph.nodes)
-            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != count + len(acts):
-                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {count} nodes and {len(acts)} acts")
-            rows = nodes[count:] if acts else None
+            actions, count = tuple(about.get("acts", ())), len(graph.nodes)
+            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != count + len(actions):
+                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {count} nodes and {len(actions)} actions")
+            rows = nodes[count:] if actions else None
             return cls(
-                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), acts, rows
+                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), actions, rows
             )
         except (InvalidFile, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
             raise InvalidFile(

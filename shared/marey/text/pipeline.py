@@ -165,26 +165,28 @@ class TextPipeline:
         rewritten = self._rewritten(checked)
         read = self._read([text for text, _ in rewritten])
         return [
-            self._features(prompt, graph, acts, reason)
-            for prompt, (_, reason), (graph, acts) in zip(checked, rewritten, read, strict=True)
+            self._features(prompt, graph, actions, reason)
+            for prompt, (_, reason), (graph, actions) in zip(checked, rewritten, read, strict=True)
         ]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
         time."""
         graphs = self._graphs(texts)
-        acts = [split_actions(graph) for graph in graphs]
+        actions = [split_actions(graph) for graph in graphs]
         if self.spec.in_order:
-            several = [k for k, found in enumerate(acts) if len(found) > 1]
-            for k, graph in zip(several, self._graphs([join_in_order(acts[k]) for k in several]), strict=True):
+            several = [k for k, found in enumerate(actions) if len(found) > 1]
+            for k, graph in zip(several, self._graphs([join_in_order(actions[k]) for k in several]), strict=True):
                 graphs[k] = graph
-        return list(zip(graphs, acts, strict=True))
+        return list(zip(graphs, actions, strict=True))
 
-    def _features(self, prompt: str, graph: SemanticGraph, acts: tuple[str, ...], reason: str | None) -> TextFeatures:
-        if len(acts) == 1:
+    def _features(
+        self, prompt: str, graph: SemanticGraph, actions: tuple[str, ...], reason: str | None
+    ) -> TextFeatures:
+        if len(actions) == 1:
             return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason)
-        rows = np.stack(self.pooled(acts)).astype(np.float16)
-        return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason, acts, rows)
+        rows = np.stack(self.pooled(actions)).astype(np.float16)
+        return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason, actions, rows)
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
         """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states

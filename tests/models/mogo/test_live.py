@@ -170,8 +170,8 @@ def test_what_cannot_be_is_refused_and_leaves_the_room_as_it_was(generator: Gene
 
 ACTS = replace(
     text_features(0),
-    acts=("walk forward", "wave"),
-    act_rows=np.concatenate([text_features(0).nodes[:1], text_features(1).nodes[:1]]),
+    actions=("walk forward", "wave"),
+    action_rows=np.concatenate([text_features(0).nodes[:1], text_features(1).nodes[:1]]),
 )
 
 

@@ -30,17 +30,17 @@ def test_a_blob_gives_back_what_went_in() -> None:
     assert np.array_equal(read.sentence, made.nodes[0])
 
 
-def test_acts_come_back_and_one_act_is_the_sentence() -> None:
+def test_actions_come_back_and_one_action_is_the_sentence() -> None:
     made = features()
-    assert np.array_equal(made.act_vectors, made.nodes[:1])
-    acts = np.random.default_rng(1).normal(size=(2, 384)).astype(np.float16)
-    several = replace(made, acts=("he walks", "he bows"), act_rows=acts)
+    assert np.array_equal(made.action_vectors, made.nodes[:1])
+    rows = np.random.default_rng(1).normal(size=(2, 384)).astype(np.float16)
+    several = replace(made, actions=("he walks", "he bows"), action_rows=rows)
     read = TextFeatures.from_blob(several.to_blob())
-    assert read.acts == ("he walks", "he bows")
-    assert np.array_equal(read.act_vectors, acts)
+    assert read.actions == ("he walks", "he bows")
+    assert np.array_equal(read.action_vectors, rows)
     assert np.array_equal(read.nodes, made.nodes)
-    with pytest.raises(InvalidFile, match="3 nodes and 2 acts"):
-        TextFeatures.from_blob(replace(several, act_rows=acts[:1]).to_blob())
+    with pytest.raises(InvalidFile, match="3 nodes and 2 actions"):
+        TextFeatures.from_blob(replace(several, action_rows=rows[:1]).to_blob())
 
 
 @given(st.integers(0, 2000))

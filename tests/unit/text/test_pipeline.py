@@ -107,7 +107,7 @@ def test_a_prompt_of_several_acts_is_read_in_the_order_of_time_where_the_bundle_
     plain, read = pipeline.features([late, one]), ordered.features([late, one])
     assert [f.graph.text for f in read] == ["she walks ahead, and then a person is bowing.", one]
     assert [f.prompt for f in read] == [late, one]
-    assert read[0].acts == plain[0].acts == ("she walks ahead", "a person is bowing")
+    assert read[0].actions == plain[0].actions == ("she walks ahead", "a person is bowing")
     assert ordered.parse([late])[0] == read[0].graph
     assert read[1].to_blob() == plain[1].to_blob()
 

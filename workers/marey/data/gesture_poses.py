@@ -57,7 +57,7 @@ def direction(azimuth: float, elevation: float) -> Array:
     return np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
 
 
-class Body:
+class StandingBody:
     """A standing motion (T, 22, 3) at 20 fps whose poses are changed; metres, Y up."""
 
     def __init__(self, joints: Array) -> None:
@@ -204,7 +204,7 @@ def swings(way: Array, rate: Callable[[Array], Array] | float) -> Array:
     """(T,) -1 to 1: to and fro while the way is nearly done.
 
     Args:
-        way: (T,) see `Body.move_arm`.
+        way: (T,) see `StandingBody.move_arm`.
         rate: swings to and fro in a second.
     """
     t = np.arange(len(way)) / FPS

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from marey.data.captions import seeded
 from marey.data.compose import TRIES
 from marey.data.describe import describe_text
-from marey.data.gesture_poses import ARMS, LEFT, RIGHT, Body, direction, envelope, swings, swung
+from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, direction, envelope, swings, swung
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
@@ -59,7 +59,7 @@ class Gesture:
 
     seconds: float
     kinds: tuple[str, ...]
-    change: Callable[[Body], None]
+    change: Callable[[StandingBody], None]
     side: str = ""
     times: int = 1
 
@@ -98,13 +98,13 @@ def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
         return None
     base = rng.choice(bases)
     standing = _of_length(base.joints.astype(np.float64), frames, rng)
-    body = Body(standing)
+    body = StandingBody(standing)
     gesture.change(body)
     joints = body.solved()
     feet = [7, 8, 10, 11]
     if is_broken(joints, FPS) or np.linalg.norm(joints[:, feet] - standing[:, feet], axis=-1).max() > _SLIPS:
         return None
-    told = _told(gesture, rng)
+    told = _captions_of(gesture, rng)
     source = replace(base.source, content=action, side=gesture.side, captions=told, facts="")
     facts = describe_text(told, joints, FPS)
     return Part(name, source, action, base.mirrored, joints.astype(np.float32), facts, made=True)
@@ -119,8 +119,8 @@ def _of_length(joints: Array, frames: int, rng: random.Random) -> Array:
     return joints[first : first + frames]
 
 
-def _told(gesture: Gesture, rng: random.Random) -> tuple[tuple[str, ...], ...]:
-    """What each voice says of a gesture: of its kind in general or of what is special about it."""
+def _captions_of(gesture: Gesture, rng: random.Random) -> tuple[tuple[str, ...], ...]:
+    """Draw captions of a gesture in each voice: of its kind in general or of what is special about it."""
     told = []
     for said in _captions().values():
         chosen = [rng.choice(said[rng.choice(gesture.kinds)]) for _ in range(CAPTIONS)]
@@ -159,7 +159,7 @@ class _Pace:
         """With some standing after it."""
         return self.seconds + rng.uniform(0.25, 1.3)
 
-    def way(self, body: Body) -> Array:
+    def way(self, body: StandingBody) -> Array:
         return envelope(len(body.joints), self.start, self.rise, self.hold, self.fall)
 
 
@@ -184,7 +184,7 @@ def _wave(rng: random.Random) -> Gesture:
     twist, sway = rng.uniform(-2, 8), rng.uniform(0, 4)
     inward = rng.choice((-1.0, 1.0))
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         way = pace.way(body)
         swing = inward * swings(way, rate)
         _respond(body, way, side, twist, sway)
@@ -217,7 +217,7 @@ def _raise_arm(rng: random.Random) -> Gesture:
     arms = {one: _drawn_arm(rng, _RAISES[form]) for one in _arms(side)}
     twist, sway = rng.uniform(-2, 6), rng.uniform(0, 5)
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         way = pace.way(body)
         _respond(body, way, side, twist, sway)
         for one, arm in arms.items():
@@ -241,7 +241,7 @@ def _guide(rng: random.Random) -> Gesture:
     arm = _drawn_arm(rng, _GUIDES[form])
     twist, stoop = rng.uniform(0, 14), rng.uniform(0, 14)
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         way = pace.way(body)
         body.lean(stoop * way, "left")
         _respond(body, way, side, twist, 0.0)
@@ -259,7 +259,7 @@ def _clap(rng: random.Random) -> Gesture:
     ahead = rng.uniform(0.2, 0.3) if high else rng.uniform(0.27, 0.36)
     apart = rng.uniform(0.1, 0.22)
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         way = pace.way(body)
         gap = 0.05 + apart * (0.5 - 0.5 * swings(way, rate))
         middle = body.joints[:, [ARMS[side][1] for side in SIDES]].mean(1)
@@ -291,7 +291,7 @@ def _arms(side: str) -> tuple[str, ...]:
     return SIDES if side == BOTH else (side,)
 
 
-def _respond(body: Body, way: Array, side: str, twist: float, sway: float) -> None:
+def _respond(body: StandingBody, way: Array, side: str, twist: float, sway: float) -> None:
     """The trunk turns towards a lifted arm and leans away from it, by so many degrees."""
     if side != BOTH:
         sign = 1.0 if side == LEFT else -1.0
@@ -319,7 +319,7 @@ def _bow(rng: random.Random) -> Gesture:
     arms_hang, head = rng.uniform(0.1, 0.9) if not hand else 0.0, rng.uniform(-0.15, 0.3)
     belly = rng.uniform(0.1, 0.28), rng.uniform(0.17, 0.22)
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         ways = [pace.way(body) for pace in paces]
         if hand:
             first, last = paces[0].start, paces[-1].seconds
@@ -343,7 +343,7 @@ def _nod(rng: random.Random) -> Gesture:
     pace = _Pace.draw(rng, (0.2, 0.4), (2.2 / rate, 4.5 / rate))
     neck = rng.uniform(0.1, 0.3)
 
-    def change(body: Body) -> None:
+    def change(body: StandingBody) -> None:
         down = degrees * (0.5 - 0.5 * np.cos(np.pi * pace.way(body))) * (0.6 + swings(pace.way(body), rate))
         body.lean(neck * down, "left", (9,))
         body.lean((1 - neck) * down, "left", (12,))

@@ -123,3 +123,8 @@ class Clip(BaseModel):
     authors: tuple[int, ...] = ()
     seams: tuple[int, ...] = ()
     act_captions: tuple[str, ...] = ()
+
+    @property
+    def captured(self) -> bool:
+        """True for what was captured as it is: not mirrored, joined, made, slower or faster."""
+        return not (self.mirrored or self.spliced or self.made) and self.speed == 1.0

@@ -6,21 +6,18 @@ The limit of a measure is a quantile of the captured clips of a support, not mir
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.data.manifest import Clip
+from marey.data.measured_files import write_measured
 from marey.data.prepared import PreparedData
-from marey.motion.files import write_atomically
 from marey.quality.limits import FILE, LIMITED, OFF_FLOOR, Expected, expected_of
 from marey.quality.measure import Measures, measure
 from marey.vocabulary.entries import Support, load_vocabulary
@@ -61,7 +58,7 @@ class Real:
 
 def read_real(data: PreparedData) -> list[Real]:
     """Measure the captured clips whose actions the vocabulary has."""
-    found = [(clip, _expected(clip)) for clip in data.clips if not clip.mirrored and not clip.spliced]
+    found = [(clip, _expected(clip)) for clip in data.clips if clip.captured]
     return [
         Real(clip.id, expected, measure(data.joints(clip), data.manifest.fps))
         for clip, expected in found
@@ -136,14 +133,8 @@ def document(data: PreparedData, clips: Sequence[Real]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the limits of a prepared folder."""
-    parser = argparse.ArgumentParser(description="Compute the limits of the quality of motions.")
-    parser.add_argument("prepared", type=Path, help="Folder of `marey data prepare`.")
-    parser.add_argument("-o", "--output", type=Path, default=FILE)
-    chosen = parser.parse_args(arguments)
-    data = PreparedData.open(chosen.prepared)
-    text = document(data, read_real(data))
-    write_atomically(chosen.output, text.encode())
-    sys.stdout.write(text)
+    description = "Compute the limits of the quality of motions."
+    write_measured(arguments, description, FILE, lambda data: document(data, read_real(data)))
 
 
 if __name__ == "__main__":

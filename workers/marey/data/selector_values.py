@@ -6,17 +6,14 @@ captured as they are (not mirrored, spliced or of another speed) and show one ac
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
+from marey.data.measured_files import write_measured
 from marey.data.prepared import PreparedData
-from marey.motion.files import write_atomically
 from marey.selector import RULES, Motion, WantedAction, match
 from marey.selector.matching import PASS
 from marey.selector.motion import SHORTEST
@@ -32,8 +29,7 @@ def read_values(data: PreparedData) -> dict[str, list[float]]:
     """Return the values of the clips of each action that has a rule."""
     found: dict[str, list[float]] = defaultdict(list)
     for clip in data.clips:
-        as_captured = not clip.mirrored and not clip.spliced and clip.speed == 1.0
-        if as_captured and clip.content in RULES and clip.length >= SHORTEST:
+        if clip.captured and clip.content in RULES and clip.length >= SHORTEST:
             motion = Motion(data.joints(clip), data.manifest.fps)
             found[clip.content].append(match(motion, [(WantedAction(clip.content),)]))
     return dict(sorted(found.items()))
@@ -68,14 +64,8 @@ def _is_enough(values: Sequence[float]) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the values of a prepared folder."""
-    parser = argparse.ArgumentParser(description="Compute the values of real clips by the selector.")
-    parser.add_argument("prepared", type=Path, help="Folder of `marey data prepare`.")
-    parser.add_argument("-o", "--output", type=Path, default=FILE)
-    chosen = parser.parse_args(arguments)
-    data = PreparedData.open(chosen.prepared)
-    text = document(data, read_values(data))
-    write_atomically(chosen.output, text.encode())
-    sys.stdout.write(text)
+    description = "Compute the values of real clips by the selector."
+    write_measured(arguments, description, FILE, lambda data: document(data, read_values(data)))
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ class ReferenceClip(BaseModel):
             acts=clip.acts,
             sides=sides,
             frames=min(clip.length, max_frames),
-            captured=not clip.mirrored and not clip.spliced,
+            captured=clip.captured,
             captions=clip.captions,
         )
 

@@ -93,7 +93,7 @@ def _match(clip: MotionClip, request: Request) -> PromptMatch:
     """Match a clip with its prompt; recordings of streams, which hold several, have no match."""
     if request.recording is not None:
         return PromptMatch()
-    return match_of(clip, request.text.acts or (request.text.rewritten,))
+    return match_of(clip, request.text.actions or (request.text.rewritten,))
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:

@@ -45,8 +45,8 @@ class MotionData:
         )
 
     def originals(self, split: str) -> list[Clip]:
-        """Return captured clips of a split: no mirror images, no loops or splices."""
-        return [c for c in self.prepared.split(split) if not c.mirrored and not c.spliced]
+        """Return captured clips of a split: see `Clip.captured`."""
+        return [c for c in self.prepared.split(split) if c.captured]
 
     def windows(self, starts: Tensor, size: int) -> Tensor:
         """Return features (B, size, D) from first frames (B,); frames past the end repeat the very last one."""

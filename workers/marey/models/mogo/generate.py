@@ -132,7 +132,7 @@ class Generator:
 
     def actions(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
         """Return the action vectors of a prompt (A, W), and the usual frames of each (A,)."""
-        actions = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.device)
+        actions = torch.from_numpy(text.action_vectors.astype(np.float32)).to(self.device)
         return actions, self.transformer.natural_frames(actions)
 
     def streams(self, count: int, inference: InferenceConfig) -> StreamBatch:
