@@ -26,6 +26,7 @@ from marey.jobs import (
     sweep,
     waiting_batches,
 )
+from marey.jobs.types import MAX_KEEP_DAYS
 from tests.servers.audit import audit
 from tests.servers.jobs import new_item, parse_texts, submit_items
 
@@ -89,7 +90,16 @@ def test_a_bad_item_refuses_the_whole_job(engine: sa.Engine, change: dict[str, o
         assert list_jobs(conn, "default").rows == ()
 
 
-@pytest.mark.parametrize("change", [{"priority": 1001}, {"fail_early": 1.5}, {"name": "a\0"}])
+def test_the_most_days_that_a_job_may_be_kept_are_accepted(engine: sa.Engine) -> None:
+    job = submit_items(engine, 1, keep_days=MAX_KEEP_DAYS)
+    with transaction(engine) as conn:
+        assert get_job(conn, "default", job).keep_days == MAX_KEEP_DAYS
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"priority": 1001}, {"fail_early": 1.5}, {"name": "a\0"}, {"keep_days": 0}, {"keep_days": MAX_KEEP_DAYS + 1}],
+)
 def test_a_job_with_a_bad_value_is_refused(engine: sa.Engine, change: dict[str, object]) -> None:
     with pytest.raises(InvalidInput):
         submit_items(engine, 1, **change)

@@ -259,6 +259,7 @@ def test_three_levels_a_step_average_the_same_loss_as_one_drawn(prepared: Prepar
     loss, logs = three.loss(context(fraction=0.0))
     assert torch.isfinite(loss)
     assert 0 < float(logs["reconstruction"]) < 10
+    assert 0 <= float(logs["accuracy"]) <= 1
 
 
 def test_configurations_survive_json() -> None:

@@ -10,7 +10,15 @@ import pytest
 import torch
 
 from marey.data.prepared import PreparedData
-from marey.models.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
+from marey.models.mogo import ablation
+from marey.models.mogo.ablation import (
+    SCALES,
+    VARIANTS,
+    LevelToken,
+    ablate_tokenizer,
+    train_tokenizer,
+    train_transformer,
+)
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.config import TINY
 from marey.models.mogo.train import train_stage
@@ -52,6 +60,27 @@ def test_variants_of_the_transformer_share_tokens_and_steers(options: TrainOptio
     assert found[0] == found[1]  # the same variant twice: same data, same seed
     assert set(found[0]) == {"accuracy/0", *(f"loss/{level}" for level in range(TINY.tokenizer.levels))}
     assert (tmp_path / "0" / TOKENS).read_bytes() == (tmp_path / "1" / TOKENS).read_bytes()
+
+
+def test_an_ablation_goes_on_where_it_stopped(
+    prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trained: list[str] = []
+
+    def train(scale: str, options: TrainOptions) -> dict[str, float]:
+        trained.append(scale)
+        if len(trained) == 2:
+            raise KeyboardInterrupt
+        return {"local_mm": float(len(trained))}
+
+    monkeypatch.setattr(ablation, "train_tokenizer", train)
+    arguments = (prepared.path, str(options.run / "bundle"), tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1)
+    shown = ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1)
+    assert trained == [*SCALES.values()][:2] + [*SCALES.values()][1:]
+    assert shown.count("|\n") >= len(SCALES)
+    assert ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1) == shown
 
 
 @pytest.mark.parametrize("name", VARIANTS)

@@ -67,6 +67,21 @@ def test_the_clock_of_an_act_that_goes_on_although_it_is_over_stops(frame: int, 
     assert torch.equal(state(), before) != told
 
 
+@pytest.mark.parametrize(("frame", "told"), [(1, True), (10, True), (11, False)])
+def test_frames_that_were_read_again_have_the_time_that_they_were_drawn_with(frame: int, told: bool) -> None:
+    packed = PackedModel(transformer())
+    assert packed.times is not None
+
+    def state() -> torch.Tensor:
+        streams = StreamBatch(packed, 1)
+        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=ActionStart(0, 0))
+        return streams.states()
+
+    before = state()
+    packed.times[frame] += 1
+    assert torch.equal(state(), before) != told
+
+
 def test_guidance_is_told_no_time_where_it_is_told_no_prompt() -> None:
     packed = PackedModel(transformer())
     assert packed.times is not None

@@ -100,6 +100,12 @@ def test_one_lane_for_all_levels_reads_whole_frames_of_the_past_and_nothing_late
             assert not torch.allclose(first[:, any_level, 5:], second[:, any_level, 5:])
 
 
+def test_the_usual_duration_is_learned_whatever_the_features_are() -> None:
+    regression = DurationRegression(TINY)
+    regression.fit(torch.zeros(2, TINY.condition.text_width), torch.tensor([21, 21]))
+    assert regression(torch.zeros(1, TINY.condition.text_width)).tolist() == [21]
+
+
 def test_one_lane_for_all_levels_needs_a_depth_head() -> None:
     with pytest.raises(InvalidInput, match="needs a depth head"):
         replace(JOINT, depth=replace(JOINT.depth, layers=0))

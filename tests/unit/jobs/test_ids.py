@@ -13,6 +13,12 @@ def test_an_id_is_a_uuid_of_version_7_that_holds_the_time() -> None:
     assert before <= made.int >> 80 <= time.time_ns() // 1_000_000
 
 
+def test_all_62_bits_after_the_variant_are_random() -> None:
+    made = [new_id().int for _ in range(200)]
+    for bit in range(62):
+        assert len({number >> bit & 1 for number in made}) == 2, bit
+
+
 def test_ids_are_in_the_order_in_which_they_were_made_and_differ() -> None:
     made = []
     for _ in range(100):

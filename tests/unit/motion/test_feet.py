@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
+from marey.motion.feet import FLOOR_BAND, _fill, clean_feet, find_contacts, floor_height, runs, skate
 from marey.motion.filters import smooth_above
 from marey.motion.kinematics import bone_lengths
 from marey.motion.legs import two_bone_knee
@@ -166,6 +166,28 @@ def test_a_long_walker_is_cleaned_like_a_short_one():
 )
 def test_runs_are_found(mask, found):
     assert runs(np.array(mask, bool)) == found
+
+
+def test_a_curve_between_stretches_meets_the_slopes_at_its_own_ends():
+    known = np.zeros(40, bool)
+    known[5:15] = known[25:35] = True
+    steps = np.arange(40.0)
+    values = np.where(steps < 20, 0.1 * (steps - 14) ** 2, 0.2 * (steps - 30) ** 2)[:, None]
+    filled = _fill(values, known, 20.0)[:, 0]
+    np.testing.assert_array_equal(filled[known], values[known, 0])
+    first, second = values[25:28, 0], values[12:15, 0]
+    assert filled[25] - filled[24] == pytest.approx(np.diff(first).mean(), abs=0.5)
+    assert filled[15] - filled[14] == pytest.approx(np.diff(second).mean(), abs=0.5)
+
+
+def test_the_floor_is_where_the_lowest_tenth_of_the_frames_stand():
+    joints = np.repeat(walker().joints[:1], 100, axis=0).astype(float)
+    toes = joints[0, list(HUMANML3D.feet[1::2]), 1].min()
+    joints[..., 1] += 0.3 - toes
+    joints[15:, :, 1] += 0.1  # on tiptoe for most of the time
+    low = floor_height(joints, HUMANML3D)
+    joints[:, :, 1] -= 0.3 - toes
+    assert low == pytest.approx(0.3 - np.clip(0.3, *FLOOR_BAND))
 
 
 def test_a_smooth_cover_is_nowhere_below():
