@@ -8,7 +8,7 @@ import pytest
 
 from marey.checks.prompts import PromptSet, evaluation_prompts
 from marey.data.captions import captions, joined_caption, long_caption, seeded, short_caption
-from marey.data.describe import ACTS, STYLE_NAMES, describe
+from marey.data.describe import ACTIONS, STYLE_NAMES, describe
 from marey.data.english import conjugate, gerund, third, with_adjective
 from marey.data.grammar import grammar
 from marey.data.phrases import PAIR
@@ -94,8 +94,8 @@ def test_long_captions_have_thirty_to_sixty_words(name):
 
 def test_each_act_has_ten_phrasings_and_each_style_several():
     words = grammar()
-    assert all(len(set(act.phrases)) >= 10 for act in words.acts.values())
-    assert set(ACTS.values()) <= set(words.acts)
+    assert all(len(set(action.phrases)) >= 10 for action in words.actions.values())
+    assert set(ACTIONS.values()) <= set(words.actions)
     assert all(len(set(style.after)) >= 5 for style in words.styles.values())
     assert set(STYLE_NAMES.values()) <= set(words.styles)
 
@@ -136,8 +136,8 @@ def trained_phrases() -> set[str]:
     """All phrases of the grammar, in all forms, sides and hands, without their measured numbers."""
     out = set()
     words = grammar()
-    phrases = [p for act in words.acts.values() for p in (*act.phrases, *act.nouns, *act.whole)]
-    phrases += [p for act in words.acts.values() for rows in act.manners.values() for p in rows]
+    phrases = [p for action in words.actions.values() for p in (*action.phrases, *action.nouns, *action.whole)]
+    phrases += [p for action in words.actions.values() for rows in action.manners.values() for p in rows]
     for phrase in phrases:
         for side, hands in (("left", "left hand"), ("right", "right hand"), ("both", "both hands")):
             for his in ("his", "her", "their", "the"):
@@ -180,7 +180,7 @@ def known(text: str, trained: set[str]) -> bool:
     words = grammar()
     for after in (plain(a) for style in words.styles.values() for a in style.after if a):
         text = re.sub(rf"(^{after} | {after}$)", "", text).strip()
-    subjects = [*words.subjects, *(w for act in words.acts.values() for w in act.who)]
+    subjects = [*words.subjects, *(w for action in words.actions.values() for w in action.who)]
     subjects += [w for style in words.styles.values() for w in style.who]
     who = {w for subject in subjects for w in plain(subject).split()}
     who |= {w for style in words.styles.values() for adjective in style.adjective for w in plain(adjective).split()}
@@ -241,7 +241,7 @@ def test_verbs_are_conjugated(verb, she, ing):
 
 
 def test_every_verb_of_the_grammar_has_its_forms():
-    verbs = {v for act in grammar().acts.values() for p in act.phrases for v in re.findall(r"<(\w+)>", p)}
+    verbs = {v for action in grammar().actions.values() for p in action.phrases for v in re.findall(r"<(\w+)>", p)}
     assert {gerund(v) for v in verbs} >= {"running", "spinning", "putting", "letting", "cutting", "jogging", "making"}
     assert not [v for v in verbs if re.fullmatch(r"[^aeiou]*[aeiou][bdgmnpt]", v) and gerund(v)[len(v)] != v[-1]]
 

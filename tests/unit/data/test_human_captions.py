@@ -42,23 +42,23 @@ def fields_of(text: str) -> set[str]:
 
 
 def test_every_act_that_prompts_ask_for_is_told_in_many_ways():
-    assert set(human_captions().acts) == set(KNOWN)
-    assert all(len(rows) >= 60 for rows in human_captions().acts.values())
+    assert set(human_captions().actions) == set(KNOWN)
+    assert all(len(rows) >= 60 for rows in human_captions().actions.values())
 
 
 @pytest.mark.parametrize("act", KNOWN)
-def test_captions_of_an_act_name_only_what_is_measured_on_it(act):
-    for row in human_captions().acts[act]:
-        assert fields_of(row) <= KNOWN[act], row
-        if "side" in KNOWN[act] and not act.endswith("_both"):
+def test_captions_of_an_act_name_only_what_is_measured_on_it(action):
+    for row in human_captions().actions[action]:
+        assert fields_of(row) <= KNOWN[action], row
+        if "side" in KNOWN[action] and not action.endswith("_both"):
             assert fields_of(row) & {"side", "hands", "arms", "one"}, row
 
 
 def test_frames_have_each_act_once():
-    for rows, acts in ((human_captions().two, "ab"), (human_captions().stop, "ab"), (human_captions().three, "abc")):
+    for rows, actions in ((human_captions().two, "ab"), (human_captions().stop, "ab"), (human_captions().three, "abc")):
         for row in rows:
             named = [name[0] for name in re.findall(r"{([abc](?:_\w+)?)}", row)]
-            assert sorted(named) == list(acts), row
+            assert sorted(named) == list(actions), row
 
 
 def test_one_side_after_the_other_names_both_sides():
@@ -95,7 +95,7 @@ def test_a_told_sequence_says_both_acts_and_is_complete():
 
 
 def test_some_captions_of_a_clip_are_told_and_some_made_by_the_grammar():
-    rows = [re.sub(r"{\w+}", "", row) for row in human_captions().acts["bow"]]
+    rows = [re.sub(r"{\w+}", "", row) for row in human_captions().actions["bow"]]
     whole = {plain(row) for row in rows if row}
     drawn = [plain(caption([EXAMPLES["bow"]()], seeded(k))) for k in range(200)]
     share = sum(any(text.startswith(row[:30]) for row in whole) for text in drawn) / len(drawn)
@@ -104,7 +104,7 @@ def test_some_captions_of_a_clip_are_told_and_some_made_by_the_grammar():
 
 @pytest.mark.parametrize("which", get_args(PromptSet))
 def test_no_prompt_of_a_set_is_told(which):
-    tables = (human_captions().acts, human_captions().same, human_captions().pairs)
+    tables = (human_captions().actions, human_captions().same, human_captions().pairs)
     patterns = [re.compile(pattern(row)) for table in tables for rows in table.values() for row in rows]
     for prompt in evaluation_prompts(which):
         assert not any(p.fullmatch(plain(prompt.text)) for p in patterns), prompt.text

@@ -77,7 +77,7 @@ def test_few_clips_contradict_their_label(parts, left_out):
 
 def test_the_checker_passes_real_test_clips_and_refuses_other_acts(parts):
     test = [p for p in parts if p.source.split == "test" and not p.mirrored]
-    found = rates([LabelledClip(p.id, (p.facts.act,), (p.facts.side,), lambda p=p: p.joints) for p in test], 20.0)
+    found = rates([LabelledClip(p.id, (p.facts.action,), (p.facts.side,), lambda p=p: p.joints) for p in test], 20.0)
     assert found.overall.share >= 0.97, found.failures
     for name, rate in found.own.items():
         assert rate.share >= 0.9, name
@@ -90,7 +90,7 @@ def test_sequences_are_in_order_and_no_rougher_than_their_parts(parts):
     made = [c for k in range(60) if (c := composer.sequence(f"test-{k}", 2)) is not None]
     assert len(made) > 30
     clips = [
-        LabelledClip(c.name, tuple(f.act for f in c.facts), tuple(f.side for f in c.facts), lambda c=c: c.joints)
+        LabelledClip(c.name, tuple(f.action for f in c.facts), tuple(f.side for f in c.facts), lambda c=c: c.joints)
         for c in made
     ]
     found = rates(clips, 20.0)

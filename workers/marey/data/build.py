@@ -19,7 +19,7 @@ from marey.data import manifest as names
 from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COMPOSED, COUNTS, compose
-from marey.data.describe import ACTS, Facts, describe, describe_text
+from marey.data.describe import ACTIONS, Facts, describe, describe_text
 from marey.data.gestures import made_gestures
 from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
@@ -184,7 +184,7 @@ def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
 
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
     """Facts of a clip: captions of its index, or the caption grammar where that knows the action."""
-    if clip.captions or content not in ACTS:
+    if clip.captions or content not in ACTIONS:
         seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
         authors = clip.captions or ((seen,),)
         if mirrored:
@@ -231,7 +231,7 @@ class FolderWriter:
         self,
         part: Part,
         joints: NDArray[np.floating],
-        acts: Sequence[Facts],
+        actions: Sequence[Facts],
         *,
         name: str,
         spliced: tuple[str, ...],
@@ -245,8 +245,8 @@ class FolderWriter:
         self._features.write(np.ascontiguousarray(features, "<f4").tobytes())
         self._local.write(np.ascontiguousarray(local, "<f2").tobytes())
         self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
-        walked = acts[0].gait
-        told = _choose_texts(acts, name)
+        walked = actions[0].gait
+        told = _choose_texts(actions, name)
         self.clips.append(
             Clip(
                 id=name,
@@ -261,23 +261,23 @@ class FolderWriter:
                 speed=part.speed,
                 made=made,
                 spliced=spliced,
-                acts=tuple(facts.act for facts in acts),
-                sides=tuple(facts.side for facts in acts),
+                acts=tuple(facts.action for facts in actions),
+                sides=tuple(facts.side for facts in actions),
                 measured=Measured(
                     seconds=round(len(features) / FPS, 2),
                     path=round(walked.path, 2),
                     turn=round(walked.turn, 1),
                     speed=round(walked.speed, 2),
                     steps=walked.steps,
-                    side=acts[0].side,
+                    side=actions[0].side,
                 ),
-                captions=tuple(chain(*told)) or captions(acts, name, phrasings(acts, spliced=bool(spliced))),
+                captions=tuple(chain(*told)) or captions(actions, name, phrasings(actions, spliced=bool(spliced))),
                 authors=tuple(map(len, told)),
                 seams=seams,
                 act_captions=tuple(
                     facts.text[0][0] if facts.text else captions([facts], f"{name}/{k}", 1)[0]
-                    for k, facts in enumerate(acts)
-                    if len(acts) > 1
+                    for k, facts in enumerate(actions)
+                    if len(actions) > 1
                 ),
             )
         )
@@ -358,11 +358,11 @@ class FolderWriter:
         )
 
 
-def _choose_texts(acts: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:
+def _choose_texts(actions: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:
     """Captions of a clip by each author of its source's own ones; none where it has none."""
-    if not acts[0].text:
+    if not actions[0].text:
         return ()
-    return acts[0].text if len(acts) == 1 else joined_texts(acts, name)
+    return actions[0].text if len(actions) == 1 else joined_texts(actions, name)
 
 
 def _kind(clip: Clip) -> str:

@@ -67,7 +67,7 @@ def _voice_of(subject: str, rng: random.Random) -> _Voice:
 def short_caption(facts: Facts, rng: random.Random) -> str:
     """A few words: the action, and its style as an adverb, an adjective or not at all."""
     style = grammar().styles[facts.style]
-    words = grammar().acts[facts.act]
+    words = grammar().actions[facts.action]
     if verbless := _verbless(facts, rng):
         return _loosen(with_adverb(verbless, rng.choice(style.after)), rng)
     draw = rng.random()
@@ -85,7 +85,7 @@ def short_caption(facts: Facts, rng: random.Random) -> str:
 
 def _verbless(facts: Facts, rng: random.Random) -> str | None:
     """Sometimes a caption without a person: a noun phrase, or the limb as its subject."""
-    words = grammar().acts[facts.act]
+    words = grammar().actions[facts.action]
     draw = rng.random()
     phrases = words.nouns if draw < NOUN_SHARE else words.whole if draw < NOUN_SHARE + WHOLE_SHARE else ()
     if not phrases or facts.repeats > 1:
@@ -100,12 +100,12 @@ def long_caption(facts: Facts, rng: random.Random) -> str:
     style = g.styles[facts.style]
     voice = _voice(rng, plain=True)
     values = fields(facts, rng, voice.pronoun)
-    act = with_adverb(voice.clause(phrase_of(facts, rng, voice.pronoun)), rng.choice(style.after))
+    action = with_adverb(voice.clause(phrase_of(facts, rng, voice.pronoun)), rng.choice(style.after))
     names = details(facts)
     rng.shuffle(names)
     clauses = [text for name in names[:2] if (text := fill(rng.choice(g.details[name].clause), values))]
     said = [text for name in names[2:] if (text := fill(rng.choice(g.details[name].sentence), values))]
-    sentences = [sentence(", ".join([act, *clauses])), rng.choice(style.sentence), *map(sentence, said)]
+    sentences = [sentence(", ".join([action, *clauses])), rng.choice(style.sentence), *map(sentence, said)]
     again = _voice(rng, plain=True)
     while len(" ".join(sentences).split()) < LONG_WORDS[0]:
         more = with_adverb(again.clause(phrase_of(facts, rng, again.pronoun)), "")
@@ -127,7 +127,7 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     g = grammar()
     same = len({facts.style for facts in parts}) == 1
     style = g.styles[parts[0].style]
-    voice = _voice(rng, plain=False, who=style.who + g.acts[parts[0].act].who if same else ())
+    voice = _voice(rng, plain=False, who=style.who + g.actions[parts[0].action].who if same else ())
     text = _pair(parts, rng) if len(parts) == 2 and rng.random() < PAIR_SHARE else None
     if text is None:
         text = _framed(parts, rng, voice, same=same)
@@ -163,9 +163,9 @@ _THEN = (", then ", ", and then ", " and then ", ". Then ", ". After that, ", ",
 def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
     """The words that two actions have together ("slows to a walk"); None where they have none."""
     joins, (first, second) = grammar().joins, parts
-    phrases = joins.pairs.get(f"{first.act}-{second.act}", ())
-    if first.act == second.act:
-        phrases = joins.same.get(first.act, ())
+    phrases = joins.pairs.get(f"{first.action}-{second.action}", ())
+    if first.action == second.action:
+        phrases = joins.same.get(first.action, ())
     if not phrases:
         return None
     values = {f"{name}_{key}": value for name, facts in zip("ab", parts, strict=True)
@@ -177,7 +177,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: 
     """A frame with the phrase of each action in its place."""
     g = grammar()
     frames = g.joins.two if len(parts) == 2 else g.joins.three
-    if len(parts) == 2 and parts[0].act in LOCOMOTION and parts[1].act not in LOCOMOTION:
+    if len(parts) == 2 and parts[0].action in LOCOMOTION and parts[1].action not in LOCOMOTION:
         frames += g.joins.halt
     text = rng.choice([f for f in frames if voice.subject or "{who}" not in f]).replace("{who}", voice.again)
     for name, facts in zip("abc", parts, strict=False):
@@ -217,7 +217,7 @@ def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
     """Number of captions of a clip: enough that none is drawn over and over."""
     if len(parts) > 1:
         return 4
-    return PHRASINGS.get(parts[0].act, 2 if spliced else 3)
+    return PHRASINGS.get(parts[0].action, 2 if spliced else 3)
 
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:

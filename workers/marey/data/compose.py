@@ -109,28 +109,28 @@ class Composer:
     """Draws clips of one split and composes them."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
-        self.by_act: dict[str, list[Part]] = defaultdict(list)
+        self.by_action: dict[str, list[Part]] = defaultdict(list)
         self.by_style: dict[tuple[str, str], list[Part]] = defaultdict(list)
         for part in parts:
-            if part.source.dataset == COMPOSED and part.facts.act in SEQUENCE_WEIGHTS:
-                self.by_act[part.facts.act].append(part)
-                self.by_style[part.facts.act, part.facts.style].append(part)
-        self.acts = sorted(self.by_act)
+            if part.source.dataset == COMPOSED and part.facts.action in SEQUENCE_WEIGHTS:
+                self.by_action[part.facts.action].append(part)
+                self.by_style[part.facts.action, part.facts.style].append(part)
+        self.actions = sorted(self.by_action)
 
     def sequence(self, name: str, count: int) -> Composed | None:
         """Two or three different actions, or None when what was drawn does not fit."""
         rng = seeded("sequence", name)
-        acts = self._draw_acts(rng, count)
+        actions = self._draw_actions(rng, count)
         same_style = rng.random() < 0.75
-        part = self._draw_first(rng, acts[0])
-        budget = LIMIT - sum(30 if act in CYCLIC else 45 for act in acts[1:])
-        start, stop = _cut_first(part, rng, budget, len(acts))
+        part = self._draw_first(rng, actions[0])
+        budget = LIMIT - sum(30 if action in CYCLIC else 45 for action in actions[1:])
+        start, stop = _cut_first(part, rng, budget, len(actions))
         if stop.stop <= stop.start:
             return None
         chosen, joints, seams = [part], np.empty((0, 22, 3)), [0]
         current, first = part, start
-        for act in acts[1:]:
-            found = self._best_next(rng, current, stop, act, part.facts.style if same_style else None)
+        for action in actions[1:]:
+            found = self._best_next(rng, current, stop, action, part.facts.style if same_style else None)
             if found is None:
                 return None
             following, leave, enter = found
@@ -142,36 +142,36 @@ class Composer:
             stop = _leave_range(following, enter, rng, LIMIT - len(joints) - 30 * (count - len(chosen)))
             if stop.stop <= stop.start:
                 return None
-        last = int(rng.choice(stop)) if current.facts.act in CYCLIC else stop.stop - 1
+        last = int(rng.choice(stop)) if current.facts.action in CYCLIC else stop.stop - 1
         joints = join_clips(joints, current.joints[first : last + 1].astype(np.float64), FPS)
         seams.append(len(joints))
         return _checked(name, chosen, joints, seams)
 
-    def _draw_acts(self, rng: random.Random, count: int) -> list[str]:
-        acts: list[str] = []
-        while len(acts) < count:
-            if acts and acts[-1] in SIDED and rng.random() < OTHER_SIDE_SHARE:
-                acts.append(acts[-1])
+    def _draw_actions(self, rng: random.Random, count: int) -> list[str]:
+        actions: list[str] = []
+        while len(actions) < count:
+            if actions and actions[-1] in SIDED and rng.random() < OTHER_SIDE_SHARE:
+                actions.append(actions[-1])
                 continue
-            if acts and acts[-1] in REVERSALS and rng.random() < REVERSAL_SHARE:
-                acts.append(REVERSALS[acts[-1]])
+            if actions and actions[-1] in REVERSALS and rng.random() < REVERSAL_SHARE:
+                actions.append(REVERSALS[actions[-1]])
                 continue
-            act = rng.choices(self.acts, [SEQUENCE_WEIGHTS[a] for a in self.acts])[0]
-            if not acts or act != acts[-1] or act in SIDED:
-                acts.append(act)
-        return acts
+            action = rng.choices(self.actions, [SEQUENCE_WEIGHTS[a] for a in self.actions])[0]
+            if not actions or action != actions[-1] or action in SIDED:
+                actions.append(action)
+        return actions
 
-    def _draw_first(self, rng: random.Random, act: str) -> Part:
-        style = rng.choice(sorted({part.facts.style for part in self.by_act[act]}))
-        return rng.choice(self.by_style[act, style])
+    def _draw_first(self, rng: random.Random, action: str) -> Part:
+        style = rng.choice(sorted({part.facts.style for part in self.by_action[action]}))
+        return rng.choice(self.by_style[action, style])
 
     def _best_next(
-        self, rng: random.Random, current: Part, leave: range, act: str, style: str | None
+        self, rng: random.Random, current: Part, leave: range, action: str, style: str | None
     ) -> tuple[Part, int, int] | None:
-        pool = self.by_style.get((act, style or ""), []) or self.by_act[act]
+        pool = self.by_style.get((action, style or ""), []) or self.by_action[action]
         best, least = None, WORST_SEAM
         for part in rng.sample(pool, min(_CANDIDATES, len(pool))):
-            if (part.facts.act, part.facts.side) == (current.facts.act, current.facts.side):
+            if (part.facts.action, part.facts.side) == (current.facts.action, current.facts.side):
                 continue
             i, j, cost = best_cut(current, leave, part, _enter_range(part))
             if cost < least:
@@ -180,26 +180,28 @@ class Composer:
 
     # -- one action, another length ------------------------------------------------------------------------------------
 
-    def gesture(self, name: str, act: str, lengths: range) -> Composed | None:
+    def gesture(self, name: str, action: str, lengths: range) -> Composed | None:
         """A gesture of one of these lengths, done once."""
-        if act not in self.by_act:
+        if action not in self.by_action:
             return None
         rng = seeded("retimed", name)
-        part = self._draw_first(rng, act)
+        part = self._draw_first(rng, action)
         return self._measured_again(name, part, stretch(part, rng.choice(lengths), rng, repeat_share=0))
 
     def retimed(self, name: str) -> Composed | None:
         """One action, longer or shorter than it was captured."""
         rng = seeded("retimed", name)
-        weights = [len(self.by_act[a]) ** 0.25 * (0.4 if a in ("dash", "walk_diagonal") else 1.0) for a in self.acts]
-        act = rng.choices(self.acts, weights)[0]
-        part = self._draw_first(rng, act)
+        weights = [
+            len(self.by_action[a]) ** 0.25 * (0.4 if a in ("dash", "walk_diagonal") else 1.0) for a in self.actions
+        ]
+        action = rng.choices(self.actions, weights)[0]
+        part = self._draw_first(rng, action)
         target = rng.randint(32, LIMIT)
-        if act in CYCLIC:
+        if action in CYCLIC:
             made = crop(part, target, rng) if target < 0.8 * len(part.joints) else loop(part, target)
-        elif act == "turn":
+        elif action == "turn":
             made = self._on_a_way(rng, part, target, before=1.0)
-        elif act in ("wave", "raise", "guide", "bow", "call"):
+        elif action in ("wave", "raise", "guide", "bow", "call"):
             made = stretch(part, target, rng)
         else:
             made = crop(part, max(target, 70), rng)
@@ -207,7 +209,7 @@ class Composer:
 
     def long_turn(self, name: str) -> Composed | None:
         """A turn somewhere in a walk of 7 to 9.8 s."""
-        if not self.by_act["turn"]:
+        if not self.by_action["turn"]:
             return None
         rng = seeded("retimed", name)
         part = self._draw_first(rng, "turn")
@@ -235,17 +237,17 @@ class Composer:
 def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
     """Return True if the action is still recognisable: a hand held by loops must not seem to wave, a loop must not bend
     the path."""
-    act = "run" if facts.act == "dash" else facts.act
-    if repeats > 1 or act not in get_args(Act):
+    action = "run" if facts.action == "dash" else facts.action
+    if repeats > 1 or action not in get_args(Act):
         return True
-    side = facts.side if act in ("turn", "wave", "raise") else ""
-    expected = Expectation(cast("Act", act), cast("Side", side), straight=act in _STRAIGHT)
+    side = facts.side if action in ("turn", "wave", "raise") else ""
+    expected = Expectation(cast("Act", action), cast("Side", side), straight=action in _STRAIGHT)
     return judge(joints, FPS, [expected]).passed
 
 
 def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple[int, range]:
     """Start frame of the first clip, and the frames after which it may be left."""
-    if part.facts.act in CYCLIC:
+    if part.facts.action in CYCLIC:
         room = len(part.joints) - 1
         start = rng.randint(0, max(room - 60, 0))
         longest = min(room, start + min(budget, 110 if count == 2 else 65))
@@ -254,7 +256,7 @@ def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple
 
 
 def _enter_range(part: Part) -> range:
-    if part.facts.act in CYCLIC:
+    if part.facts.action in CYCLIC:
         return range(max(len(part.joints) - 40, 1))
     return range(core(part)[0] + 1)
 
@@ -262,7 +264,7 @@ def _enter_range(part: Part) -> range:
 def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> range:
     """Frames after which the clip may be left when it was entered at `start` and `budget` frames are free."""
     end = min(len(part.joints), start + budget)
-    if part.facts.act in CYCLIC:
+    if part.facts.action in CYCLIC:
         return range(min(start + 28, end), end)
     first = core(part)[1]
     return range(max(first, start + 1), end)
@@ -272,7 +274,7 @@ def with_brief_waves(parts: Sequence[Part]) -> list[Part]:
     """The same clips with waves cut short: two actions fit into 9.8 s where a captured wave takes 5 to 8 of them."""
     out: list[Part] = []
     for part in parts:
-        if part.facts.act != "wave":
+        if part.facts.action != "wave":
             out.append(part)
             continue
         rng = seeded("brief", part.id)
@@ -284,7 +286,7 @@ def with_brief_waves(parts: Sequence[Part]) -> list[Part]:
 
 
 def _with_wave(composed: Composed | None) -> Composed | None:
-    return composed if composed is not None and any(f.act == "wave" for f in composed.facts) else None
+    return composed if composed is not None and any(f.action == "wave" for f in composed.facts) else None
 
 
 def _measured(part: Part, joints: Array) -> Facts | None:
@@ -321,8 +323,8 @@ def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
         ("SW", 2, counts.brief_waves, lambda name: _with_wave(brief.sequence(name, 2))),
         ("RW", 1, counts.quick_waves, lambda name: composer.gesture(name, "wave", QUICK_WAVES)),
     )
-    for letter, acts, wanted, make in makers:
-        if len(composer.acts) < acts:
+    for letter, actions, wanted, make in makers:
+        if len(composer.actions) < actions:
             continue
         yield from attempts(f"{letter}-{split}", wanted, make)
 

@@ -25,18 +25,18 @@ def core(part: Part) -> tuple[int, int]:
     """
     joints = part.joints.astype(np.float64)
     last = len(joints) - 1
-    act, side = part.facts.act, part.facts.side
-    if act in CYCLIC:
+    action, side = part.facts.action, part.facts.side
+    if action in CYCLIC:
         return 0, 0
-    if act == "turn":
+    if action == "turn":
         angle = heading(joints, FPS)
         done = (angle - angle[0]) / (angle[-1] - angle[0])
         inside = np.flatnonzero((done > 0.06) & (done < 0.94))
         return (max(int(inside[0]) - 5, 0), min(int(inside[-1]) + 5, last)) if len(inside) else (0, last)
-    if act in ("wave", "raise", "guide") and side in _ARMS:
+    if action in ("wave", "raise", "guide") and side in _ARMS:
         level = arm_level(joints, side)
         inside = np.flatnonzero(level > 0.12)
-    elif act in ("bow", "call"):
+    elif action in ("bow", "call"):
         bend = lean(joints, FPS)
         bend = bend - np.percentile(bend, 10)
         inside = np.flatnonzero(bend > 0.15 * bend.max())

@@ -14,7 +14,7 @@ LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
 
 # content label -> action; the side is always measured
-ACTS: dict[str, str] = {
+ACTIONS: dict[str, str] = {
     "1/walk": "walk",
     "2/walk": "walk",
     "1/run": "run",
@@ -62,7 +62,7 @@ class Facts:
         text: captions of the source's own, of each author, where it has any.
     """
 
-    act: str
+    action: str
     style: str
     side: str
     gait: GaitMeasures
@@ -90,22 +90,22 @@ def describe(content: str, style: str, joints: NDArray[np.floating], fps: float)
         None when label and motion contradict each other, so that no true caption can be made: a turn of the wrong size,
         a wave without a hand that moves.
     """
-    act = ACTS[content]
+    action = ACTIONS[content]
     walked, hands, bend = measure(joints, fps)
-    facts = Facts(act, STYLE_NAMES.get(style, style), "", walked, hands, bend)
-    if act == "turn":
+    facts = Facts(action, STYLE_NAMES.get(style, style), "", walked, hands, bend)
+    if action == "turn":
         single = 55 <= abs(walked.turn) <= 130 and walked.swing < abs(walked.turn) + 30
         return replace(facts, side=_signed(walked.turn)) if single else None
-    if act == "walk_diagonal":
+    if action == "walk_diagonal":
         return replace(facts, side=_signed(walked.sideways)) if abs(walked.sideways) > 0.6 else None
-    if act in ("wave", "raise", "guide"):
+    if action in ("wave", "raise", "guide"):
         side = active_hands(hands, walked.duration)
         return replace(facts, side=side) if side else None
-    if act == "walk_back":
+    if action == "walk_back":
         return facts if walked.along < -0.5 else None
-    if act in STRIKES:
-        return facts if STRIKES[act](np.asarray(joints, np.float64), fps) else None
-    if act in ("walk", "run", "dash"):
+    if action in STRIKES:
+        return facts if STRIKES[action](np.asarray(joints, np.float64), fps) else None
+    if action in ("walk", "run", "dash"):
         return facts if walked.along > 0.5 and abs(walked.turn) < 40 else None
     return facts
 

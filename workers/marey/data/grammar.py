@@ -69,7 +69,7 @@ class Grammar:
     """`grammar.toml`."""
 
     subjects: tuple[str, ...]
-    acts: dict[str, Words]
+    actions: dict[str, Words]
     details: dict[str, Detail]
     pace: dict[str, tuple[str, ...]]
     height: dict[str, tuple[str, ...]]
@@ -84,7 +84,7 @@ def grammar() -> Grammar:
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("grammar.toml").read_text("utf-8"))
     return Grammar(
         subjects=tuple(table["subjects"]),
-        acts={act: _words(rows, table["manners"].get(act, {})) for act, rows in table["acts"].items()},
+        actions={action: _words(rows, table["manners"].get(action, {})) for action, rows in table["acts"].items()},
         details={
             name: Detail(tuple(rows["clause"]), tuple(rows["sentence"])) for name, rows in table["details"].items()
         },

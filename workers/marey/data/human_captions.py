@@ -39,7 +39,7 @@ class HumanCaptions:
         two, stop, three: frames for any actions; `stop` for an action in place after travel.
     """
 
-    acts: dict[str, tuple[str, ...]]
+    actions: dict[str, tuple[str, ...]]
     same: dict[str, tuple[str, ...]]
     pairs: dict[str, tuple[str, ...]]
     two: tuple[str, ...]
@@ -51,14 +51,16 @@ class HumanCaptions:
 def human_captions() -> HumanCaptions:
     """The captions of the package."""
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("human_captions.toml").read_text("utf-8"))
-    acts, same, pairs = ({name: tuple(rows) for name, rows in table[key].items()} for key in ("acts", "same", "pairs"))
+    actions, same, pairs = (
+        {name: tuple(rows) for name, rows in table[key].items()} for key in ("acts", "same", "pairs")
+    )
     frames = {name: tuple(rows) for name, rows in table["frames"].items()}
-    return HumanCaptions(acts, same, pairs, **frames)
+    return HumanCaptions(actions, same, pairs, **frames)
 
 
 def human_caption(facts: Facts, rng: random.Random) -> str | None:
     """A caption of one action, its style in a sentence or an adverb of its own; None if no author wrote one."""
-    rows = human_captions().acts.get(_key(facts), ())
+    rows = human_captions().actions.get(_key(facts), ())
     text = _some(rows, fields(facts, rng, "the"), rng) if facts.repeats == 1 else None
     if text is None or rng.random() > STYLED_SHARE:
         return text
@@ -80,22 +82,22 @@ def human_sequence(parts: Sequence[Facts], rng: random.Random) -> str | None:
 
 def _key(facts: Facts) -> str:
     sided = {"left": "_one", "right": "_one", "both": "_both"}.get(facts.side, "")
-    return facts.act + sided if facts.act in ("raise", "wave") else facts.act
+    return facts.action + sided if facts.action in ("raise", "wave") else facts.action
 
 
 def _own(parts: Sequence[Facts], rng: random.Random) -> str | None:
     """The words that these two actions have together."""
     first, second = parts
     values = {f"{name}_side": facts.side for name, facts in zip("ab", parts, strict=True) if facts.side}
-    if first.act == second.act:
+    if first.action == second.action:
         one_each = {first.side, second.side} == {"left", "right"}
-        return _some(human_captions().same.get(first.act, ()), values, rng) if one_each else None
+        return _some(human_captions().same.get(first.action, ()), values, rng) if one_each else None
     for facts in parts:  # of a turn and a hand each names its own
-        if facts.act == "turn":
+        if facts.action == "turn":
             values["side"] = facts.side
         elif facts.side:
             values |= {name: _limbs(facts.side, name) for name in ("hands", "arms")}
-    return _some(human_captions().pairs.get(f"{first.act}-{second.act}", ()), values, rng)
+    return _some(human_captions().pairs.get(f"{first.action}-{second.action}", ()), values, rng)
 
 
 def _limbs(side: str, name: str) -> str:
@@ -104,7 +106,7 @@ def _limbs(side: str, name: str) -> str:
 
 def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
     """A frame with each action in its place, in the form that the frame asks for."""
-    stops = parts[0].act in LOCOMOTION and parts[1].act not in LOCOMOTION
+    stops = parts[0].action in LOCOMOTION and parts[1].action not in LOCOMOTION
     frames = (
         human_captions().three if len(parts) == 3 else human_captions().two + (human_captions().stop if stops else ())
     )
@@ -126,7 +128,7 @@ def _said(facts: Facts, form: str, rng: random.Random) -> str | None:
         return conjugate(with_adverb(phrase_of(facts, rng, "the"), ""), _FORMS[form or None])
     if facts.repeats > 1:
         return None
-    nouns = [noun for noun in grammar().acts[facts.act].nouns if noun.startswith(("a ", "an "))]
+    nouns = [noun for noun in grammar().actions[facts.action].nouns if noun.startswith(("a ", "an "))]
     return _some(nouns, fields(facts, rng, "the"), rng)
 
 

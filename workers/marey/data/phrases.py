@@ -21,8 +21,8 @@ RIGHT_ANGLE = 16.0  # degrees about 90 within which a turn is called a right ang
 
 def pace_of(facts: Facts) -> str | None:
     """slow, medium or fast; None when the body does not travel."""
-    slow, fast = {"run": (1.9, 3.2), "dash": (2.2, 3.4)}.get(facts.act, (0.75, 1.45))
-    if facts.act not in LOCOMOTION or facts.gait.path < 0.8:
+    slow, fast = {"run": (1.9, 3.2), "dash": (2.2, 3.4)}.get(facts.action, (0.75, 1.45))
+    if facts.action not in LOCOMOTION or facts.gait.path < 0.8:
         return None
     return "slow" if facts.gait.speed < slow else "fast" if facts.gait.speed > fast else "medium"
 
@@ -42,7 +42,7 @@ def height_of(facts: Facts) -> str | None:
 
 def lasting_of(facts: Facts) -> str | None:
     """short or long, for gestures that are."""
-    if facts.act not in ("raise", "wave"):
+    if facts.action not in ("raise", "wave"):
         return None
     return "short" if facts.gait.duration < 3.5 else "long" if facts.gait.duration > 5.5 else None
 
@@ -51,12 +51,12 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
     """Values of the phrases' fields; unmeasured ones are absent."""
     words = rng.random() < 0.5
     out = {"seconds": number(facts.gait.duration, words=words)} if facts.gait.duration > 1.4 else {}
-    if facts.act in LOCOMOTION:
+    if facts.action in LOCOMOTION:
         if facts.gait.path > 1.5:
             out["metres"] = number(facts.gait.path, words=words)
         if 2 <= facts.gait.steps <= 20:
             out["steps"] = number(facts.gait.steps, words=words)
-        if facts.act == "turn":
+        if facts.action == "turn":
             out["degrees"] = str(round(abs(facts.gait.turn) / 10) * 10)
             if abs(abs(facts.gait.turn) - 90) < RIGHT_ANGLE:
                 out["right_angle"] = rng.choice(
@@ -74,7 +74,7 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
         else:
             out |= {"one": f"{facts.side} one", "one_side": facts.side}
             out["other"] = "right" if facts.side == "left" else "left"
-        if facts.act == "wave":
+        if facts.action == "wave":
             swings = max(h.swings for h in facts.hands) // 2
             if swings >= 2:
                 out["count"] = number(swings, words=words)
@@ -99,19 +99,19 @@ def fill(phrase: str, values: dict[str, str]) -> str | None:
 def details(facts: Facts) -> list[str]:
     """Names of the details that are true of the motion."""
     names = ["duration"]
-    if facts.act in LOCOMOTION:
-        names += ["travel", "steps"] + (["turn"] if facts.act == "turn" else [])
-    if facts.act in ("wave", "raise", "guide"):
+    if facts.action in LOCOMOTION:
+        names += ["travel", "steps"] + (["turn"] if facts.action == "turn" else [])
+    if facts.action in ("wave", "raise", "guide"):
         if height := height_of(facts):
             names.append(height)
         others = [h for h, name in zip(facts.hands, ("left", "right"), strict=True) if name != facts.side]
         if facts.side != "both" and others and others[0].peak < -0.28:
             names.append("idle_arm")
-        if facts.act == "wave":
+        if facts.action == "wave":
             names.append("waves")
-    if facts.act in ("wave", "raise", "guide", "bow", "call") and facts.gait.path < 0.1:
+    if facts.action in ("wave", "raise", "guide", "bow", "call") and facts.gait.path < 0.1:
         names.append("in_place")
-    if facts.act in ("bow", "call"):
+    if facts.action in ("bow", "call"):
         names.append("deep_lean" if facts.lean > 40 else "slight_lean" if facts.lean < 25 else "")
     elif facts.lean < 8:
         names.append("upright")
@@ -136,7 +136,7 @@ def filled_if_any(phrases: Sequence[str], values: dict[str, str], rng: random.Ra
 
 def phrase_of(facts: Facts, rng: random.Random, pronoun: str) -> str:
     """A verb phrase of the action, filled; verbs in angle brackets. After a pace it ends in `and` (`with_adverb`)."""
-    words = grammar().acts[facts.act]
+    words = grammar().actions[facts.action]
     manners = words.manners.get(facts.style, ())
     values = fields(facts, rng, pronoun)
     if manners and rng.random() < MANNER_SHARE:

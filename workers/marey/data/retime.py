@@ -60,7 +60,7 @@ def stretch(part: Part, target: int, rng: random.Random, *, repeat_share: float 
         return None
     x, y = held
     joints = whole[: y + 1]
-    if part.facts.act == "raise" and target > len(whole):
+    if part.facts.action == "raise" and target > len(whole):
         return held_longer(whole, x, y, target - len(whole)), (part,) * 2, 1
     if target < len(whole):  # skip a piece of the hold
         third = max((y - x) // 3, 1)

@@ -54,12 +54,12 @@ def compose_texts(parts: Sequence[Part], split: str) -> Iterator[Composed]:
             yield from attempts(f"{letter}-{split}", wanted, partial(composer.sequence, count=count))
 
 
-def joined_texts(acts: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], ...]:
+def joined_texts(actions: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], ...]:
     """Captions of a sequence by each author who wrote short ones of all its actions, two at most."""
     rng = seeded("texts", seed)
     told = []
-    for author in range(min(len(facts.text) for facts in acts)):
-        short = [[text for text in facts.text[author] if len(text.split()) <= WORDS] for facts in acts]
+    for author in range(min(len(facts.text) for facts in actions)):
+        short = [[text for text in facts.text[author] if len(text.split()) <= WORDS] for facts in actions]
         if all(short):
             chosen = (_joined([rng.choice(texts) for texts in short], rng) for _ in range(2))
             told.append(tuple(dict.fromkeys(chosen)))
@@ -82,7 +82,7 @@ class _Composer:
         self._by_action: dict[str, list[Part]] = defaultdict(list)
         known = load_vocabulary().actions
         for part in parts:
-            if part.facts.act == FREE_TEXT and part.content in known and len(part.joints) >= LEAST_FRAMES:
+            if part.facts.action == FREE_TEXT and part.content in known and len(part.joints) >= LEAST_FRAMES:
                 self._by_action[part.content].append(part)
         self.actions = sorted(self._by_action)
         self.size = sum(map(len, self._by_action.values()))
