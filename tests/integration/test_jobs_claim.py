@@ -32,6 +32,7 @@ from marey.jobs import (
     set_priority,
     sweep,
     waiting_batches,
+    waiting_items,
 )
 from marey.jobs.leases import Claim, ItemFailure
 from tests.servers.audit import audit
@@ -185,6 +186,14 @@ def test_waiting_batches_count_what_a_worker_could_claim(engine: sa.Engine) -> N
         assert waiting_batches(conn, sizes) == {"hgm3": 3}
         pause(conn, "default", job)
         assert waiting_batches(conn, sizes) == {}
+
+
+def test_waiting_items_are_counted_by_queue_as_long_as_their_job_runs(engine: sa.Engine) -> None:
+    job = submit_items(engine, 1)
+    with transaction(engine) as conn:
+        assert waiting_items(conn) == {"text": 1}
+        pause(conn, "default", job)
+        assert waiting_items(conn) == {}
 
 
 def test_a_paused_job_is_not_claimed_and_what_runs_may_finish(engine: sa.Engine) -> None:

@@ -91,9 +91,11 @@ class Selector:
         by_file: dict[str, list[str]] = defaultdict(list)
         for name in sorted(names, key=lambda name: (self.map.tests[name].seconds, name)):
             by_file[self.map.tests[name].file].append(name)
-        near = sorted(by_file, key=lambda file: (file not in WHOLE.values(), -_nearness(file, path), file))
-        close = [by_file[file] for file in near if file in WHOLE.values() or _nearness(file, path)]
-        chosen = self._take(_in_turn(close), [], BUDGET_S / 2)
+        holding = WHOLE.get(Path(path).name, "")
+        near = sorted(by_file, key=lambda file: (file != holding, -_nearness(file, path), file))
+        close = [by_file[file] for file in near if _nearness(file, path)]
+        chosen = self._take(by_file.get(holding, ()), [], BUDGET_S / 2)
+        chosen = self._take(_in_turn(close), chosen, BUDGET_S / 2)
         chosen = self._take(_in_turn(by_file[file] for file in near), chosen, BUDGET_S)
         return sorted(chosen, key=lambda name: (near.index(self.map.tests[name].file), self.map.tests[name].seconds))
 

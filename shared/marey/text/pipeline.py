@@ -38,7 +38,7 @@ CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4
 
 
 class TextPipeline:
-    """Prompts in, graphs and features out.
+    """Turn prompts into graphs and features.
 
     A vector depends on its text alone, so features are equal in any batch. Thread-safe when made by `load`: labeller
     and encoder serve one thread at a time, and a thread that waits for a rewriter blocks no other.

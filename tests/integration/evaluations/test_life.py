@@ -7,7 +7,7 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.core.errors import NotFound
+from marey.core.errors import Conflict, NotFound
 from marey.core.settings import Settings
 from marey.db import transaction
 from marey.evaluations import EvaluationRow, EvaluationState
@@ -15,6 +15,7 @@ from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import get_job
 from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
+from marey.takes import erase
 from marey.tenants import DEFAULT_TENANT
 from tests.servers.audit import audit as audit_tables
 from tests.support.evaluations import (
@@ -62,6 +63,15 @@ def test_an_evaluation_is_generated_in_the_background_then_scored_and_reported(
     content = folder_store.get(f"t/default/{row.reports[2].sha256[:2]}/{row.reports[2].sha256}")
     assert content == f"# 6 motions of {evaluation}\n".encode()
     assert len(judge.seen) == 1
+
+
+def test_prompts_of_an_evaluation_are_not_erased_by_its_job(
+    engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
+) -> None:
+    row = finish(scheduler, loop, engine, new_evaluation(engine))
+    assert row.generation is not None
+    with pytest.raises(Conflict, match=f"evaluation {row.id} made it"), transaction(engine) as conn:
+        erase(conn, DEFAULT_TENANT, row.generation.id, by="ann")
 
 
 def test_the_evaluator_sees_every_motion_in_input_order_with_what_was_expected(

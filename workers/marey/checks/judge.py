@@ -1,7 +1,7 @@
 """Kinematic judge: check on joints (T, 22, 3) and frames per second alone that a motion does what its prompt says.
 
 Thresholds were set on the training clips of the Bandai-Namco sets; the checker's own rate on their test clips, and how
-often it passes clips of other actions, stand in the report of `rates.py` beside every number it gives on generated
+often it passes clips of other actions, are reported by `rates.py` beside every number that it gives on generated
 motion.
 """
 
@@ -269,7 +269,7 @@ class Straightness:
 
 
 def straightness(joints: Array, fps: float) -> Straightness:
-    """Measure the way of the pelvis over the floor, sway taken out."""
+    """Measure the path of the pelvis over the floor, without its sway."""
     way = smooth(np.asarray(joints, np.float64)[:, PELVIS], 0.4, fps)[:, [0, 2]]
     chord = way[-1] - way[0]
     length = float(np.linalg.norm(chord))

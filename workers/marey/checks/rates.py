@@ -81,7 +81,7 @@ class Rates:
 
     @property
     def overall(self) -> Rate:
-        """All clips together."""
+        """Return the rate over all clips."""
         return Rate(sum(r.clips for r in self.own.values()), sum(r.passed for r in self.own.values()))
 
 
@@ -126,6 +126,6 @@ def rates(clips: Iterable[LabelledClip], fps: float) -> Rates:
 
 
 def mean_quality(qualities: Iterable[Quality]) -> Quality:
-    """Means of each number (the deepest penetration is averaged too)."""
+    """Return the mean of each number over the clips, the deepest penetration included."""
     table = np.array([[q.skate, q.jerk, q.bone_drift, q.penetration] for q in qualities])
     return Quality(*(float(v) for v in table.mean(axis=0)))

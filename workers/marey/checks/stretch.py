@@ -47,17 +47,17 @@ class Arm:
 
     @property
     def up(self) -> bool:
-        """Lifted on purpose: arms of runners get to -0.1, but are not stretched up from below."""
+        """Return True if the hand is lifted on purpose; arms of runners reach -0.1, but do not rise far."""
         return self.peak > -0.14 and (self.rise > 0.25 or self.lifted > 1.0)
 
     @property
     def down(self) -> bool:
-        """Clearly not lifted."""
+        """Return True if the hand is clearly not lifted."""
         return self.peak < -0.16 or (self.peak < -0.05 and self.rise < 0.25)
 
     @property
     def waves(self) -> bool:
-        """Swings: five and more (raised hands have up to three), or small ones within a lift that lasts.
+        """Return True for five or more swings (raised hands have up to three), or small ones within a long lift.
 
         A wave from the wrist moves the wrist joint by a centimetre or two.
         """

@@ -1,1 +1,1 @@
-"""Training data: archives in, a prepared folder out, and the reader that training uses."""
+"""Training data: prepare folders from archives of captures, and read them."""

@@ -177,7 +177,7 @@ _ONCE = re.compile(r"\b(once|twice|one (shot|blow))\b")
 
 
 def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
-    """The clip with what is said of it changed; what cannot be changed is left out."""
+    """Return the clip with its captions and facts changed; those that cannot be changed are left out."""
     changed = (tuple(new for text in said if (new := change(text))) for said in clip.captions)
     return replace(clip, facts=change(clip.facts) or "", captions=tuple(said for said in changed if said))
 
@@ -359,7 +359,7 @@ class FolderWriter:
 
 
 def _choose_texts(actions: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:
-    """Captions of a clip by each author of its source's own ones; none where it has none."""
+    """Return the captions of each author of the source; empty if the source has none."""
     if not actions[0].text:
         return ()
     return actions[0].text if len(actions) == 1 else joined_texts(actions, name)

@@ -65,7 +65,7 @@ def _voice_of(subject: str, rng: random.Random) -> _Voice:
 
 
 def short_caption(facts: Facts, rng: random.Random) -> str:
-    """A few words: the action, and its style as an adverb, an adjective or not at all."""
+    """Return a few words: the action, and its style as an adverb or an adjective, or without it."""
     style = grammar().styles[facts.style]
     words = grammar().actions[facts.action]
     if verbless := _verbless(facts, rng):

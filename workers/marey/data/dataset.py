@@ -1,4 +1,4 @@
-"""`dataset.toml`: a set of captures in words that the reader understands. There is no code for any one set.
+"""`dataset.toml`: the description of a set of captures. No set has code of its own.
 
 It names the set with its terms, maps the columns of its `index.csv`, and describes its rigs. Those of the known sets
 are in `sets/`; a studio writes its own.

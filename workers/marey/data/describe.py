@@ -132,6 +132,6 @@ FREE_TEXT = "cmu"
 
 
 def describe_text(captions: tuple[tuple[str, ...], ...], joints: NDArray[np.floating], fps: float) -> Facts:
-    """Facts of a clip that has captions of its own, of each author."""
+    """Return the facts of a clip whose authors captioned it."""
     walked, hands, bend = measure(joints, fps)
     return Facts(FREE_TEXT, "normal", "", walked, hands, bend, text=captions)

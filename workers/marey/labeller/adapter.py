@@ -49,7 +49,7 @@ class AdaptedMiniLM(nn.Module):
     Args:
         minilm: its bundle.
         rank: of the updates.
-        start: updates to begin with, as `updates` gives them; None = none.
+        start: initial updates, as `updates` returns them; None = zero.
     """
 
     def __init__(self, minilm: Bundle, rank: int, start: Mapping[str, Tensor] | None = None) -> None:

@@ -65,7 +65,7 @@ def _labelled(entry: dict[str, list[dict[str, object]]]) -> Example:
 
 
 def distinct(examples: Sequence[Example]) -> list[Example]:
-    """One of each sentence."""
+    """Return the sentences without repetitions."""
     return list({example.words: example for example in examples}.values())
 
 

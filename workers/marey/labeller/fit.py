@@ -101,7 +101,7 @@ def fit(
     Args:
         batches: at least `config.steps`, and those that int8 is prepared with.
         minilm: the bundle of MiniLM.
-        start: what to begin with; None = MiniLM as it is, and a random head.
+        start: initial weights; None = MiniLM unchanged, and a random head.
         progress: called with the step and its loss.
     """
     torch.manual_seed(seed)

@@ -37,7 +37,7 @@ TREEBANK = DataSource(
 def pack(
     output: Path, weights: Weights, sentences: Sequence[Path], recipe: Recipe, result: Evaluation | None
 ) -> Bundle:
-    """Write the bundle; weights that PropBank went into are under its terms."""
+    """Write the bundle; weights that were trained on PropBank carry its terms."""
     hashes = [hashlib.sha256(file.read_bytes()).hexdigest() for file in sentences]
     sources = [SENTENCES.model_copy(update={"sha256": sha256}) for sha256 in hashes]
     if recipe.first:

@@ -36,7 +36,7 @@ class Evaluation:
     confused: Counter[tuple[str, str]] = field(default_factory=Counter[tuple[str, str]])
 
     def metrics(self) -> dict[str, float]:
-        """For the manifest."""
+        """Return the scores as the manifest of the bundle keeps them."""
         found = {
             f"{name}_{what}_f1": getattr(scores, f"{what}s").f1
             for name, scores in self.scores.items()

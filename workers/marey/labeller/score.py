@@ -13,7 +13,7 @@ Item = tuple[object, ...]
 
 @dataclass
 class Tally:
-    """Right, said and wanted."""
+    """Counts of correct, predicted and expected items."""
 
     right: int = 0
     said: int = 0

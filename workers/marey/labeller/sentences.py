@@ -1,4 +1,4 @@
-"""Annotated sentences: a line a sentence, and below it a line `> predicate ROLE phrase; ROLE phrase` for each verb.
+"""Annotated sentences: one sentence a line, and below it a line `> predicate ROLE phrase; ROLE phrase` for each verb.
 
     A person walks forward, then turns left.
     > walks ARG0 A person; ARGM-DIR forward

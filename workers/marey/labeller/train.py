@@ -47,7 +47,7 @@ def learn_propbank(
     network: LightConfig,
     seed: int,
 ) -> Weights:
-    """The first training, and what it comes to on sentences of PropBank that were held out."""
+    """Train on PropBank, and score the result on its held-out sentences."""
     words, size = WordStates(minilm, network.layers), PROPBANK_FIT.batch
     batches = propbank_batches(kept, annotated, words, network.tags, size, seed)
     first = fit(batches, minilm, network, PROPBANK_FIT, seed, progress=_progress)
@@ -59,7 +59,7 @@ def learn_propbank(
 
 
 def prepare(options: argparse.Namespace, annotated: Sequence[Example], minilm: Bundle) -> Recipe:
-    """The recipe, with the first training where PropBank is given.
+    """Return the recipe, with the training on PropBank if its folder is given.
 
     Raises:
         InvalidInput: its annotations without the words they belong to, or words alone.

@@ -33,7 +33,7 @@ class Weights:
         return LightLabeller(network, WordStates(minilm, self.network.layers, self.updates), "")
 
     def save(self, file: Path) -> None:
-        """Keep them."""
+        """Write the weights to a file."""
         tensors = {f"head/{name}": value for name, value in self.head.items()}
         tensors |= {f"updates/{name}": value for name, value in self.updates.items()}
         save_file(tensors, file, {"network": json.dumps(asdict(self.network))})
