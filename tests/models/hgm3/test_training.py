@@ -254,6 +254,13 @@ def test_hard_masks_take_the_tokens_the_teacher_finds_hardest(prepared: Prepared
     assert not masked[:, : size - half].any()
 
 
+def test_the_first_prediction_is_how_often_each_code_occurs(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    shares = stage.module.masked.head.bias.detach().exp()
+    counts = torch.bincount(stage.tokens.tokens[:, 0].clamp(min=0), minlength=TINY.tokenizer.codes).float()
+    assert float(torch.corrcoef(torch.stack([shares[: len(counts)], counts]))[0, 1]) > 0.95
+
+
 def test_three_levels_a_step_average_the_same_loss_as_one_drawn(prepared: PreparedData) -> None:
     three = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, levels_per_step=3)))
     loss, logs = three.loss(context(fraction=0.0))

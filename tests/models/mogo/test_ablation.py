@@ -88,6 +88,8 @@ def test_a_variant_changes_lanes_and_depth_alone(name: str) -> None:
     changed = VARIANTS[name].of(TINY)
     kept = replace(changed, transformer=replace(changed.transformer, joint=False), depth=TINY.depth)
     assert kept == TINY
+    # without a depth head all frames cover all levels: less would save nothing
+    assert changed.depth.share == (TINY.depth.share if changed.depth.layers else 1.0)
 
 
 def test_a_level_token_is_read_by_its_own_lane_from_the_first_frame_on() -> None:

@@ -100,6 +100,12 @@ def test_one_lane_for_all_levels_reads_whole_frames_of_the_past_and_nothing_late
             assert not torch.allclose(first[:, any_level, 5:], second[:, any_level, 5:])
 
 
+def test_until_trained_later_frames_are_predicted_as_the_next_one() -> None:
+    assert TINY.ahead
+    for layer in RQHCTransformer(TINY).ahead:
+        torch.testing.assert_close(layer.weight, torch.eye(TINY.transformer.width))
+
+
 def test_the_usual_duration_is_learned_whatever_the_features_are() -> None:
     regression = DurationRegression(TINY)
     regression.fit(torch.zeros(2, TINY.condition.text_width), torch.tensor([21, 21]))

@@ -46,7 +46,7 @@ def test_every_act_that_prompts_ask_for_is_told_in_many_ways():
     assert all(len(rows) >= 60 for rows in human_captions().actions.values())
 
 
-@pytest.mark.parametrize("act", KNOWN)
+@pytest.mark.parametrize("action", KNOWN)
 def test_captions_of_an_act_name_only_what_is_measured_on_it(action):
     for row in human_captions().actions[action]:
         assert fields_of(row) <= KNOWN[action], row

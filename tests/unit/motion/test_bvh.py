@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from marey.motion.clip import MotionClip
 from marey.motion.io import bvh, bvh_header
-from marey.motion.io.bvh import format_bvh, parse_bvh, read_bvh, write_bvh
+from marey.motion.io.bvh import first_frame_stands_apart, format_bvh, parse_bvh, read_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import about, angle_between, multiply, to_euler
 from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS
@@ -201,6 +202,14 @@ def test_a_t_pose_before_the_motion_is_left_out():
     order = [read.skeleton.joint_names.index(n) for n in HUMANML3D.joint_names]
     np.testing.assert_allclose(read.rest[order], HUMANML3D.rest - HUMANML3D.rest[0], atol=1e-5)
     assert len(parse(text, rest_frame="keep").root) == clip.frames + 1
+
+
+@pytest.mark.parametrize(("turns", "apart"), [((60, 5, 5, 5), True), ((60, 60, 5, 5), False), ((60, 5, 5, 60), False)])
+def test_a_first_frame_stands_apart_where_no_later_step_turns_as_far(turns, apart):
+    clip = parse(SMALL)
+    angles = np.radians(np.cumsum([0, *turns]))
+    rotations = np.repeat(about("x", angles)[:, None], 2, axis=1)
+    assert first_frame_stands_apart(replace(clip, rotations=rotations)) is apart
 
 
 def test_a_motion_that_starts_at_once_keeps_its_first_frame():

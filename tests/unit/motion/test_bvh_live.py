@@ -31,6 +31,13 @@ from tests.support.walker import walker
 REPOSITORY = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.parametrize("fps", [0.0, -20.0, float("nan"), float("inf")])
+def test_a_rate_that_cannot_be_is_refused_and_nothing_is_written(tmp_path: Path, fps: float) -> None:
+    with pytest.raises(InvalidInput, match="frames per second is out of range"):
+        LiveBVH(tmp_path / "a.bvh", HUMANML3D, fps)
+    assert list(tmp_path.iterdir()) == []
+
+
 @dataclass(frozen=True)
 class Write:
     """One write to the file."""

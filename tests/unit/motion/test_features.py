@@ -36,6 +36,21 @@ def dance(skeleton: Skeleton = HUMANML3D, seed: int = 0, frames: int = 60, turns
     return rotate(about("Y", np.linspace(0, 2 * np.pi * turns, frames))[:, None], joints)
 
 
+def test_a_body_in_humanml3ds_raw_pose_has_no_rotations():
+    """Bones along the raw directions of HumanML3D: hips to the sides, legs and arms down, feet ahead, trunk up."""
+    up, down, ahead, left, right = (0, 1, 0), (0, -1, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0)
+    bones = {"L_hip": left, "R_hip": right, "L_collar": left, "R_collar": right, "L_foot": ahead, "R_foot": ahead}
+    bones |= dict.fromkeys(("spine1", "spine2", "spine3", "neck"), up) | {"head": ahead}
+    joints = np.zeros((4, 22, 3))
+    for j, (name, parent) in enumerate(zip(HUMANML3D.joint_names, HUMANML3D.parents, strict=True)):
+        if parent >= 0:
+            length = np.linalg.norm(HUMANML3D.offsets[j])
+            joints[:, j] = joints[:, parent] + length * np.array(bones.get(name, down))
+    joints[..., 1] -= joints[..., 1].min()
+    rotations = HUMANML3D_263.encode(joints)[:, 67:193].reshape(-1, 21, 6)
+    np.testing.assert_allclose(rotations, np.broadcast_to([1, 0, 0, 0, 1, 0], rotations.shape), atol=1e-5)
+
+
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_layouts_have_the_published_widths_and_slices(name):
     each = layout(name)
