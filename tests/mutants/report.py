@@ -11,7 +11,11 @@ from typing import Any
 from marey.referee.adherence import interval
 from tests.mutants.drawing import Mutant
 
-EQUIVALENTS = Path(__file__).with_name("equivalent.toml")
+EQUIVALENTS = (
+    Path(__file__).with_name("equivalent.toml"),
+    *sorted(Path(__file__).parents[1].glob("models/*/equivalent.toml")),
+)
+"""A model's own stand beside its tests, with which it goes."""
 KILLS = frozenset({"killed", "timeout"})
 
 
@@ -29,9 +33,9 @@ class Equivalent:
         return self.path == mutant.mutation.path and (self.before, self.after) == mutant.diff
 
 
-def read_equivalents(path: Path = EQUIVALENTS) -> list[Equivalent]:
-    """Read the reviewed list."""
-    return [Equivalent(**entry) for entry in tomllib.loads(path.read_text()).get("equivalent", [])]
+def read_equivalents(paths: Iterable[Path] = EQUIVALENTS) -> list[Equivalent]:
+    """Read the reviewed lists."""
+    return [Equivalent(**entry) for path in paths for entry in tomllib.loads(path.read_text()).get("equivalent", [])]
 
 
 def wilson(killed: int, total: int) -> tuple[float, float]:
