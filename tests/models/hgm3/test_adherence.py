@@ -71,3 +71,22 @@ def test_an_action_without_prompts_is_told_with_those_that_have_some(bundle: str
     assert done.exit_code == InvalidInput.exit_code
     assert "no held-out prompts for 'levitate'" in done.stderr
     assert "walk-backward" in done.stderr
+
+
+def test_minimal_pairs_are_measured_by_property(bundle: str, tmp_path: Path) -> None:
+    options = ["--property", "duration", "--seeds", "1", "--set", "steps=2", "-o", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, ["eval", "pairs", bundle, *options])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "report.json").read_text())
+    assert json.loads(done.stdout) == found
+    (rate,) = found["properties"]
+    assert (rate["property"], rate["motions"]) == ("duration", len(found["motions"]))
+    assert all(0 < motion["value"] <= 9.8 for motion in found["motions"])
+    assert "| duration |" in (tmp_path / "report.md").read_text()
+
+
+def test_a_property_without_pairs_is_told_with_those_that_have_some(bundle: str) -> None:
+    done = CliRunner().invoke(app, ["eval", "pairs", bundle, "--property", "colour"])
+    assert done.exit_code == InvalidInput.exit_code
+    assert "no pairs for 'colour'" in done.stderr
+    assert "side, count, order, direction, speed, duration" in done.stderr

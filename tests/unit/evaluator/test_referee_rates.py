@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import pytest
 
-from marey.evaluator.referee_rates import Verdicts, implied, page, rates
+from marey.evaluator.referee_rates import Verdicts, accepted_list, implied, page, rates
 from marey.vocabulary.entries import load_vocabulary
 
 
@@ -31,9 +33,26 @@ def test_a_rule_is_accepted_with_one_miss_and_few_false_passes(missed: int, fals
     assert rate.accepted is accepted
 
 
+def test_a_kick_in_a_dance_is_no_false_pass_of_a_single_action() -> None:
+    own, dances = [_clip("kick", "kick")], [_clip("dance", "dance", "kick")] * 10
+    rate = next(rate for rate in rates([*own, *dances, _clip("walk")]) if rate.action == "kick")
+    assert (rate.others, rate.falsely, rate.single_others, rate.single_falsely) == (11, 10, 1, 0)
+    assert rate.accepted
+
+
+def test_a_rule_that_passes_no_clip_is_not_accepted() -> None:
+    rate = next(rate for rate in rates([_clip("kick"), _clip("walk")]) if rate.action == "kick")
+    assert not rate.accepted
+
+
+def test_the_list_holds_the_accepted_rules() -> None:
+    listed = tomllib.loads(accepted_list([_clip("walk", "walk"), _clip("kick")]))["accepted"]
+    assert listed == ["walk"]
+
+
 def test_the_page_has_a_row_for_each_action_and_fold() -> None:
     text = page([_clip("walk", "walk"), _clip("dance", "kick", source="two")], ["cmu"])
     assert text.count("\n| fold ") == 5
-    assert "| walk | 1 | 100.0% | 0.0% |  | yes |" in text
-    assert "| kick | 0 | — | 50.0% | dance 1 | no clips |" in text
+    assert "| walk | 1 | 100.0% | 0.0% | — |  | yes |" in text
+    assert "| kick | 0 | — | 50.0% | 0.0% | dance 1 | no clips |" in text
     assert "| all | 2 | 50.0% |" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,13 +12,14 @@ from hypothesis import strategies as st
 from marey.referee import Body
 from marey.referee.adherence import ActionTrial, document, interval, judge_trial, markdown, rates
 from marey.referee.prompts import ActionPrompt, action_prompts, studio_prompts
+from marey.referee.rules import accepted_rules
 from marey.referee.studio import StudioRates, judge_studio, studio_markdown, studio_rates
 from marey.vocabulary.entries import load_vocabulary
 from tests.unit.referee.bodies import FPS, standing, walking
 
 
 def _trials(
-    fails: dict[int, int], *, phrasings: int = 10, seeds: int = 4, authors: int = 2, action: str = "walk"
+    fails: dict[int, int], *, phrasings: int = 10, seeds: int = 4, authors: int = 2, action: str = "kick"
 ) -> list[ActionTrial]:
     """Trials of one action; of phrasing `n` the first `fails[n]` seeds fail."""
     return [
@@ -45,13 +47,27 @@ def test_an_action_is_supported_at_80_percent_of_enough_phrasings(trials: list[A
     assert rate.share == sum(trial.passed for trial in trials) / len(trials)
 
 
+def test_an_action_is_unjudged_where_the_rule_is_not_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("marey.referee.adherence.accepted_rules", lambda: frozenset({"bow"}))
+    walk, bow = rates(_trials({}, action="walk") + _trials({}, action="bow"))
+    assert (walk.standing, bow.standing) == ("unjudged", "supported")
+    assert "1 of 1 actions with a precise rule are supported" in markdown("toy@1", [walk, bow])
+
+
+def test_the_page_and_the_list_of_accepted_rules_agree() -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/referee.md").read_text()
+    yes = {line.split(" | ")[0].removeprefix("| ") for line in page.splitlines() if line.endswith("| yes |")}
+    assert accepted_rules() == yes
+    assert yes < set(load_vocabulary().actions)
+
+
 def test_actions_are_counted_apart_and_the_table_begins_with_the_best() -> None:
-    trials = _trials(dict.fromkeys(range(10), 4), action="bow") + _trials({0: 4}, action="walk")
+    trials = _trials(dict.fromkeys(range(10), 4), action="bow") + _trials({0: 4}, action="kick")
     found = rates(trials)
-    assert [(rate.action, rate.share, rate.lost) for rate in found] == [("bow", 0.0, 10), ("walk", 0.9, 1)]
+    assert [(rate.action, rate.share, rate.lost) for rate in found] == [("bow", 0.0, 10), ("kick", 0.9, 1)]
     lines = markdown("toy@1", found).splitlines()
-    assert lines[0].startswith("Bundle `toy@1`: 1 of 2 actions are supported; 45.0% of 80 motions")
-    assert [line.split(" | ")[0] for line in lines[4:]] == ["| walk", "| bow"]
+    assert lines[0].startswith("Bundle `toy@1`: 1 of 2 actions with a precise rule are supported; 45.0% of 80 motions")
+    assert [line.split(" | ")[0] for line in lines[4:]] == ["| kick", "| bow"]
     assert len(document("toy@1", {}, trials)["trials"]) == 80  # pyright: ignore[reportArgumentType]
 
 

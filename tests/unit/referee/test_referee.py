@@ -29,10 +29,15 @@ def _between(low: Joints, high: Joints, share: Joints) -> Joints:
     return low + (np.asarray(high) - low) * share[:, None]
 
 
-def _waving() -> Joints:
+def _waving(*, forearm: bool = True) -> Joints:
     time = seconds(4.0)
     up = np.clip(time - 0.5, 0, 1) * np.clip(3.9 - time, 0, 1)
     hand = _between(_hanging(4.0), np.array([0.2, 0.3, 0.1]), np.minimum(up, 1))
+    still = arm_to(standing(4.0), "L", hand)
+    if forearm:
+        swing = 0.15 * np.sin(2 * np.pi * 2 * time) * (up >= 1)
+        still[:, HUMANML3D.index("L_wrist"), 0] += swing
+        return still
     hand[:, 0] += 0.15 * np.sin(2 * np.pi * 2 * time) * (up >= 1)
     return arm_to(standing(4.0), "L", hand)
 
@@ -126,6 +131,11 @@ def test_an_arm_that_shows_the_way_rises_and_stays_while_the_other_hangs() -> No
     assert shows("guide", body(_showing()))
     assert not shows("guide", body(_showing()[50:]))  # held all the time, as a spear is
     assert not shows("guide", body(_waving()))
+
+
+def test_a_wave_is_of_the_forearm() -> None:
+    assert shows("wave", body(_waving()))
+    assert not shows("wave", body(_waving(forearm=False)))
 
 
 @pytest.mark.parametrize(

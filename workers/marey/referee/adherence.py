@@ -1,7 +1,7 @@
 """Adherence per action: what share of a bundle's motions shows the action that was asked for, by the referee.
 
 An action is `supported` at 80 % over at least ten held-out phrasings of at least two authors and four seeds, if at most
-two phrasings fail with every seed; otherwise `tried`.
+two phrasings fail with every seed; otherwise `tried`. It is `unjudged` where the referee's rule is not precise enough.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import Literal
 
 from marey.referee.body import Body
 from marey.referee.prompts import ActionPrompt
+from marey.referee.rules import accepted_rules
 from marey.referee.sequences import shows_in_order
 
-Standing = Literal["supported", "tried", "unproven"]
+Standing = Literal["supported", "tried", "unproven", "unjudged"]
 LEAST_SHARE = 0.8
 LEAST_PHRASINGS = 10
 LEAST_AUTHORS = 2
@@ -44,7 +45,8 @@ class ActionRate:
         share: motions that show the action, 0 to 1.
         low, high: 95 % interval of the share over phrasings, by Wilson's formula with phrasings as the sample size.
         lost: phrasings that failed with every seed.
-        standing: supported; tried (measured, and less); unproven (too few phrasings, authors or seeds).
+        standing: supported; tried (measured, and less); unproven (too few phrasings, authors or seeds); unjudged (the
+            rule of one of the actions is not accepted, so the share only tells bundles apart).
     """
 
     action: str
@@ -83,7 +85,8 @@ def _rate(action: str, trials: Sequence[ActionTrial]) -> ActionRate:
     lost = sum(not any(passed) for passed in of_prompt.values())
     enough = len(of_prompt) >= LEAST_PHRASINGS and authors >= LEAST_AUTHORS and seeds >= LEAST_SEEDS
     good = share >= LEAST_SHARE and lost <= MOST_LOST
-    standing: Standing = "unproven" if not enough else "supported" if good else "tried"
+    judged = accepted_rules().issuperset(trials[0].prompt.actions)
+    standing: Standing = "unjudged" if not judged else "unproven" if not enough else "supported" if good else "tried"
     return ActionRate(action, len(of_prompt), authors, seeds, len(trials), share, low, high, lost, standing)
 
 
@@ -99,9 +102,10 @@ def markdown(bundle: str, found: Sequence[ActionRate]) -> str:
     motions = sum(rate.motions for rate in found)
     passed = sum(rate.share * rate.motions for rate in found)
     supported = sum(rate.standing == "supported" for rate in found)
+    judged = sum(rate.standing != "unjudged" for rate in found)
     lines = [
-        f"Bundle `{bundle}`: {supported} of {len(found)} actions are supported; {passed / motions:.1%} of {motions} "
-        "motions show the action that was asked for.",
+        f"Bundle `{bundle}`: {supported} of {judged} actions with a precise rule are supported; {passed / motions:.1%} "
+        f"of {motions} motions show the action that was asked for.",
         "",
         "| action | adherence | 95 % interval | phrasings | motions | phrasings that always failed | standing |",
         "|---|---|---|---|---|---|---|",

@@ -70,10 +70,11 @@ def _kicks(body: Body, speed: float, height: float) -> int:
         fast = np.linalg.norm(body.own_velocity(f"{side}_ankle", window=0.06), axis=-1) >= speed
         toe = np.maximum(body.height(f"{side}_ankle"), body.height(f"{side}_foot"))
         out = np.linalg.norm((body.at(f"{side}_ankle") - body.at("pelvis"))[:, [0, 2]], axis=-1)
+        # The heel of a runner rises behind the body, and the foot of a lifted knee hangs under it.
+        extended = (body.own(f"{side}_ankle")[:, 2] > -0.15) & (body.bend(side, "knee") < 100)
+        shown = (toe >= height) & (out >= 0.35) & extended
         for begin, end in runs(fast):
-            part = slice(begin, min(len(body), end + body.frames(0.15)))
-            if (toe[part] >= height).any() and out[part][toe[part] >= height].max() >= 0.35:
-                found += 1
+            found += bool(shown[begin : min(len(body), end + body.frames(0.15))].any())
     return found
 
 

@@ -97,10 +97,12 @@ def _bridged(mask: Mask, gap: int) -> Mask:
 def _steps(body: Body, begin: int, end: int) -> int:
     """Count how often one foot is lifted past the other."""
     apart = body.smooth(body.lift("L") - body.lift("R"), 0.1)[begin:end]
-    lifted = len(swings(apart, 0.05))
     along = (body.at("L_ankle") - body.at("R_ankle"))[begin:end]
     velocity = (body.velocity("pelvis", SLOW_S) * [1.0, 0.0, 1.0])[begin:end]
     speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
+    # Slow steps are low, and a loop of one cycle holds no second lift of its first foot.
+    low = speed.mean() > MOVING or end - begin < 1.2 * body.fps
+    lifted = len(swings(apart, 0.03 if low else 0.05))
     heading = np.where(speed > MOVING, velocity / np.maximum(speed, 1e-6), body.forward[begin:end])
     passed = len(swings(body.smooth((along * heading).sum(-1), 0.1), 0.15))
     return min(lifted, max(passed, 0)) if passed >= 2 else lifted
@@ -148,10 +150,12 @@ def idle(body: Body) -> bool:
     low = np.maximum(
         body.height("L_wrist") - body.height("L_shoulder"), body.height("R_wrist") - body.height("R_shoulder")
     )
-    calm = (hands < 0.5) & (low < 0) & (body.height("pelvis") > 0.85 * HIPS) & (body.lean < 30)
+    calm = (hands < 0.5) & (low < 0) & (body.height("pelvis") > 0.78 * HIPS) & (body.lean < 30)
     feet = max(_spread(body, f"{side}_foot") for side in SIDES)
     upright = float(np.ptp(body.smooth(body.tip, 0.2))) < 15
-    return upright and calm.mean() >= 0.6 and travel(body) < 0.15 and feet < 0.15
+    path = body.at("pelvis")[:, [0, 2]]
+    stays = float(np.linalg.norm(path - path.mean(0), axis=-1).max()) < 0.15
+    return upright and stays and calm.mean() >= 0.6 and feet < 0.15
 
 
 def _spread(body: Body, joint: str) -> float:
@@ -173,7 +177,7 @@ def walk(body: Body) -> bool:
 
 def _least_steps(body: Body, found: Gait) -> int:
     """Return how many steps a walk has at least; a loop of one cycle holds two."""
-    return 2 if (found.end - found.begin) / body.fps < 1.8 else 3
+    return 2 if (found.end - found.begin) / body.fps < 2.5 else 3
 
 
 def _treads(body: Body) -> bool:
@@ -196,7 +200,7 @@ def run(body: Body) -> bool:
         return False
     ahead = body.smooth((body.velocity("pelvis", SLOW_S) * body.forward).sum(-1), SLOW_S)
     fast = _ahead(found) and float(ahead[found.begin : found.end].max()) >= 1.8
-    return fast or (_in_place(body, found) and found.cadence >= 2.2)
+    return fast or (_in_place(body, found) and found.cadence >= 2.0)
 
 
 @rule("sprint")
@@ -218,18 +222,18 @@ def turn(body: Body) -> bool:
     going = found.forward > 0.2 and found.distance >= 0.6 and found.steps >= 2
     if travel(body) < 0.5 and found.steps >= 3:
         going = travel(body) >= 0.3
-    return going and 45 <= abs(found.turn) <= 200 + 15
+    return going and 45 - 5 <= abs(found.turn) <= 200 + 15
 
 
 def _turned_in_place(body: Body) -> tuple[float, float]:
-    """Return the largest turn, degrees, within which the hips stay in 0.8 m, and its fastest rate, degrees a second."""
+    """Return the largest turn, degrees, within which the hips stay in 0.4 m, and its fastest rate, degrees a second."""
     yaw, path = body.smooth(body.yaw, 0.2), body.at("pelvis")[:, [0, 2]]
     best, rate = 0.0, 0.0
     stride = max(1, body.frames(0.1))
     frames = list(range(0, len(body), stride))
     for begin in frames:
         away = np.linalg.norm(path[begin:] - path[begin], axis=-1)
-        outside = np.flatnonzero(away > 0.8)
+        outside = np.flatnonzero(away > 0.4)
         end = begin + (int(outside[0]) if len(outside) else len(away))
         if end - begin < 2:
             continue
@@ -255,10 +259,10 @@ def turn_around(body: Body) -> bool:
 @rule("spin")
 def spin(body: Body) -> bool:
     yaw = body.smooth(body.yaw, 0.15)
-    fast = np.abs(np.gradient(yaw)) * body.fps >= 100
-    for begin, end in runs(_bridged(fast, body.frames(0.15))):
+    fast = np.abs(np.gradient(yaw)) * body.fps >= 60
+    for begin, end in runs(_bridged(fast, body.frames(0.25))):
         path = body.at("pelvis")[begin:end, :][:, [0, 2]]
-        near = float(np.linalg.norm(path - path[0], axis=-1).max()) < 1.2
+        near = float(np.linalg.norm(path - path[0], axis=-1).max()) < 1.3
         seconds = (end - begin) / body.fps
         angle = abs(float(yaw[end - 1] - yaw[begin]))
         if near and angle >= 300 and angle / seconds >= 120:

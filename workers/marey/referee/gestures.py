@@ -14,6 +14,8 @@ DANCE_S = 3.0
 """Shortest clip in which movements can be told to be a dance."""
 KNEES = 0.5
 """Height of the knees, m."""
+WAVING_ELBOW = 0.46
+"""Median speed of the elbow in a wave, as a share of that of the wrist; at most."""
 
 
 def _stays(body: Body) -> bool:
@@ -50,7 +52,12 @@ def _half_swings(body: Body, side: str, mask: Mask, size: float) -> int:
 def wave(body: Body) -> bool:
     for side in SIDES:
         high = body.height(f"{side}_wrist") > body.height("spine3") - 0.05
-        if _gestures(body) and _half_swings(body, side, high, 0.07) >= 3:
+        if not high.any() or not _gestures(body):
+            continue
+        # The forearm swings about the elbow; in blows and traffic signs the whole arm moves.
+        elbow, wrist = (np.linalg.norm(body.own_velocity(f"{side}_{joint}"), axis=-1) for joint in ("elbow", "wrist"))
+        forearm = np.median(elbow[high]) < WAVING_ELBOW * np.median(wrist[high])
+        if forearm and _half_swings(body, side, high, 0.07) >= 3:
             return True
     return False
 
@@ -59,10 +66,11 @@ def wave(body: Body) -> bool:
 def raise_arm(body: Body) -> bool:
     for side in SIDES:
         high = body.smooth(_over_shoulder(body, side), 0.1)
-        calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6
+        calm = (np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6) & (body.speed("pelvis") < 0.5)
         held = body.longest((high > 0.0) & calm) >= 0.25
-        low = float(high.min()) < -0.1 or float(np.median(high)) > 0.1
-        if held and low and _gestures(body):
+        low = float(high.min()) < -0.25 or float(np.median(high)) > 0.1
+        upright = float(np.percentile(body.height("pelvis"), 5)) > 0.8 * HIPS
+        if held and low and upright and _gestures(body):
             return True
     return False
 
@@ -71,8 +79,9 @@ def raise_arm(body: Body) -> bool:
 def bow(body: Body) -> bool:
     tip, head = body.smooth(body.tip, 0.1), body.smooth(body.height("head"), 0.1)
     hands = np.minimum(body.height("L_wrist"), body.height("R_wrist"))
-    if not _stays(body) or not _gestures(body):
+    if not _stays(body) or not _gestures(body) or body.height("pelvis").min() < 0.6 * HIPS:
         return False
+    struck = np.max([body.speed(f"{side}_wrist") for side in SIDES], axis=0) > 3.0
     for begin, end in swings(tip, 12.0):
         if tip[end] <= tip[begin]:
             continue
@@ -80,16 +89,21 @@ def bow(body: Body) -> bool:
         tipped = tip[end] - tip[begin] >= 15 or tip[end] >= 18
         down = head[begin : end + 1].max() - head[end] >= 0.05
         rises = tip[end] - up >= 0.4 * (tip[end] - tip[begin])
-        if tipped and down and rises and body.height("pelvis")[end] > 0.7 * HIPS and hands[end] > 0.35:
+        calm = not struck[begin : end + body.frames(0.3)].any()
+        if tipped and down and rises and calm and body.height("pelvis")[end] > 0.7 * HIPS and hands[end] > 0.35:
             return True
     return False
 
 
+def claps(body: Body) -> int:
+    """Count how often the hands come together."""
+    apart = body.hand_apart()
+    return sum(bool(apart[end] < apart[begin] and apart[end] < 0.22) for begin, end in swings(apart, 0.05))
+
+
 @rule("clap")
 def clap(body: Body) -> bool:
-    apart = body.hand_apart()
-    together = [b for a, b in swings(apart, 0.05) if apart[b] < apart[a] and apart[b] < 0.22]
-    return len(together) >= 3
+    return claps(body) >= 3
 
 
 @rule("cheer")
@@ -248,7 +262,10 @@ def reach_up(body: Body) -> bool:
     for side in SIDES:
         over = body.height(f"{side}_wrist") - body.height("head")
         peak = float(over.max())
-        if not passage(body) and peak > 0.17 and (over.min() < 0.1 or over[-1] < peak - 0.05):
+        slow = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 1.0
+        held = body.longest((over > max(0.17, peak - 0.15)) & slow) >= 0.25
+        upright = body.height("pelvis").min() > 0.7 * HIPS
+        if not passage(body) and held and upright and (over.min() < 0.1 or over[-1] < peak - 0.05):
             return True
     return False
 
@@ -491,7 +508,7 @@ def dribble(body: Body) -> bool:
 def shoot_basket(body: Body) -> bool:
     both = (body.height("L_wrist") + body.height("R_wrist")) / 2
     one = np.maximum(body.height("L_wrist"), body.height("R_wrist"))
-    near = body.hand_apart() < 0.45
+    near = body.hand_apart() < 0.4
     for begin, end in runs(one > body.height("head") + 0.1):
         before = slice(max(0, begin - body.frames(1.0)), begin + 1)
         chest = (both[before] < CHEST + 0.25).any() and near[before].any()

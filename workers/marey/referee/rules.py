@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 from typing import TypeAlias
 
 from marey.referee.body import Body
@@ -21,3 +24,9 @@ def rule(action: str) -> Callable[[Rule], Rule]:
         return function
 
     return register
+
+
+@lru_cache(maxsize=1)
+def accepted_rules() -> frozenset[str]:
+    """Return the actions whose rules are precise enough on real clips to say that an action is supported."""
+    return frozenset(tomllib.loads(Path(__file__).with_name("accepted.toml").read_text("utf-8"))["accepted"])

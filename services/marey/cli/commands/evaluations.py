@@ -296,6 +296,27 @@ def actions(
 
 
 @app.command()
+def pairs(
+    bundle: JudgedBundle,
+    chosen: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--property", help="side, count, order, direction, speed or duration; may be repeated. Default: all."
+        ),
+    ] = None,
+    seeds: Seeds = 4,
+    settings: evaluating.Settings = None,
+    threads: Threads = 0,
+    output: ReportFolder = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure whether a bundle tells left from right, two from three, slow from fast. Needs no server."""
+    from marey.cli.roles.actions import measure_pairs
+
+    _measure(lambda how: measure_pairs(bundle, chosen or (), how), seeds, settings, threads, output, as_json)
+
+
+@app.command()
 def studio(
     bundle: JudgedBundle,
     seeds: Seeds = 1,

@@ -1,11 +1,11 @@
-"""Adherence by the referee, measured in this process, for `marey eval actions` and `marey eval studio`."""
+"""Measurements of a bundle by the referee, in this process: `marey eval actions`, `pairs` and `studio`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
@@ -14,6 +14,14 @@ from marey.registry import get_model, resolve
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
     from marey.referee.prompts import ActionPrompt
+
+
+class _Prompt(Protocol):
+    @property
+    def text(self) -> str: ...
+
+
+P = TypeVar("P", bound=_Prompt)
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,36 @@ def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:
     return run.report(table, studio_document(run.reference, run.settings, trials))
 
 
+def measure_pairs(bundle: str, properties: Sequence[str], options: MeasureOptions) -> RefereeReport:
+    """Generate minimal pairs of prompts with a bundle, and count the pairs whose motions differ as asked.
+
+    Args:
+        properties: side, count, order, direction, speed or duration; none = all.
+
+    Raises:
+        NotFound, InvalidBundle: of the bundle.
+        InvalidInput: no such property or setting.
+    """
+    from marey.referee import Body
+    from marey.referee.pairs import (
+        PROPERTIES,
+        pair_prompts,
+        pairs_document,
+        pairs_markdown,
+        property_rates,
+        read_property,
+    )
+
+    if unknown := [name for name in properties if name not in PROPERTIES]:
+        hint = f"Known: {', '.join(PROPERTIES)}."
+        raise InvalidInput(f"there are no pairs for {unknown[0]!r}", where="--property", hint=hint)
+    run = _Run.of(bundle, options)
+    asked = [prompt for prompt in pair_prompts() if not properties or prompt.property in properties]
+    readings = [read_property(prompt, seed, Body(clip.joints, clip.fps)) for prompt, seed, clip in run.motions(asked)]
+    table = pairs_markdown(run.reference, property_rates(readings))
+    return run.report(table, pairs_document(run.reference, run.settings, readings))
+
+
 def _of_actions(prompts: Sequence[ActionPrompt], actions: Sequence[str]) -> list[ActionPrompt]:
     known = {action for prompt in prompts for action in prompt.actions}
     if unknown := [action for action in actions if action not in known]:
@@ -116,7 +154,7 @@ class _Run:
         load = resolve(get_model(found.manifest.model, where=bundle).load)
         return cls(load(found, threads=options.threads), options, values)
 
-    def motions(self, prompts: Sequence[ActionPrompt]) -> Iterator[tuple[ActionPrompt, int, MotionClip]]:
+    def motions(self, prompts: Sequence[P]) -> Iterator[tuple[P, int, MotionClip]]:
         """Generate each prompt with each seed."""
         from marey.generation.port import Request
         from marey.training.adherence import finished, pipeline_of
