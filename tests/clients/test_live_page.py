@@ -343,6 +343,14 @@ def test_an_example_starts_a_stream_and_another_steers_it(tab, server):
     assert server.heard == [{"kind": "steer", "prompt": examples[1]}]
 
 
+def test_what_is_wrong_with_the_finished_clip_is_told(tab, server):
+    server.flags = ["floating", "popping"]
+    begin(tab)
+    tab.click("stop")
+    tab.wait("document.querySelectorAll('#clip button').length === 2")
+    assert tab.ask("document.querySelector('#clip [data-flags]').textContent") == "The clip is floating, popping."
+
+
 def test_the_finished_clip_is_downloaded_with_the_key_in_a_header(tab, server):
     begin(tab)
     assert tab.ask("document.getElementById('clip').hidden")

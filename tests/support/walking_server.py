@@ -93,6 +93,7 @@ class WalkingServer:
         skip: frames that are left out, with a gap, before the next one.
         skeleton: that streams to come tell of; they walk as HumanML3D's.
         asked: how often the motions of the clip's job were listed.
+        flags: faults in the quality record of the clip.
     """
 
     def __init__(self) -> None:
@@ -103,6 +104,7 @@ class WalkingServer:
         self.skeleton = HUMANML3D
         self.url = ""
         self.asked = 0
+        self.flags: list[str] = []
         self._walks: dict[str, Walk] = {}
         self._sockets: set[WebSocket] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -156,7 +158,8 @@ class WalkingServer:
         if request.headers.get("authorization") != f"Bearer {KEY}":
             return _problem(401, "this API key is unknown or revoked", "")
         files = [{"format": "npz"}, {"format": "bvh"}]
-        motion = [{"id": "motion-of-the-clip", "files": files}] if self.asked > 1 else []
+        quality = {"flags": self.flags, "ok": not self.flags}
+        motion = [{"id": "motion-of-the-clip", "files": files, "quality": quality}] if self.asked > 1 else []
         return JSONResponse({"items": motion, "next": None})
 
     async def _file(self, request: Request, format: str) -> Response:

@@ -13,6 +13,7 @@ import sqlalchemy as sa
 from marey.db.ids import new_id
 from marey.webhooks.types import EventKind
 
+SUBSCRIBED = sa.text("SELECT EXISTS (SELECT FROM webhook WHERE tenant_id = :tenant AND :kind = ANY(events))")
 # A webhook that is being deleted is waited for, and then gone: its deliveries could not refer to it.
 WRITE = sa.text("""
     WITH wanted AS MATERIALIZED (
@@ -25,6 +26,11 @@ WRITE = sa.text("""
     INSERT INTO webhook_delivery (webhook_id, event_id, next_at, created_at)
     SELECT wanted.id, :event, clock_timestamp(), event.at FROM wanted, event
 """)
+
+
+def is_subscribed(conn: sa.Connection, tenant: str, kind: EventKind) -> bool:
+    """Return True if a webhook of the tenant subscribes to a kind of event."""
+    return conn.execute(SUBSCRIBED, {"tenant": tenant, "kind": str(kind)}).scalar_one()
 
 
 def enqueue_event(conn: sa.Connection, tenant: str, kind: EventKind, data: Mapping[str, object]) -> None:

@@ -42,7 +42,37 @@ def test_a_job_that_ended_is_told_once_with_its_counters_and_without_its_prompts
     (row,) = deliveries(engine, webhook)
     assert (row.kind, row.state, row.attempts) == ("job.ended", "pending", 0)
     counters = {"total": 3, "ready": 0, "leased": 0, "succeeded": 2, "failed": 1, "dead": 0, "cancelled": 0}
-    assert row.data == {"job": str(job), "state": "partial", "counters": counters}
+    quality = {"measured": 0, "ok": 0, "flags": {}}
+    assert row.data == {"job": str(job), "state": "partial", "counters": counters, "quality": quality}
+
+
+def test_the_end_of_a_job_tells_the_quality_of_its_motions(engine: sa.Engine) -> None:
+    webhook = new_webhook(engine)
+    submit_items(engine, 4)
+    parse_texts(engine)
+    claimed = claim_some(engine)
+    commit_all(engine, claimed, [item.id for item in claimed.items[:3]])
+    records = [
+        {"ok": True, "flags": []},
+        {"ok": False, "flags": ["floating", "popping"]},
+        {"ok": False, "flags": ["popping"]},
+    ]
+    with transaction(engine) as conn:
+        motions = conn.execute(sa.text("SELECT id FROM motion ORDER BY id")).scalars().all()
+        for motion, record in zip(motions, records, strict=True):
+            statement = sa.text("UPDATE motion SET metadata = metadata || CAST(:value AS jsonb) WHERE id = :id")
+            conn.execute(statement, {"value": json.dumps({"quality": record}), "id": motion})
+    commit_all(engine, claimed, [claimed.items[3].id])
+    (row,) = deliveries(engine, webhook)
+    assert row.data["quality"] == {"measured": 3, "ok": 1, "flags": {"floating": 1, "popping": 2}}
+
+
+def test_quality_is_counted_only_for_a_subscriber(engine: sa.Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    new_webhook(engine, "https://studio.example/", EventKind.JOB_PAUSED)
+    monkeypatch.setattr("marey.jobs.notifications.count_quality", lambda conn, job: pytest.fail("counted"))
+    submit_items(engine, 1)
+    parse_texts(engine)
+    commit_all(engine, claim_some(engine))
 
 
 def test_every_end_of_a_job_is_an_event_of_its_own(engine: sa.Engine) -> None:

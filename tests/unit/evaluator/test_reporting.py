@@ -33,6 +33,8 @@ from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.motion.features import HUMANML3D_263
 from marey.motion.finish import finish_motion
+from marey.quality.clips import quality_of
+from marey.quality.limits import expected_of
 from marey.runtime.scoring import ScoreInput
 
 NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
@@ -103,6 +105,25 @@ def test_motions_that_are_the_real_ones_have_no_distance_to_them(report: Report)
     assert raw.values["fid"].mean == pytest.approx(0, abs=1e-3)
     assert raw.values["kid"].mean == pytest.approx(0, abs=1e-3)
     assert raw.values[RETRIEVED].n == report.row("exported").values[RETRIEVED].n == 32
+
+
+def test_motions_with_a_flag_of_their_quality_record_are_counted(
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips, report: Report
+) -> None:
+    assert report.row("exported").values["flagged"].mean is None
+    assert report.row("exported").values["flagged"].note == "no motion has a quality record"
+    clips = [parse_npz(data, where="clip") for data in files[:34]]
+    records = [quality_of(clip, expected_of(["walk"])) for clip in clips]
+    flagged = sum(bool(record and record.flags) for record in records)
+    assert 0 < flagged < 34
+    made = [
+        replace(clip, manifest={**clip.manifest, "quality": record and record.model_dump(mode="json")}).to_npz()
+        for clip, record in zip(clips, records, strict=True)
+    ]
+    source = source_of(made, evaluator, real)
+    found = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert found.row("exported").values["flagged"].mean == pytest.approx(100 * flagged / 34)
+    assert "flagged" not in found.row("raw").values
 
 
 def test_what_cannot_be_measured_is_marked_with_its_reason(report: Report) -> None:

@@ -24,6 +24,7 @@ from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.features import FeatureLayout, layout
 from marey.motion.resample import resample
+from marey.quality.record import read_quality
 
 Piece = TypeVar("Piece")
 TOGETHER = 64
@@ -45,11 +46,16 @@ class Checked:
 
 @dataclass(frozen=True)
 class EvaluatedMotion:
-    """One motion and its measurements, as generated and as exported."""
+    """One motion and its measurements, as generated and as exported.
+
+    Attributes:
+        flags: those of the quality record that it was delivered with; None without a record.
+    """
 
     item: MadeItem
     raw: Checked
     exported: Checked
+    flags: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -115,11 +121,13 @@ def measure(
                 continue
             clips.append(clip)
             raw_joints = space.decode(clip.features)
+            record = read_quality(clip.manifest)
             found.append(
                 EvaluatedMotion(
                     item,
                     raw=check(raw_joints, space.fps, item.expected),
                     exported=check(clip.joints, clip.fps, item.expected),
+                    flags=None if record is None else tuple(record.flags),
                 )
             )
         raw.append(evaluator.embed_motion([clip.features for clip in clips]))

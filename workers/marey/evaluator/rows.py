@@ -21,6 +21,7 @@ from marey.evaluator.scoring import (
     EmbeddedSet,
     compositional,
     embedded,
+    flagged,
     keys_of,
     label_ceilings,
     multimodality,
@@ -134,7 +135,7 @@ def generated_rows(
             "exported",
             "Exported",
             "as users get them: feet locked, rotations solved",
-            exported | {"multimodality": multimodality(measured, ruler.seed)},
+            exported | {"multimodality": multimodality(measured, ruler.seed), "flagged": flagged(measured)},
         ),
     )
 

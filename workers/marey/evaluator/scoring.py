@@ -118,6 +118,7 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
         Metric("jerk", "Jerk", "m/s³", "lower", 1, "Mean third derivative of the joints.", JOINTS),
         Metric("bone_drift", "Bone drift", "mm", "lower", 3, "How far bones leave their median length.", JOINTS),
         Metric("penetration", "Floor penetration", "mm", "lower", 1, "Deepest joint under the floor.", JOINTS),
+        Metric("flagged", "Flagged", "%", "lower", 1, "Motions whose quality record has a flag.", JOINTS),
     )
     if len(splits) < 2 or COMPOSITIONAL not in splits:
         return whole
@@ -164,6 +165,13 @@ def multimodality(measured: EvaluatedMotions, seed: int) -> Value:
         lambda rng: distribution.multimodality(whole, pairs=PAIRS_OF_A_PROMPT, rng=rng), repeats=REPEATS, seed=seed
     )
     return _interval(drawn, len(whole) * repeats)
+
+
+def flagged(measured: EvaluatedMotions) -> Value:
+    """Return the share of the delivered motions whose quality record has a flag."""
+    known = np.array([motion.flags is not None for motion in measured.motions], bool)
+    numbers = np.array([100.0 * bool(motion.flags) for motion in measured.motions])
+    return _over_repeats(measured.variants, numbers, known, "no motion has a quality record")
 
 
 def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np.int64]) -> dict[str, Value]:

@@ -51,7 +51,7 @@ class PairPrompt:
 
 @dataclass(frozen=True)
 class PairReading:
-    """What the referee reads off one motion.
+    """Measurement of one motion by the referee.
 
     Attributes:
         value: side, number, direction, speed or seconds of the motion; of an order, whether it is shown.

@@ -199,7 +199,8 @@ def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
 @deadline(db.SEARCH)
 def get_quality(job: UUID, conn: Connection, key: Reader) -> QualityCountsView:
     """Count the job's motions by their quality: how many have a flag, and which."""
-    return QualityCountsView.of(count_quality(conn, key.tenant, job))
+    jobs.get_job(conn, key.tenant, job)
+    return QualityCountsView.of(count_quality(conn, job))
 
 
 @router.patch("/{job}")

@@ -250,11 +250,20 @@
           button.onclick = () => download(motion.id, file.format, key, button);
           return button;
         });
-        $("clip").replaceChildren(...buttons);
+        $("clip").replaceChildren(...buttons, ...faults(motion.quality));
         return enter(shown.state);
       }
       await new Promise((resolve) => setTimeout(resolve, 1000 * wait));
     }
+  }
+
+  // What the quality record of a motion says is wrong with it; nothing if it has none.
+  function faults(quality) {
+    if (!quality?.flags.length) return [];
+    const said = document.createElement("p");
+    said.dataset.flags = quality.flags.join(" ");
+    said.textContent = `The clip is ${quality.flags.join(", ")}.`;
+    return [said];
   }
 
   async function load(path, key, read) {
