@@ -15,7 +15,7 @@ from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
-from marey.models.hgm3.decoding import condition_level
+from marey.models.hgm3.decoding import DecodeOptions, condition_level
 from marey.models.hgm3.generate import Generated, Generator, SamplingSettings
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
@@ -220,3 +220,19 @@ def test_a_bundle_whose_tensors_do_not_fit_is_refused(tmp_path: Path) -> None:
     bundle.manifest = bundle.manifest.model_copy(update={"parameters": parameters})
     with pytest.raises(InvalidBundle, match="do not fit"):
         Generator.load(bundle, device="cpu")
+
+
+def test_one_pass_is_enough(generator: Generator) -> None:
+    (made,) = generator.generate([Request(text_features(1, 1, 1), 7, 30)], SamplingSettings(steps=1))
+    assert made is not None
+    assert (made.tokens >= 0).all()
+
+
+def test_the_longest_motions_come_first(generator: Generator) -> None:
+    frames = [20, 196, 60, 190]
+    (longest, *_, shortest) = generator._groups(frames)
+    assert (1 in longest, 0 in shortest) == (True, True)
+
+
+def test_a_pass_may_keep_no_token_unless_progress_is_asked_for() -> None:
+    assert not DecodeOptions().min_progress

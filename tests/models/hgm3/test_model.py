@@ -366,3 +366,15 @@ def test_guidance_in_front_of_the_last_matrix_equals_guidance_of_logits(compact:
     with_condition, without = residual(*inputs).chunk(2)
     found = residual(*inputs, guidance=5.0)
     torch.testing.assert_close(found[valid[:2]], guide(with_condition, without, 5.0)[valid[:2]], atol=1e-4, rtol=1e-4)
+
+
+def test_logits_of_mixed_levels_are_those_of_each_level_alone() -> None:
+    torch.manual_seed(0)
+    model = ResidualTransformer(replace(TINY, compact=False)).eval().requires_grad_(False)
+    model.bias.normal_()
+    total, valid = torch.randn(1, 8, 32).repeat(2, 1, 1), torch.ones(2, 8, dtype=torch.bool)
+    sentence = model.sentence(torch.randn(2, 384))
+    both = model(total, valid, torch.tensor([1, 2]), sentence)
+    for row, level in enumerate((1, 2)):
+        alone = model(total[row : row + 1], valid[:1], torch.tensor([level]), sentence[row : row + 1])
+        torch.testing.assert_close(both[row : row + 1], alone, rtol=1e-4, atol=1e-4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import torch
 from marey.data.prepared import PreparedData
 from marey.models.hgm3 import decoding
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from marey.models.hgm3.config import TINY, HGM3Config
+from marey.models.hgm3.config import TINY, HGM3Config, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.decoding import DecodeOptions, Items
 from marey.models.hgm3.generate import Generator
@@ -19,8 +21,11 @@ from marey.models.hgm3.model import MaskedTransformer
 from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage
 from marey.models.hgm3.stage_residual import ResidualStage
 from marey.models.hgm3.tokenizer import Tokenizer
+from marey.models.hgm3.train import train_stage
+from marey.training.budget import Budget
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData, TokenData
+from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import tokenizer_loss
 from tests.support.prepared import text_features
@@ -236,3 +241,29 @@ def _items(batch: int, size: int) -> Items:
         tokens=torch.full((batch, size, TINY.tokenizer.levels), -1),
         decided=torch.zeros(batch, 3, dtype=torch.long),
     )
+
+
+@pytest.mark.parametrize(
+    ("random", "mask", "kinds"), [(0.0, 1.0, {"mask"}), (0.0, 0.5, {"mask", "same"}), (0.5, 1.0, {"mask", "other"})]
+)
+def test_masked_tokens_are_shown_as_mask_as_another_or_as_they_are(random: float, mask: float, kinds: set[str]) -> None:
+    torch.manual_seed(0)
+    config = replace(TINY, mining=replace(TINY.mining, replace_random=random, replace_mask=mask))
+    stage = SimpleNamespace(
+        config=config, module=SimpleNamespace(masked=SimpleNamespace(mask_token=config.tokenizer.codes))
+    )
+    targets = torch.zeros(4, 100, dtype=torch.long)
+    masked = torch.arange(100).expand(4, 100) < 50
+    shown = MaskedStage._shown(stage, targets, masked)  # pyright: ignore[reportArgumentType]
+    assert not shown[~masked].any()
+    names = {config.tokenizer.codes: "mask", 0: "same"}
+    assert {names.get(int(token), "other") for token in shown[masked]} - ({"same"} if random else set()) == kinds
+
+
+def test_a_stage_joins_the_other_processes_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def joined() -> None:
+        raise InterruptedError
+
+    monkeypatch.setattr("marey.models.hgm3.train.start_process_group", joined)
+    with pytest.raises(InterruptedError):
+        train_stage("masked", TrainOptions(tmp_path, tmp_path, named_config("tiny"), Budget()))

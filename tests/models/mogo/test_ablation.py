@@ -120,3 +120,13 @@ def test_behind_a_level_token_frames_still_read_the_past_alone_and_the_prompt_in
     changed = (model.states(second, tokens, seam=seam) - before).abs().amax((0, 2, 3))
     assert (changed[:3] == 0).all()  # frames 1 to 3 come before the steer
     assert (changed[3:] > 1e-5).all()
+
+
+def test_variants_are_named_by_their_lanes_and_their_depth() -> None:
+    named = {name: (variant.joint, variant.depth) for name, variant in VARIANTS.items()}
+    assert named == {
+        "a lane a level, PnQ, independent levels": (False, 0),
+        "a lane a level, level token, independent levels": (False, 0),
+        "a lane a level, PnQ, depth head": (False, 2),
+        "one lane, depth head": (True, 2),
+    }

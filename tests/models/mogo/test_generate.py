@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +15,11 @@ from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.bundle import random_bundle
-from marey.models.mogo.config import TINY
+from marey.models.mogo.config import TINY, InferenceConfig
 from marey.models.mogo.generate import Generator, SamplingSettings
+from marey.models.mogo.spec import SPEC
 from marey.models.mogo.train import train_stage
+from marey.motion.skeleton import HUMANML3D
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.prepared import text_features, write_prepared
@@ -128,3 +132,30 @@ def test_an_items_settings_are_checked_by_name(generator: Generator, values: dic
     with pytest.raises(InvalidInput) as error:
         generator.settings(values)
     assert error.value.where == where
+
+
+def test_streams_of_a_card_are_made_again_only_for_other_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Recording a step takes as long as drawing a motion. A stand-in takes the place of the card."""
+    generator = object.__new__(Generator)
+    generator.device = SimpleNamespace(type="cuda")
+    generator._streams = None
+    monkeypatch.setattr(Generator, "packed", lambda self: None)
+    monkeypatch.setattr("marey.models.mogo.generate.StreamBatch", lambda *_: object())
+    usual, other = InferenceConfig(), InferenceConfig(temperature=0.5)
+    first = generator.streams(3, usual)
+    assert generator.streams(5, usual) is first
+    assert generator.streams(5, other) is not first
+
+
+def test_variety_lowers_and_raises_the_temperature() -> None:
+    variety = SPEC.variety
+    assert variety is not None
+    assert variety.low["temperature"] < 1 < variety.high["temperature"]
+
+
+@pytest.mark.parametrize(("width", "encoder"), [(384, "minilm"), (768, "t5-base")])
+def test_a_random_bundle_names_the_encoder_of_its_width(tmp_path: Path, width: int, encoder: str) -> None:
+    config = replace(TINY, condition=replace(TINY.condition, text_width=width))
+    bundle = random_bundle(tmp_path / "random", config)
+    assert (bundle.manifest.text.encoder, bundle.manifest.text.width) == (encoder, width)
+    assert bundle.manifest.offsets == pytest.approx(HUMANML3D.offsets, abs=1e-6)

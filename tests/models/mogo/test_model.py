@@ -20,6 +20,8 @@ from marey.models.mogo.model import (
     in_force,
     next_targets,
 )
+from marey.models.mogo.packed_model import sessions_of_product
+from marey.models.mogo.plan import EARLIEST, NEVER, ActionPlan
 
 from .networks import columns, prompts, transformer
 
@@ -282,3 +284,27 @@ def test_an_act_takes_as_long_as_acts_that_were_said_alike() -> None:
     said = torch.zeros(3, TINY.condition.text_width)
     said[:, 0] = torch.tensor([0.0, -1.0, 50.0])
     assert pace(said).tolist() == [20, 18, TINY.max_frames]
+
+
+def test_a_clock_begins_without_effect_and_may_be_left_out() -> None:
+    torch.manual_seed(0)
+    with_clock = RQHCTransformer(TINY)
+    assert with_clock.clock is not None
+    assert not with_clock.clock.project.weight.any()
+    assert RQHCTransformer(replace(TINY, condition=replace(TINY.condition, clock=False))).clock is None
+
+
+def test_large_models_take_several_sessions_in_one_product(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = transformer()
+    assert sessions_of_product(model, 5) == 1
+    monkeypatch.setattr("marey.nn.packed.SMALL", 1)
+    assert [sessions_of_product(model, sessions) for sessions in (5, 20)] == [5, 8]
+
+
+def test_an_action_may_end_some_time_after_it_began() -> None:
+    plan = ActionPlan.of(torch.zeros(2, 4), 0, [40, NEVER])
+    plan.take(100)
+    assert plan.until == 140
+    assert plan.earliest == 100 + int(EARLIEST * 40) > 100
+    plan.take(150)
+    assert plan.earliest == 150

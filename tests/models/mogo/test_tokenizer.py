@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -106,3 +108,9 @@ def test_the_encoder_may_look_ahead() -> None:
     later[:, 12:] += 1
     latents = [made.encoder(x.transpose(1, 2), None) for x in (features, later)]
     assert not torch.allclose(latents[0][..., 11], latents[1][..., 11])
+
+
+def test_the_quantizer_drops_levels_as_configured() -> None:
+    config = replace(TINY, tokenizer=replace(TINY.tokenizer, level_dropout=0.37, decay=0.61))
+    quantizer = Tokenizer(config).quantizer
+    assert (quantizer.dropout, quantizer.decay) == (0.37, 0.61)

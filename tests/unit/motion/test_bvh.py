@@ -15,6 +15,7 @@ from marey.motion.io.bvh import first_frame_stands_apart, format_bvh, parse_bvh,
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import about, angle_between, multiply, to_euler
 from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from marey.motion.units import METRES
 from tests.support.exported import tumbling
 from tests.support.walker import walker
 
@@ -391,3 +392,23 @@ def test_no_damage_to_a_file_gives_anything_but_a_clip_or_an_expected_error(data
             break
     with contextlib.suppress(InvalidFile, TooLarge):
         assert np.isfinite(parse_bvh(bytes(text)).joints()).all()
+
+
+def test_the_text_form_of_a_file_leaves_its_arrays_out() -> None:
+    text = repr(parse_bvh(format_bvh(tumbling(HUMANML3D, 20.0)).encode()))
+    assert "array" not in text.replace(repr(HUMANML3D), "")
+    assert "fps=" in text
+
+
+def test_a_file_of_as_many_frames_as_may_be_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = tumbling(HUMANML3D, 20.0)
+    data = format_bvh(clip).encode()
+    monkeypatch.setattr(bvh, "MAX_FRAMES", clip.frames)
+    assert len(parse_bvh(data).rotations) == clip.frames
+    monkeypatch.setattr(bvh, "MAX_FRAMES", clip.frames - 1)
+    with pytest.raises(TooLarge):
+        parse_bvh(data)
+
+
+def test_units_are_told_in_metres() -> None:
+    assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}

@@ -178,3 +178,10 @@ def test_a_header_that_claims_too_many_numbers_is_refused():
 def test_saving_into_no_folder_says_so(tmp_path):
     with pytest.raises(InvalidInput, match="cannot be written"):
         walker().save_npz(tmp_path / "none" / "a.npz")
+
+
+def test_features_of_any_precision_are_kept_as_float32() -> None:
+    clip = tumbling(HUMANML3D, 20.0)
+    features = np.zeros((clip.frames, 3), np.float64)
+    made = MotionClip.of(HUMANML3D, clip.rotations, clip.root, clip.contacts, fps=20.0, features=features)
+    assert made.features.dtype == np.float32

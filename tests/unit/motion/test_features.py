@@ -225,3 +225,11 @@ def test_smoothing_keeps_constants_and_narrows_noise():
     assert smooth(np.full((30, 2), 3.0), 5) == pytest.approx(3.0)
     noise = np.random.default_rng(0).normal(size=(500, 1))
     assert smooth(noise, 4).std() == pytest.approx((2 * 4 * np.pi**0.5) ** -0.5, rel=0.2)
+
+
+@pytest.mark.parametrize(("step", "stands"), [(0.04, True), (0.055, False)])
+def test_a_foot_stands_while_it_moves_less_than_45_mm_a_frame(step: float, stands: bool) -> None:
+    joints = np.repeat(HUMANML3D.rest[None].astype(np.float64), 20, axis=0)
+    joints[..., 2] += step * np.arange(20)[:, None]
+    contacts = HUMANML3D_263.encode(joints)[:, HUMANML3D_263.slices["contacts"]]
+    assert (contacts == float(stands)).all()

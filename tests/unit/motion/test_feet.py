@@ -212,3 +212,13 @@ def test_a_straight_leg_bends_ahead():
     leg = np.array([[[0, 0.8, 0], [0, 0.4, 0], [0, 0.0, 0]]])
     knee = two_bone_knee(leg, leg[:, 0], np.array([[0, 0.1, 0]]), np.array([[0, 0, 1.0]]))
     assert knee[0, 2] > 0.1
+
+
+def test_a_gap_beside_a_single_known_frame_stays_near_its_value() -> None:
+    """A stretch of one frame has no slope."""
+    values, known = np.zeros((60, 1)), np.zeros(60, bool)
+    values[20], known[20] = 0.1, True
+    values[25:30], known[25:30] = 0.1, True
+    filled = _fill(values, known, 20.0)
+    assert filled.min() > -0.01
+    assert filled.max() < 0.11

@@ -9,6 +9,7 @@ from marey.motion.kinematics import bone_lengths, forward_kinematics
 from marey.motion.live_poses import LivePoses
 from marey.motion.rotations import about, from_rotvec
 from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS, Skeleton
+from marey.motion.solver import _limbs, _spines
 from tests.support.motions import drift
 
 
@@ -53,3 +54,14 @@ def test_a_chain_without_rigid_bodies_is_solved_too():
     np.testing.assert_allclose(pose.joints, joints, atol=1e-9)
     np.testing.assert_allclose(live.places(joints), joints, atol=1e-9)
     np.testing.assert_allclose(forward_kinematics(chain, pose.rotations, pose.root), joints, atol=1e-9)
+
+
+def test_a_chain_that_begins_under_a_root_without_a_rigid_body_is_no_spine() -> None:
+    assert _spines((-1, 0, 1, 2), frozenset({3})) == {}
+    assert _spines((-1, 0, 1, 2), frozenset({0, 3})) == {1: (1, 2, 3)}
+
+
+def test_knees_bend_one_way_and_elbows_both() -> None:
+    limbs = _limbs(HUMANML3D.parents, HUMANML3D.facing)
+    names = {HUMANML3D.joint_names[limb.upper]: limb.one_way for limb in limbs}
+    assert names == {"R_hip": True, "L_hip": True, "R_shoulder": False, "L_shoulder": False}

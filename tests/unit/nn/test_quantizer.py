@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from marey.nn.quantizer import NO_TOKEN, ResidualQuantizer
+from marey.nn.quantizer import NO_TOKEN, ResidualQuantizer, _draw
 
 
 def quantizer(levels: int = 3, codes: int = 8, width: int = 4, **options: float) -> ResidualQuantizer:
@@ -105,3 +105,9 @@ def test_positions_beyond_a_clip_come_out_as_zeros_and_train_nothing() -> None:
     assert first.tokens[0, 2].tolist() == [NO_TOKEN] * 3
     assert torch.equal(a.codebooks, b.codebooks)
     assert torch.equal(first.commitment, second.commitment)
+
+
+def test_codes_drawn_from_too_few_vectors_differ_by_a_hundredth() -> None:
+    torch.manual_seed(0)
+    drawn = _draw(torch.ones(2, 64), 4000)
+    assert 0.9 < float((drawn - 1).norm(dim=-1).mean() / 0.01) < 1.1

@@ -137,3 +137,8 @@ def test_scales_stay_near_one_over_a_training() -> None:
         assert all(float(s.detach().min()) > 0.2 and float(s.detach().max()) < 5 for s in q.scales)
     assert sum(losses[-100:]) < 0.7 * sum(losses[:100])
     assert max(float((s.detach() - 1).abs().max()) for s in q.scales) > 0.02  # they do learn
+
+
+def test_codebooks_decay_as_told() -> None:
+    made = ScaledQuantizer(2, 8, 4, decay=0.61, dropout=0.37, revive=3.0)
+    assert (made.decay, made.dropout, made.revive) == (0.61, 0.37, 3.0)
