@@ -121,7 +121,9 @@ def test_priority_and_comment_are_kept_and_told(engine: sa.Engine) -> None:
         assert set_priority(conn, "default", job, 7).priority == 7
         assert set_comment(conn, "default", job, "for Monday").comment == "for Monday"
         assert set_comment(conn, "default", job, None).comment is None
-        assert [event.kind for event in events_after(conn, "default", job, 1)] == ["priority", "comment", "comment"]
+        told, *others = events_after(conn, "default", job, 1)
+        assert (told.kind, told.data["priority"]) == ("priority", 7)
+        assert [event.kind for event in others] == ["comment", "comment"]
         for priority in (-1001, 1001):
             with pytest.raises(InvalidInput, match="1000"):
                 set_priority(conn, "default", job, priority)

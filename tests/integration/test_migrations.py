@@ -32,13 +32,15 @@ def test_the_migrated_database_is_the_one_in_the_code(engine: sa.Engine) -> None
         assert compare_metadata(context, metadata) == []
 
 
-def test_checks_and_generated_columns_are_those_in_the_code(engine: sa.Engine) -> None:
+def test_checks_generated_columns_and_indexes_are_those_in_the_code(engine: sa.Engine) -> None:
     """Compare properties that Alembic ignores: the tables are made a second time, from the code."""
     query = sa.text(
         "SELECT conrelid::regclass::text, conname::text, pg_get_constraintdef(oid) FROM pg_constraint "
         "WHERE connamespace = current_schema::regnamespace AND conrelid <> 0 UNION ALL "
         "SELECT table_name, column_name, generation_expression FROM information_schema.columns "
-        "WHERE table_schema = current_schema AND is_generated = 'ALWAYS' ORDER BY 1, 2"
+        "WHERE table_schema = current_schema AND is_generated = 'ALWAYS' UNION ALL "
+        "SELECT tablename, indexname, regexp_replace(indexdef, ' ON [a-z_]+[.]', ' ON ') FROM pg_indexes "
+        "WHERE schemaname = current_schema ORDER BY 1, 2, 3"
     )
     with engine.begin() as conn:
         migrated = [tuple(row) for row in conn.execute(query) if "alembic" not in row[0]]

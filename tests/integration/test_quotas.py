@@ -94,6 +94,11 @@ def test_a_tenant_has_a_name_and_quotas_that_can_be_changed(engine: sa.Engine) -
                 act(conn, "nobody")
         with pytest.raises(InvalidInput, match="running"):
             set_quotas(conn, "studio-7", {"running": -1})
+        largest = {"queued": 2**31 - 1, "running": 2**31 - 1, "bytes": 2**63 - 1, "streams": 2**31 - 1}
+        assert set_quotas(conn, "studio-7", largest).quotas == Quotas(**largest)
+        for name, value in largest.items():
+            with pytest.raises(InvalidInput, match=f"not between 0 and {value}"):
+                set_quotas(conn, "studio-7", {name: value + 1})
 
 
 @pytest.mark.parametrize("name", ["", "Studio", "a/b", "../x", "-a", "a" * 64, "ä", "a b", "a\n"])

@@ -104,6 +104,14 @@ def test_readings_that_differ_are_all_answered_and_a_whole_id_has_no_other(engin
     assert found(engine, JOB, "last") == [newer, last]
 
 
+def test_of_jobs_made_in_the_same_microsecond_the_last_is_that_of_the_larger_id(engine: sa.Engine) -> None:
+    jobs = [submit_items(engine, 1) for _ in range(3)]
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE job SET created_at = '2026-01-01'"))
+        conn.execute(sa.text("UPDATE job SET name = 'touched' WHERE id = :job"), {"job": jobs[2]})  # moves its row
+    assert found(engine, JOB, "last") == [max(jobs)]
+
+
 def test_two_ids_that_end_alike_are_told_apart_by_more_digits(engine: sa.Engine) -> None:
     ids = [renamed(engine, _empty(engine), UUID(f"0190000{n}-0000-7000-8000-0{n}00deadbeef")) for n in (1, 2)]
     assert found(engine, JOB, "deadbeef") == ids[::-1]

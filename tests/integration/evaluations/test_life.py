@@ -162,6 +162,15 @@ def test_a_run_is_compared_with_the_last_of_the_same_model_prompts_and_evaluator
     assert judge.seen[-1].history == ()
 
 
+def report_digest(engine: sa.Engine, evaluation: UUID) -> str:
+    query = sa.text(
+        "SELECT sha256 FROM evaluation_report JOIN asset ON asset.id = asset_id "
+        "WHERE evaluation_id = :evaluation AND format = 'json'"
+    )
+    with transaction(engine) as conn:
+        return conn.execute(query, {"evaluation": evaluation}).scalar_one()
+
+
 def test_a_pinned_baseline_stays_the_one_to_compare_with(
     engine: sa.Engine, scheduler: EvaluationScheduler, loop: Loop, judge: ToyEvaluator
 ) -> None:
@@ -174,6 +183,9 @@ def test_a_pinned_baseline_stays_the_one_to_compare_with(
     assert score.baseline is not None
     assert score.previous is not None
     assert (score.baseline.id, score.previous.id) == (first, second)
+    for run in (score.baseline, score.previous):
+        assert run.report is not None
+        assert run.report.sha256 == report_digest(engine, run.id)
     assert [run.id for run in score.history] == [first, second]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from datetime import timedelta
 from uuid import UUID
 
 import httpx2
@@ -104,6 +105,15 @@ def test_a_stream_that_a_worker_has_is_asked_to_stop(http: httpx2.Client, stream
     response = http.delete(f"/v1/streams/{stream}")
     assert (response.status_code, response.json()["state"]) == (202, "live")
     assert hand.received() == [StreamControl("stop")]
+
+
+def test_a_worker_that_takes_a_stream_has_been_seen(api: LiveApi, stream: str) -> None:
+    with transaction(api.engine) as conn:
+        conn.execute(sa.text("UPDATE stream SET seen_at = now() - interval '1 hour'"))
+    with transaction(api.engine) as conn:
+        assert take_stream(conn, UUID(stream), 1, "hand") is not None
+        age = conn.execute(sa.text("SELECT clock_timestamp() - seen_at FROM stream WHERE id = :id"), {"id": stream})
+        assert age.scalar_one() < timedelta(minutes=1)
 
 
 def test_a_worker_that_takes_a_stream_while_it_is_deleted_has_it_and_hears_of_that(

@@ -266,4 +266,4 @@ def test_a_stage_joins_the_other_processes_first(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr("marey.models.hgm3.train.start_process_group", joined)
     with pytest.raises(InterruptedError):
-        train_stage("masked", TrainOptions(tmp_path, tmp_path, named_config("tiny"), Budget()))
+        train_stage("masked", TrainOptions(tmp_path, tmp_path, named_config("tiny"), Budget(1)))
