@@ -30,6 +30,7 @@ from marey.jobs import (
     pause,
     record_scheduler_heartbeat,
     retire,
+    sweep,
 )
 from marey.runtime.app import DRAIN, create_app
 from marey.runtime.queue import redis_client
@@ -451,3 +452,13 @@ def test_one_look_that_finds_every_part_silent_is_a_machine_that_slept() -> None
 def test_a_scheduler_without_database_says_what_to_set() -> None:
     with pytest.raises(InvalidInput, match="MAREY_DATABASE_URL"):
         scheduler_main(Settings(database_url=None, queue_url=None), stopping=threading.Event())
+
+
+def test_a_worker_that_was_not_seen_for_a_day_is_forgotten(engine: sa.Engine) -> None:
+    live(engine, "a", "b")
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE worker SET seen_at = seen_at - interval '25 hours' WHERE id LIKE 'a/%'"))
+        conn.execute(sa.text("UPDATE worker SET seen_at = seen_at - interval '23 hours' WHERE id LIKE 'b/%'"))
+    with transaction(engine) as conn:
+        sweep(conn)
+        assert [row.id for row in list_workers(conn)] == [f"b/{QUEUE}"]

@@ -378,3 +378,11 @@ def test_logits_of_mixed_levels_are_those_of_each_level_alone() -> None:
     for row, level in enumerate((1, 2)):
         alone = model(total[row : row + 1], valid[:1], torch.tensor([level]), sentence[row : row + 1])
         torch.testing.assert_close(both[row : row + 1], alone, rtol=1e-4, atol=1e-4)
+
+
+def test_features_are_normalized_by_mean_and_deviation_and_restored() -> None:
+    tokenizer = Tokenizer(TINY)
+    mean, std = torch.randn(TINY.features), torch.rand(TINY.features) + 0.5
+    tokenizer.set_statistics(mean, std)
+    torch.testing.assert_close(tokenizer.normalize(mean + 2 * std), torch.full((TINY.features,), 2.0))
+    torch.testing.assert_close(tokenizer.restore(tokenizer.normalize(mean + 3)), mean + 3)

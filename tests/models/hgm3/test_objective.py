@@ -129,6 +129,9 @@ def test_the_residual_input_holds_nothing_of_the_level_it_predicts(prepared: Pre
     """App. A.2: level v + 1 from the levels up to v; a higher level that changes leaves the input as it is."""
     tokenizer, tokens, captions = encoded(prepared, TINY)
     stage = ResidualStage(TINY, prepared.clips, tokens, captions, tokenizer.codebooks)
+    mean, std = captions.statistics(stage.pairs.train.tolist(), TINY.condition)
+    assert torch.equal(stage.module.normalizer.mean, mean)
+    assert torch.equal(stage.module.normalizer.std, std)
     inputs: list[torch.Tensor] = []
     forward = stage.module.forward
 

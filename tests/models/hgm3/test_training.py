@@ -14,7 +14,7 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.generation.port import Request
-from marey.models.hgm3.assembly import assemble, unpack
+from marey.models.hgm3.assembly import RECIPE, assemble, unpack
 from marey.models.hgm3.config import TINY, HGM3Config, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.generate import Generator
@@ -278,3 +278,7 @@ def test_configurations_survive_json() -> None:
     with pytest.raises(InvalidInput, match="unknown configuration"):
         named_config("large")
     assert named_config("tiny", mask="random").mining.mask == "random"
+
+
+def test_the_stages_share_the_minutes_of_a_training() -> None:
+    assert sum(RECIPE.shares.values()) == pytest.approx(1)

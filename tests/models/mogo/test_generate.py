@@ -13,7 +13,7 @@ from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
-from marey.models.mogo.assembly import assemble
+from marey.models.mogo.assembly import RECIPE, assemble
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY, InferenceConfig
 from marey.models.mogo.generate import Generator, SamplingSettings
@@ -159,3 +159,7 @@ def test_a_random_bundle_names_the_encoder_of_its_width(tmp_path: Path, width: i
     bundle = random_bundle(tmp_path / "random", config)
     assert (bundle.manifest.text.encoder, bundle.manifest.text.width) == (encoder, width)
     assert bundle.manifest.offsets == pytest.approx(HUMANML3D.offsets, abs=1e-6)
+
+
+def test_the_stages_share_the_minutes_of_a_training() -> None:
+    assert sum(RECIPE.shares.values()) == pytest.approx(1)

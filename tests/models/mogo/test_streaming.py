@@ -377,3 +377,16 @@ def test_levels_after_the_second_branch_is_dropped_are_those_of_the_first_alone(
     found, expected = both.next(below), alone.next(below)
     assert found.shape == expected.shape == (3, 1, TINY.transformer.width)
     torch.testing.assert_close(found, expected)
+
+
+def test_a_level_depends_on_the_code_of_the_level_below() -> None:
+    model = transformer()
+    assert model.depth is not None
+    states = torch.randn(1, 1, model.lanes, TINY.transformer.width)
+    below = torch.randn(2, TINY.transformer.width)
+    found: list[torch.Tensor] = []
+    for code in below:
+        frame = DepthFrame(model.depth, DepthStep(model.depth), states)
+        frame.next(None)
+        found.append(frame.next(code[None]))
+    assert not torch.allclose(*found)

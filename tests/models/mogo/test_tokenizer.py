@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from marey.models.mogo.config import TINY
-from marey.models.mogo.tokenizer import DecoderState, Tokenizer
+from marey.models.mogo.tokenizer import CausalBlock, DecoderState, Tokenizer
 
 LEVELS = TINY.tokenizer.levels
 
@@ -114,3 +114,12 @@ def test_the_quantizer_drops_levels_as_configured() -> None:
     config = replace(TINY, tokenizer=replace(TINY.tokenizer, level_dropout=0.37, decay=0.61))
     quantizer = Tokenizer(config).quantizer
     assert (quantizer.dropout, quantizer.decay) == (0.37, 0.61)
+
+
+def test_nothing_is_dropped_outside_of_training() -> None:
+    torch.manual_seed(0)
+    block = CausalBlock(4, 1, 0.5).eval()
+    x, past = torch.randn(1, 4, 6), torch.zeros(1, 4, 2)
+    assert torch.equal(block(x, past)[0], block(x, past)[0])
+    block.train()
+    assert not torch.equal(block(x, past)[0], block(x, past)[0])

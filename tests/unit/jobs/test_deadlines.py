@@ -10,7 +10,7 @@ import pytest
 
 from marey.core.settings import Settings
 from marey.db import deadlines
-from marey.db.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
+from marey.db.deadlines import HEARTBEAT, KINDS, MIGRATION, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline, in_all
 
 ROOT = Path(__file__).resolve().parents[3]
 BAR = 15.0
@@ -43,3 +43,11 @@ def test_several_heartbeats_fit_into_a_lease() -> None:
     config = Settings()
     assert HEARTBEAT.answer + HEARTBEAT.idle < config.lease_seconds
     assert config.heartbeat_seconds + HEARTBEAT.answer < config.lease_seconds
+
+
+def test_an_index_over_all_items_may_take_an_hour() -> None:
+    assert MIGRATION.statement == 3600
+
+
+def test_short_round_trips_have_no_more_time_in_all_and_long_ones_three_times_theirs() -> None:
+    assert [in_all(limit) for limit in (3.0, 4.0, 4.5, 10.0)] == [3.0, 4.0, 13.5, 30.0]

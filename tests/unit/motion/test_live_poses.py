@@ -185,3 +185,9 @@ def test_a_state_of_other_streams_is_refused():
 
 def test_joints_all_in_one_place_are_solved_without_nan():
     assert np.isfinite(solve(np.zeros((5, 22, 3))).rotations).all()
+
+
+def test_quaternions_of_a_first_frame_have_a_positive_real_part() -> None:
+    rotations, root = dancer(3)
+    first = solve(joints_of(rotations, root)).rotations[0]
+    assert (first[..., 0] >= 0).all()

@@ -114,3 +114,8 @@ def test_skeleton_of_knows_ours_and_makes_others():
 def test_a_tree_that_is_none_is_refused(names, parents):
     with pytest.raises(InvalidInput):
         Skeleton("x", names, parents, np.zeros((len(names), 3), np.float32), tuple(range(len(names))))
+
+
+def test_of_two_sides_in_a_name_the_first_is_swapped() -> None:
+    names = ("left_arm_left", "right_arm_left", "hips")
+    assert mirror_by_name(names) == (1, 0, 2)

@@ -149,3 +149,8 @@ def test_averaged_weights_are_swapped_in_and_out() -> None:
     torch.testing.assert_close(model.weight, before + 1.0)
     average.assign()
     torch.testing.assert_close(model.weight, before + 0.5)
+
+
+def test_norms_stand_behind_unless_asked_for_in_front() -> None:
+    assert [block.norm_first for block in Transformer(1, 8, 2, 16, 0.0).blocks] == [False]
+    assert [block.norm_first for block in Transformer(1, 8, 2, 16, 0.0, norm_first=True).blocks] == [True]
