@@ -459,6 +459,6 @@ def test_a_worker_that_was_not_seen_for_a_day_is_forgotten(engine: sa.Engine) ->
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE worker SET seen_at = seen_at - interval '25 hours' WHERE id LIKE 'a/%'"))
         conn.execute(sa.text("UPDATE worker SET seen_at = seen_at - interval '23 hours' WHERE id LIKE 'b/%'"))
+    sweep(engine)
     with transaction(engine) as conn:
-        sweep(conn)
         assert [row.id for row in list_workers(conn)] == [f"b/{QUEUE}"]
