@@ -21,6 +21,7 @@ from marey.jobs import (
     JobState,
     NewItem,
     NewText,
+    Policy,
     begin_assets,
     cancel,
     commit_motions,
@@ -41,6 +42,7 @@ from tests.servers.jobs import (
     claim_some,
     commit_all,
     let_expire,
+    make_due,
     motion_of,
     new_item,
     parse_texts,
@@ -421,3 +423,18 @@ def test_features_of_another_prompt_are_refused(engine: sa.Engine) -> None:
     text = NewText(claimed.items[0].id, claimed.items[0].text_key, b"blob")
     with pytest.raises(ValueError, match="are not those of item"), transaction(engine) as conn:
         commit_texts(conn, claimed.lease_token, [replace(text, key="another")])
+
+
+def test_the_delay_before_a_retry_doubles_up_to_five_minutes(engine: sa.Engine) -> None:
+    job = submit_items(engine, 1)
+    parse_texts(engine)
+    rules = Policy(max_attempts=9)
+    for _ in range(8):
+        claimed = claim_some(engine)
+        with transaction(engine) as conn:
+            fail_items(conn, claimed.lease_token, [ItemFailure(claimed.items[0].id, PROBLEM, True)], rules=rules)
+        make_due(engine)
+        sweep(engine)
+    with transaction(engine) as conn:
+        events = [event for event in events_after(conn, "default", job, 0) if event.kind == "item_retried"]
+    assert [event.data["delay"] for event in events] == [5, 10, 20, 40, 80, 160, 300, 300]
