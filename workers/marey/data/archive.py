@@ -1,4 +1,4 @@
-"""Read BVH files out of a `.tar.xz` archive or a folder. Nothing is ever extracted to a path the archive names."""
+"""Read BVH files from a `.tar.xz` archive or a folder. Paths in the archive are never used for extraction."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path, PurePosixPath
 
 from marey.core.errors import InvalidFile, NotFound, TooLarge
 
-MAX_FILE_BYTES = 64 * 2**20  # the longest take of the two archives has 11 MB
-MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB: a bomb stops here
+MAX_FILE_BYTES = 64 * 2**20  # the largest file of the two archives has 11 MB
+MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB; stops decompression bombs
 MAX_FILES = 100_000
 
 
 def bvh_files(path: Path) -> Iterator[tuple[str, bytes]]:
-    """The BVH files of an archive or a folder: stem of the name, and content.
+    """Yield the BVH files of an archive or folder: stem of the name, and content.
 
-    Links, devices and other file types are passed over; only the last part of a name is used.
+    Links, devices and other file types are skipped; only the last part of a path is used.
 
     Raises:
-        NotFound: no such path.
+        NotFound: the path does not exist.
         InvalidFile: not an archive, truncated, or two members with one name.
         TooLarge: more bytes or files than any known archive has.
     """

@@ -1,4 +1,4 @@
-"""Stage 2 of preparing data: joints packs to a prepared folder. The same packs give the same bytes on every machine."""
+"""Stage 2 of data preparation: convert joints packs to a prepared folder, with the same bytes on every machine."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ from marey.data.text_sequences import compose_texts, joined_texts
 from marey.motion.features import HUMANML3D_263
 
 Array = NDArray[np.floating]
-# Heading: smoothed over half a second, which keeps the sway of a gait (1 Hz) out of it and follows a turn; hips and
-# shoulders count alike; frame 0 has no jump; it is held where a body has none. Decoding is that of HumanML3D.
+# The heading is smoothed over half a second: this removes the sway of a gait (1 Hz) but follows turns. Hips and
+# shoulders have equal weight, frame 0 has no jump, and an undefined heading keeps its last value. Decoding is that of
+# HumanML3D.
 LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed", held=True)
 COMPOSITIONAL_SPLIT = "compositional"
 LARGEST_SPEED = 0.5
@@ -44,12 +45,12 @@ Progress = Callable[[int, int], None]
 
 
 def swap_sides(label: str) -> str:
-    """`walk-turn-left` to `walk-turn-right`, and back."""
+    """Exchange left and right in a label: `walk-turn-left` becomes `walk-turn-right`."""
     return label.replace("left", "\0").replace("right", "left").replace("\0", "right")
 
 
 def windows(frames: int) -> list[slice]:
-    """Pieces of at most MAX_FRAMES + 1 poses of a clip; a clip a little too long is cut at both ends."""
+    """Split a clip into pieces of at most MAX_FRAMES + 1 poses; trim both ends of a clip slightly over the limit."""
     limit = MAX_FRAMES + 1
     if frames <= limit:
         return [slice(0, frames)]
@@ -62,13 +63,13 @@ def windows(frames: int) -> list[slice]:
 
 
 def held_out_pairs(packs: Sequence[JointsPack]) -> frozenset[tuple[str, str]]:
-    """(content, style) pairs of the compositional split: nothing else may show them, mirrored clips included."""
+    """(content, style) pairs of the compositional split; no clip of another split may show them, mirrored or not."""
     return frozenset((c.content, c.style) for pack in packs for c in pack.clips if c.split == COMPOSITIONAL_SPLIT)
 
 
 def with_splits(packs: Sequence[JointsPack], left_out: dict[str, str]) -> list[JointsPack]:
-    """The packs with a split for every clip, by source where the index gives none. A source that stands in two sets,
-    such as a trial on two rigs, is taken from the first of them alone."""
+    """Assign a split to every clip, by source where the index gives none. If two sets contain the same source, such as
+    a trial on two rigs, only the clips of the first set are used."""
     set_of: dict[str, str] = {}
     free: list[Sourced] = []
     kept: list[list[PackClip]] = []
@@ -90,8 +91,8 @@ def with_splits(packs: Sequence[JointsPack], left_out: dict[str, str]) -> list[J
 
 
 def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str], speed: float = 0.0) -> Iterator[Part]:
-    """Windows of each captured clip and its mirror image, with their facts; rejected clips are counted in
-    `left_out`. With `speed`, training clips are followed by themselves slower and faster by that share."""
+    """Yield windows of each captured clip and its mirror image, with their facts; record rejected clips in `left_out`.
+    With `speed`, each training clip is followed by copies that are slower and faster by that share."""
     held_out = held_out_pairs(packs)
     idles = _idles(packs)
     for pack in packs:
@@ -142,8 +143,8 @@ Idles = Mapping[tuple[str, str], Sequence[NDArray[np.float32]]]
 
 
 def _idles(packs: Sequence[JointsPack]) -> Idles:
-    """Joints of what short clips are put between, idles and guards: by data set and split, and by licence tier and
-    split for the clips of a set whose own poses are too far from theirs."""
+    """Joints of idles and guards, which extend short clips: by data set and split, and by licence tier and split for
+    clips whose own data set has no pose that is close enough."""
     found: defaultdict[tuple[str, str], list[NDArray[np.float32]]] = defaultdict(list)
     for pack in packs:
         for clip in pack.clips:
@@ -156,8 +157,8 @@ def _idles(packs: Sequence[JointsPack]) -> Idles:
 def _lengthened(
     clip: PackClip, joints: NDArray[np.float32], tier: str, idles: Idles
 ) -> tuple[PackClip, NDArray[np.float32]]:
-    """The clip with travel where it is a gait on the spot, and no shorter than it can be made; see `lengthen`. Sets
-    with fixed splits are left as they are."""
+    """Add travel to a gait on the spot and lengthen a short clip where possible; see `lengthen`. Clips of sets with
+    fixed splits are not lengthened."""
     cyclic = clip.in_place and not _ONCE.search(clip.facts)
     if clip.in_place and (moved := travelling(joints)) is not None:
         joints = moved.astype(np.float32)
@@ -177,13 +178,13 @@ _ONCE = re.compile(r"\b(once|twice|one (shot|blow))\b")
 
 
 def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
-    """Return the clip with its captions and facts changed; those that cannot be changed are left out."""
+    """Return the clip with its captions and facts changed; drop those that cannot be changed."""
     changed = (tuple(new for text in said if (new := change(text))) for said in clip.captions)
     return replace(clip, facts=change(clip.facts) or "", captions=tuple(said for said in changed if said))
 
 
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
-    """Facts of a clip: captions of its index, or the caption grammar where that knows the action."""
+    """Facts of a clip: captions of its index, or the caption grammar if it has the action."""
     if clip.captions or content not in ACTIONS:
         seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
         authors = clip.captions or ((seen,),)
@@ -193,7 +194,7 @@ def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrore
     return describe(content, clip.style, joints, FPS)
 
 
-_LEAST_STD = 1e-4  # a group that never changes must not become infinite
+_LEAST_STD = 1e-4  # a constant group must not be divided by zero
 _LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a second
 
 
@@ -284,7 +285,7 @@ class FolderWriter:
         self.frames += len(features)
 
     def finish(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
-        """Statistics, manifest, hashes; then the folder appears under its name, complete."""
+        """Write statistics, manifest and hashes, then move the complete folder to its final path."""
         if not any(clip.split == "train" for clip in self.clips):
             raise InvalidInput("no training clip is left", where=str(self.out))
         rows = self.frames + len(self.clips)
@@ -387,18 +388,18 @@ def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progres
     """Write a prepared folder.
 
     Args:
-        packs: one a source.
-        out: a folder that is empty or not there; it appears only when it is complete.
-        speed: share by which training clips are made slower and faster, beside themselves; 0: not at all.
-        progress: called with clips done and clips in all.
+        packs: one per source.
+        out: a folder that is empty or does not exist; it is created only when complete.
+        speed: share by which slower and faster copies of training clips differ; 0: no copies.
+        progress: called with the number of finished clips and the total.
 
     Raises:
         Conflict: the folder is not empty.
-        InvalidInput: no training clip is left, the licences of the packs exclude each other, or a speed that is not
+        InvalidInput: no training clip is left, the licences of the packs exclude each other, or `speed` is outside
             0 … 0.5.
     """
     if not 0 <= speed <= LARGEST_SPEED:
-        raise InvalidInput(f"a speed of {speed:g}; it is a share of 0 to {LARGEST_SPEED:g}")
+        raise InvalidInput(f"speed is {speed:g}; it must be between 0 and {LARGEST_SPEED:g}")
     check_mix({pack.terms_of(clip) for pack in packs for clip in pack.clips})
     left_out = {name: why for pack in packs for name, why in pack.left_out.items()}
     packs = with_splits(packs, left_out)

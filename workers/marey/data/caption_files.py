@@ -1,6 +1,6 @@
-"""`captions-AUTHOR.csv` beside an index: what each author says about its clips.
+"""`captions-AUTHOR.csv` beside an index: captions of its clips by one author.
 
-The columns are `id`, of a clip of the index, and `captions`, several of them joined by ` | `.
+The columns are `id`, the id of a clip in the index, and `captions`, joined by ` | `.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class CaptionFile:
     """Captions by one author.
 
     Attributes:
-        name: of the file.
-        sha256: of its content.
-        captions: by id of the clip.
+        name: name of the file.
+        sha256: hash of its content.
+        captions: captions by id of the clip.
     """
 
     name: str
@@ -39,12 +39,12 @@ def read_caption_files(folder: Path, rows: Sequence[Row]) -> tuple[CaptionFile, 
     """Read all caption files of a folder, in the order of their names.
 
     Args:
-        folder: that of the index.
-        rows: of the index; rows that are not to be used may have captions too.
+        folder: folder of the index.
+        rows: rows of the index; unused rows may have captions too.
 
     Raises:
-        InvalidFile: not UTF-8, other columns, a line without captions, or an id that no row or an earlier line has,
-            with file and line.
+        InvalidFile: not UTF-8, wrong columns, a line without captions, or an unknown or repeated id, with file and
+            line.
     """
     ids = {row.id for row in rows}
     return tuple(_read(path, ids) for path in sorted(folder.glob(PATTERN)))
@@ -67,11 +67,11 @@ def _read(path: Path, ids: set[str]) -> CaptionFile:
         name, said = cells["id"].strip(), tuple(s for part in cells["captions"].split(SEPARATOR) if (s := part.strip()))
         if name not in ids:
             raise InvalidFile(
-                f"the index has no clip {name!r}", where=place, hint="Write its id as the index gives it."
+                f"the index has no clip {name!r}", where=place, hint="Use its id as written in the index."
             )
         if name in captions:
             raise InvalidFile(f"{name!r} has a line already", where=place)
         if not said:
-            raise InvalidFile(f"says nothing about {name!r}", where=place)
+            raise InvalidFile(f"has no captions for {name!r}", where=place)
         captions[name] = said
     return CaptionFile(path.name, hashlib.sha256(data).hexdigest(), captions)

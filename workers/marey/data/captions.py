@@ -1,5 +1,5 @@
-"""Captions from facts, by a seeded grammar (`grammar.toml`). Every statement is a label that the motion confirmed, or a
-number that was measured on it."""
+"""Captions from facts, by a seeded grammar (`grammar.toml`). Every statement is a label confirmed by the motion or a
+number measured on it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from marey.data.phrases import details, fields, fill, filled, phrase_of, with_ad
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
 HUMAN_SHARE = 0.5
-SEPARATE_SHARE = 0.4  # of the captions of several actions
+SEPARATE_SHARE = 0.4  # share of the captions of several actions
 SEPARATE_WORDS = 18
 NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35
 
 
 def seeded(*parts: object) -> random.Random:
-    """A generator that depends on the parts alone, on every machine."""
+    """Random generator that depends only on the parts, with equal results on every machine."""
     return random.Random(hashlib.sha256("\0".join(map(str, parts)).encode()).digest())  # noqa: S311
 
 
@@ -36,7 +36,7 @@ class _Voice:
     pronoun: str
 
     def clause(self, phrase: str) -> str:
-        """Subject and conjugated phrase."""
+        """Join the subject and the conjugated phrase."""
         verb = conjugate(phrase, "gerund" if self.form == "progressive" else self.form)
         if self.form == "progressive":
             verb = "is " + verb
@@ -44,13 +44,13 @@ class _Voice:
 
     @property
     def again(self) -> str:
-        """The subject, mentioned once more, in front of a verb."""
+        """The subject as a pronoun, for its second mention before a verb."""
         who = mentioned_again(self.pronoun)
         return f"{who} is" if self.form == "progressive" else who
 
 
 def _voice(rng: random.Random, *, plain: bool, adjective: str = "", who: Sequence[str] = ()) -> _Voice:
-    """`plain` leaves out captions without a subject ("walking forward"); `who` are more subjects that fit."""
+    """Draw a voice. `plain` excludes captions without a subject ("walking forward"); `who` are further subjects."""
     draw = rng.random()
     if not plain and draw < 0.3 and not adjective:
         return _Voice("", "base" if draw < 0.15 else "gerund", rng.choice(["the", "their"]))
@@ -65,7 +65,7 @@ def _voice_of(subject: str, rng: random.Random) -> _Voice:
 
 
 def short_caption(facts: Facts, rng: random.Random) -> str:
-    """Return a few words: the action, and its style as an adverb or an adjective, or without it."""
+    """Return a few words: the action, with or without its style as an adverb or adjective."""
     style = grammar().styles[facts.style]
     words = grammar().actions[facts.action]
     if verbless := _verbless(facts, rng):
@@ -84,7 +84,7 @@ def short_caption(facts: Facts, rng: random.Random) -> str:
 
 
 def _verbless(facts: Facts, rng: random.Random) -> str | None:
-    """Sometimes a caption without a person: a noun phrase, or the limb as its subject."""
+    """Draw a caption without a person (a noun phrase, or a limb as its subject), or None."""
     words = grammar().actions[facts.action]
     draw = rng.random()
     phrases = words.nouns if draw < NOUN_SHARE else words.whole if draw < NOUN_SHARE + WHOLE_SHARE else ()
@@ -95,7 +95,7 @@ def _verbless(facts: Facts, rng: random.Random) -> str | None:
 
 
 def long_caption(facts: Facts, rng: random.Random) -> str:
-    """30 to 60 words: what is done, how, for how long, how far and with what."""
+    """Return a caption of 30 to 60 words: action, style, duration, distance and limbs."""
     g = grammar()
     style = g.styles[facts.style]
     voice = _voice(rng, plain=True)
@@ -123,7 +123,7 @@ _AGAIN = ("In other words,", "Seen from outside,", "That is to say,", "To put it
 
 
 def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """Two or three actions in their order, with verbs of each."""
+    """Join two or three actions in order, each with its verb."""
     g = grammar()
     same = len({facts.style for facts in parts}) == 1
     style = g.styles[parts[0].style]
@@ -136,7 +136,7 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
 
 
 def separate_caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """Caption each action separately, with all the variety of single-action captions."""
+    """Caption each action separately, as varied as captions of single actions."""
     first, *others = (_act_alone(facts, rng) for facts in parts)
     join = rng.choice(_THEN)
     return _loosen("".join([first, *(join + text for text in others)]), rng)
@@ -153,7 +153,7 @@ def _act_alone(facts: Facts, rng: random.Random) -> str:
 
 
 def lower_first(text: str) -> str:
-    """A sentence as it stands within another."""
+    """Lower the first letter of a sentence, to embed it in another."""
     return text if text.startswith("I ") else text[:1].lower() + text[1:]
 
 
@@ -161,7 +161,7 @@ _THEN = (", then ", ", and then ", " and then ", ". Then ", ". After that, ", ",
 
 
 def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """The words that two actions have together ("slows to a walk"); None where they have none."""
+    """Fill a phrase for this pair of actions ("slows to a walk"); None if the grammar has none."""
     joins, (first, second) = grammar().joins, parts
     phrases = joins.pairs.get(f"{first.action}-{second.action}", ())
     if first.action == second.action:
@@ -174,7 +174,7 @@ def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
 
 
 def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: bool) -> str:
-    """A frame with the phrase of each action in its place."""
+    """Fill a frame with the phrase of each action."""
     g = grammar()
     frames = g.joins.two if len(parts) == 2 else g.joins.three
     if len(parts) == 2 and parts[0].action in LOCOMOTION and parts[1].action not in LOCOMOTION:
@@ -190,8 +190,8 @@ def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: 
 
 
 def _spoken(text: str, voice: _Voice) -> str:
-    """Put the subject where it belongs, and verbs into its form."""
-    if text.startswith(("after ", "having ", "once ", "when ")):  # the subject stands behind the first action
+    """Insert the subject and conjugate the verbs."""
+    if text.startswith(("after ", "having ", "once ", "when ")):  # the subject follows the first action
         return conjugate(text, "gerund" if voice.form == "progressive" else voice.form)
     for opening in ("first ", "initially "):
         if text.startswith(opening) and voice.subject:
@@ -200,28 +200,28 @@ def _spoken(text: str, voice: _Voice) -> str:
 
 
 def _loosen(text: str, rng: random.Random) -> str:
-    """A proper sentence in most cases; otherwise as people type: no capital, no full stop."""
+    """Format a caption as a sentence (60 %), or as people type: no capital, no full stop."""
     proper = sentence(text)
     return proper if rng.random() < 0.6 else proper[:-1][:1].lower() + proper[:-1][1:]
 
 
-LONG_SHARE = 0.5  # of the captured clips; a long caption is nearly always a new string, and each costs text features
+LONG_SHARE = 0.5  # share of the captured clips; nearly every long caption is unique and needs its own text features
 
 
 PHRASINGS = {"walk_back": 12, "bow": 8, "walk": 6, "run": 4, "turn": 4}
-"""Captions of a clip of one action that is drawn often and has few clips. With two each, those of 159 clips backward
-were drawn 50 times in an hour of training: prompt adherence was 98 % on known captions, 67 % on another author's."""
+"""Captions per clip of actions that are drawn often but have few clips. With two captions each, 159 clips of walking
+backward were drawn 50 times in an hour: prompt adherence was 98 % on known captions, 67 % on another author's."""
 
 
 def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
-    """Number of captions of a clip: enough that none is drawn over and over."""
+    """Number of captions of a clip: enough that none is drawn too often."""
     if len(parts) > 1:
         return 4
     return PHRASINGS.get(parts[0].action, 2 if spliced else 3)
 
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """One caption, by the grammar or from other people's captions."""
+    """Draw one caption, by the grammar or from human captions."""
     if len(parts) > 1 and rng.random() < SEPARATE_SHARE:
         return separate_caption(parts, rng)
     if rng.random() < HUMAN_SHARE:
@@ -232,12 +232,12 @@ def caption(parts: Sequence[Facts], rng: random.Random) -> str:
 
 
 def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ...]:
-    """Different captions of a clip, all true of it: short ones, and for half the clips of one action a long one.
+    """Generate different true captions of a clip: short ones, and a long one for half the clips of one action.
 
     Args:
         parts: the actions of the clip in order.
-        seed: the clip's id: the same clip has the same captions everywhere.
-        count: how many.
+        seed: the clip's id, so that a clip has the same captions on every machine.
+        count: number of captions.
     """
     rng = seeded("captions", seed)
     out: dict[str, None] = {}

@@ -1,8 +1,8 @@
 """Compose clips: sequences of two and three actions, and longer and shorter versions of single ones.
 
-Captured takes are 1 to 6 s of one action. Here walks go on, waves last longer or shorter, bows come twice, and actions
-follow each other, so that every action is seen at many lengths up to 9.8 s and graphs with two and three verbs occur in
-training. Everything is drawn by seeds from clips of one split; facts are measured again on what came out.
+Captured takes show 1 to 6 s of one action. Composition extends walks, changes the length of waves, repeats bows and
+joins actions, so that training has every action at many lengths up to 9.8 s and graphs with two and three verbs. All
+draws are seeded and use clips of one split; facts are measured again on the result.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from marey.data.splice import join_clips
 Array = NDArray[np.floating]
 
 COMPOSED = "bandai-namco"
-"""The set whose clips are composed here: its captions come from the grammar."""
+"""Data set whose clips are composed here; its captions come from the grammar."""
 
-# How often an action is drawn for a sequence. Travel and greetings are what prompts ask for; the actions of one or two
-# clips stay rare, or the model would memorise those clips.
+# Weights of actions in sequences. Prompts mostly ask for travel and greetings; actions with only one or two clips stay
+# rare, since the model would memorise those clips.
 SEQUENCE_WEIGHTS: dict[str, float] = {
     "walk": 3.0,
     "run": 2.0,
@@ -50,19 +50,19 @@ SEQUENCE_WEIGHTS: dict[str, float] = {
     "dance": 0.2,
 }
 SIDED = ("wave", "raise", "turn")
-OTHER_SIDE_SHARE = 0.15  # how often one of these is followed by itself with another side
-# Ways that prompts ask for more often than drawing by weight gives them.
+OTHER_SIDE_SHARE = 0.15  # share of these that are followed by the same action on another side
+# Changes of direction, which prompts ask for more often than the weights give them.
 REVERSALS = {"walk": "walk_back", "walk_back": "walk", "run": "walk"}
 REVERSAL_SHARE = 0.2
-# Gestures at lengths at which they were not captured (raises take 1 to 5 s, waves 5 to 8): without them a
-# model takes the length for the action, and a raise of 6 s becomes a wave. Frames.
+# Lengths, in frames, at which gestures were not captured (raises take 1 to 5 s, waves 5 to 8). Without them a model
+# infers the action from the length, and a raise of 6 s becomes a wave.
 SLOW_RAISES = range(100, LIMIT + 1)
 QUICK_WAVES = range(36, 91)
 LONG_TURNS = range(140, LIMIT + 1)
-"""Captured turns take 3 to 7 s. Of a model that saw few others a walk of 8 s never turned, or twice."""
+"""Captured turns take 3 to 7 s. A model trained with few longer ones turned twice or not at all in 8 s."""
 _STRAIGHT = ("walk", "run", "walk_back")
-TRIES = 8  # for each clip that is wanted
-_CANDIDATES = 8  # clips among which the best seam is taken
+TRIES = 8  # attempts for each requested clip
+_CANDIDATES = 8  # number of clips to search for the best seam
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,10 @@ class Composed:
     """A composed clip.
 
     Attributes:
-        parts: the clips it was made of, in order.
+        parts: its source clips, in order.
         joints: (T, 22, 3).
-        facts: one an action.
-        seams: first frame of each action but the first.
+        facts: one per action.
+        seams: first frame of each action except the first.
     """
 
     name: str
@@ -118,7 +118,7 @@ class Composer:
         self.actions = sorted(self.by_action)
 
     def sequence(self, name: str, count: int) -> Composed | None:
-        """Two or three different actions, or None when what was drawn does not fit."""
+        """Join two or three different actions; None if the drawn clips do not fit together."""
         rng = seeded("sequence", name)
         actions = self._draw_actions(rng, count)
         same_style = rng.random() < 0.75
@@ -181,7 +181,7 @@ class Composer:
     # -- one action, another length ------------------------------------------------------------------------------------
 
     def gesture(self, name: str, action: str, lengths: range) -> Composed | None:
-        """A gesture of one of these lengths, done once."""
+        """A single gesture of one of these lengths."""
         if action not in self.by_action:
             return None
         rng = seeded("retimed", name)
@@ -189,7 +189,7 @@ class Composer:
         return self._measured_again(name, part, stretch(part, rng.choice(lengths), rng, repeat_share=0))
 
     def retimed(self, name: str) -> Composed | None:
-        """One action, longer or shorter than it was captured."""
+        """One action, longer or shorter than captured."""
         rng = seeded("retimed", name)
         weights = [
             len(self.by_action[a]) ** 0.25 * (0.4 if a in ("dash", "walk_diagonal") else 1.0) for a in self.actions
@@ -235,8 +235,8 @@ class Composer:
 
 
 def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
-    """Return True if the action is still recognisable: a hand held by loops must not seem to wave, a loop must not bend
-    the path."""
+    """Return True if the action is still recognisable: looping must not make a held hand wave or a straight path
+    curve."""
     action = "run" if facts.action == "dash" else facts.action
     if repeats > 1 or action not in get_args(Act):
         return True
@@ -246,7 +246,7 @@ def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
 
 
 def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple[int, range]:
-    """Start frame of the first clip, and the frames after which it may be left."""
+    """Start frame of the first clip, and the frames after which it may end."""
     if part.facts.action in CYCLIC:
         room = len(part.joints) - 1
         start = rng.randint(0, max(room - 60, 0))
@@ -262,7 +262,7 @@ def _enter_range(part: Part) -> range:
 
 
 def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> range:
-    """Frames after which the clip may be left when it was entered at `start` and `budget` frames are free."""
+    """Frames after which a clip may end if it begins at `start` and `budget` frames are available."""
     end = min(len(part.joints), start + budget)
     if part.facts.action in CYCLIC:
         return range(min(start + 28, end), end)
@@ -271,7 +271,7 @@ def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> ran
 
 
 def with_brief_waves(parts: Sequence[Part]) -> list[Part]:
-    """The same clips with waves cut short: two actions fit into 9.8 s where a captured wave takes 5 to 8 of them."""
+    """Shorten the waves among the clips: a captured wave of 5 to 8 s leaves no time for a second action in 9.8 s."""
     out: list[Part] = []
     for part in parts:
         if part.facts.action != "wave":
@@ -295,7 +295,7 @@ def _measured(part: Part, joints: Array) -> Facts | None:
 
 
 def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> Composed | None:
-    """Measure each action again in its stretch of the result."""
+    """Measure each action again in its section of the result."""
     if len(joints) > LIMIT:
         return None
     facts = []
@@ -308,7 +308,7 @@ def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> C
 
 
 def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
-    """Compose all clips of a split, from parts of that split alone."""
+    """Compose all clips of a split from parts of that split only."""
     counts = COUNTS.get(split)
     if counts is None or not parts:
         return
@@ -330,6 +330,6 @@ def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
 
 
 def attempts(name: str, wanted: int, make: Callable[[str], Composed | None]) -> Iterator[Composed]:
-    """Compose so many clips, each under a name of its own, in at most `TRIES` attempts for each."""
+    """Compose `wanted` clips with unique names, in at most `TRIES` attempts each."""
     made = (make(f"{name}-{attempt:05}") for attempt in range(TRIES * wanted))
     return islice((composed for composed in made if composed is not None), wanted)

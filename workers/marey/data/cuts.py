@@ -14,14 +14,14 @@ from marey.data.splice import seam_costs, seam_features
 
 Array = NDArray[np.floating]
 WORST_SEAM = 0.6
-"""Mean squared metres, see `seam_costs`; a bow into a run has 0.4 and looks well."""
+"""Largest cost of a seam, see `seam_costs`; a bow into a run has 0.4 and looks good."""
 _ARMS = {"left": (0,), "right": (1,), "both": (0, 1)}
 
 
 def core(part: Part) -> tuple[int, int]:
-    """First and last frame between which the action is done; a clip may be cut before and after, not within.
+    """First and last frame of the action itself; a clip may be cut before and after, not between them.
 
-    Travel has none: it may be cut anywhere (0, 0).
+    Travel has no core and may be cut anywhere: (0, 0).
     """
     joints = part.joints.astype(np.float64)
     last = len(joints) - 1
@@ -46,7 +46,7 @@ def core(part: Part) -> tuple[int, int]:
 
 
 def arm_level(joints: Array, side: str) -> Array:
-    """(T,) how far the raising hand is up: 0 at its lowest in the clip, 1 at its highest."""
+    """Relative height (T,) of the raised hand: 0 at its lowest in the clip, 1 at its highest."""
     wrists = [20 + k for k in _ARMS[side]]
     over = np.einsum("tki,ti->tk", joints[:, wrists] - joints[:, :1], trunk_up(joints)).mean(axis=1)
     over = smooth(over, 0.05, FPS)
@@ -54,7 +54,7 @@ def arm_level(joints: Array, side: str) -> Array:
 
 
 def hold(part: Part, a: int, b: int) -> tuple[int, int] | None:
-    """The frames within the core in which the pose is held or the wave goes on; None when there are too few."""
+    """First and last frame within the core that hold the pose or continue the wave; None if too few."""
     joints = part.joints.astype(np.float64)
     if part.facts.side in _ARMS:
         held = arm_level(joints, part.facts.side) > 0.7
@@ -73,7 +73,7 @@ def _seams(part: Part) -> NDArray[np.float32]:
 
 
 def best_cut(first: Part, leave: range, second: Part, enter: range) -> tuple[int, int, float]:
-    """Last frame kept of one clip, first frame of the other, and the cost of that seam."""
+    """Find the best seam: last frame of one clip, first frame of the other, and the cost."""
     costs = seam_costs(
         _seams(first)[leave.start : leave.stop].astype(np.float64),
         _seams(second)[enter.start : enter.stop].astype(np.float64),

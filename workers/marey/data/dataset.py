@@ -1,7 +1,7 @@
-"""`dataset.toml`: the description of a set of captures. No set has code of its own.
+"""`dataset.toml`: the description of a set of captures. No set needs its own code.
 
-It names the set with its terms, maps the columns of its `index.csv`, and describes its rigs. Those of the known sets
-are in `sets/`; a studio writes its own.
+It names the set and its terms, maps the columns of its `index.csv`, and describes its rigs. Descriptions of the known
+sets are in `sets/`; a studio writes its own.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ class Dataset(BaseModel):
     """A set of captures.
 
     Attributes:
-        name: short name; a clip's id is unique within it.
+        name: short name; ids of clips are unique within the set.
         title, url: for the manifest and the model card.
-        licence, credit, tier: its terms; a row of the index may have its own.
-        unit, up: of the files' lengths, and the axis that points up.
-        floor: where a clip's floor is: `support`: level, and under whatever part of the body supports it; `feet`: under
-            the feet; `file`: at height 0 of the file.
+        licence, credit, tier: terms of the set; a row of the index may have its own.
+        unit, up: unit of lengths in the files, and the axis that points up.
+        floor: position of the floor: `support`: level, and under the parts of the body that carry it; `feet`: under the
+            feet; `file`: at height 0 of the file.
         largest_error_cm: clips with a larger `error_cm` are left out.
         index_fps: frames a second at which the index counts `start` and `end`; 1 counts seconds.
-        columns: how each of our columns is made of those of the index: a template such as `{actor} {class}`.
-        rigs: one a kind of skeleton; the first that fits a file is taken.
+        columns: template of each Marey column from columns of the index, such as `{actor} {class}`.
+        rigs: one per kind of skeleton; the first that fits a file is used.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -58,14 +58,14 @@ class Dataset(BaseModel):
 
     @property
     def terms(self) -> Terms:
-        """Terms of its clips, but for rows with their own."""
+        """Terms of the clips, except for rows with their own."""
         return Terms(self.name, self.title, self.licence, self.credit, self.url, self.tier)
 
     def rig_of(self, names: tuple[str, ...], where: str) -> Rig:
-        """The rig of a skeleton with joints of these names.
+        """Find the rig of a skeleton by its joint names.
 
         Raises:
-            InvalidFile: none fits; the message names the joint that the first one misses.
+            InvalidFile: no rig fits; the message names the first missing joint of the first rig.
         """
         have = frozenset(names)
         for rig in self.rigs:
@@ -84,7 +84,7 @@ def read_dataset(path: Path) -> Dataset:
 
     Raises:
         NotFound: no such file.
-        InvalidFile: not TOML, or not a description of a set, with the field.
+        InvalidFile: not TOML, or an invalid field, which the message names.
     """
     where = str(path)
     try:
@@ -100,7 +100,7 @@ def read_dataset(path: Path) -> Dataset:
 
 
 def known_sets() -> tuple[str, ...]:
-    """Names of the sets that are described here."""
+    """Names of the sets described in this package."""
     return tuple(sorted(path.parent.name for path in SETS.glob(f"*/{DATASET}")))
 
 

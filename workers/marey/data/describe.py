@@ -1,4 +1,4 @@
-"""Facts of a clip: labels and measurements on its joints. Captions are made of these alone."""
+"""Facts of a clip: labels and measurements on its joints. Captions use nothing else."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ACTIONS: dict[str, str] = {
 STRIKES = {"kick": kicks, "punch": punches, "slash": slashes, "dance": is_lively}
 LOCOMOTION = ("walk", "run", "dash", "walk_back", "walk_diagonal", "turn")
 CYCLIC = ("walk", "run", "dash", "walk_back", "walk_diagonal")
-# one style, two names in the two data sets
+# styles with different names in the two data sets
 STYLE_NAMES = {"masculinity": "masculine", "tired": "exhausted", "old": "elderly"}
 
 
@@ -55,11 +55,11 @@ class Facts:
 
     Attributes:
         action: key of the caption grammar.
-        style: key of the caption grammar; `normal` where there is none.
+        style: key of the caption grammar; `normal` for no style.
         side: left, right, both, or empty.
-        gait, hands, lean: what was measured; lean is the deepest forward lean over the standing one, degrees.
-        repeats: how often the action is done (a spliced loop of raises, for instance).
-        text: captions of the source's own, of each author, where it has any.
+        gait, hands, lean: measurements; lean is the deepest forward lean relative to standing, degrees.
+        repeats: number of repetitions of the action, as in a spliced loop of raises.
+        text: captions of the source by author, if any.
     """
 
     action: str
@@ -73,7 +73,7 @@ class Facts:
 
 
 def measure(joints: NDArray[np.floating], fps: float) -> tuple[GaitMeasures, tuple[Hand, Hand], float]:
-    """Gait, both hands and the deepest lean of a motion (T, 22, 3)."""
+    """Measure gait, both hands and the deepest lean (degrees) of a motion (T, 22, 3)."""
     bend = lean(np.asarray(joints, np.float64), fps)
     return gait(joints, fps), (hand(joints, fps, LEFT), hand(joints, fps, RIGHT)), float(bend.max() - np.median(bend))
 
@@ -82,13 +82,13 @@ def describe(content: str, style: str, joints: NDArray[np.floating], fps: float)
     """Facts of a captured clip of the Bandai-Namco sets.
 
     Args:
-        content: label of the original, such as `2/wave-left-hand`; which side it names is not believed.
+        content: label of the original, such as `2/wave-left-hand`; its side is not trusted.
         style: label of the archive.
         joints: (T, 22, 3), mirrored or not.
 
     Returns:
-        None when label and motion contradict each other, so that no true caption can be made: a turn of the wrong size,
-        a wave without a hand that moves.
+        None if label and motion contradict each other, so that no true caption is possible: a turn by the wrong angle,
+        or a wave without a moving hand.
     """
     action = ACTIONS[content]
     walked, hands, bend = measure(joints, fps)
@@ -117,8 +117,8 @@ def _signed(value: float) -> str:
 def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
     """The raised hand: left, right, both, or empty.
 
-    A hand counts when it gets near the shoulder line, and either rises there by 15 cm and 0.45 of the other hand's
-    rise, or is up for most of the clip (takes that begin with the hands up).
+    A hand counts if it gets near the shoulder line and either rises by 15 cm and 0.45 of the other hand's rise, or is
+    up for most of the clip (some takes begin with raised hands).
     """
     rise = [h.rise for h in hands]
     up = [
@@ -128,10 +128,10 @@ def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
 
 
 FREE_TEXT = "cmu"
-"""Action of a clip whose captions are its own, and not of the caption grammar."""
+"""Action of a clip that has its own captions instead of those of the grammar."""
 
 
 def describe_text(captions: tuple[tuple[str, ...], ...], joints: NDArray[np.floating], fps: float) -> Facts:
-    """Return the facts of a clip whose authors captioned it."""
+    """Return the facts of a clip with human captions."""
     walked, hands, bend = measure(joints, fps)
     return Facts(FREE_TEXT, "normal", "", walked, hands, bend, text=captions)

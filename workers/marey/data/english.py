@@ -1,4 +1,4 @@
-"""The little English that captions need: verb forms, articles, numbers in words."""
+"""English for captions: verb forms, articles, numbers in words."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b
 
 
 def third(verb: str) -> str:
-    """`walk` to `walks`, `push` to `pushes`, `carry` to `carries`."""
+    """Form the third person: `walk` to `walks`, `push` to `pushes`, `carry` to `carries`."""
     if verb in _IRREGULAR:
         return _IRREGULAR[verb]
     if re.search(r"(s|sh|ch|x|z|o)$", verb):
@@ -53,7 +53,7 @@ def third(verb: str) -> str:
 
 
 def gerund(verb: str) -> str:
-    """`walk` to `walking`, `run` to `running`, `wave` to `waving`."""
+    """Form the gerund: `walk` to `walking`, `run` to `running`, `wave` to `waving`."""
     if verb in _DOUBLE:
         return verb + verb[-1] + "ing"
     if verb.endswith("e") and not verb.endswith(("ee", "oe", "ye", "be")):
@@ -68,13 +68,13 @@ def conjugate(phrase: str, form: str) -> str:
 
 
 def number(value: float, *, words: bool) -> str:
-    """A whole number, in words up to twelve when asked for."""
+    """Format a whole number, with `words` in words up to twelve."""
     whole = round(value)
     return _WORDS[whole] if words and 0 <= whole < len(_WORDS) else str(whole)
 
 
 def possessive(subject: str) -> str:
-    """`his`, `her` or `their`."""
+    """Possessive of a subject: `his`, `her` or `their`."""
     return "his" if _HIS.search(subject) else "her" if _HER.search(subject) else "their"
 
 
@@ -84,7 +84,7 @@ def mentioned_again(owner: str) -> str:
 
 
 def with_adjective(subject: str, adjective: str) -> str:
-    """`a person`, `old` to `an old person`; pronouns and indefinite subjects take none."""
+    """Insert an adjective: `a person`, `old` to `an old person`; not for pronouns and indefinite subjects."""
     match = re.fullmatch(r"(a|an|the) (.+)", subject)
     if not match or not adjective:
         return subject
@@ -93,7 +93,7 @@ def with_adjective(subject: str, adjective: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Capital letter, single spaces, one full stop."""
+    """Format a sentence: capital letter, single spaces, one full stop."""
     text = re.sub(r"\s+", " ", text).strip().rstrip(".")
     text = re.sub(r"\s+,", ",", text)
     return text[:1].upper() + text[1:] + "."

@@ -1,4 +1,4 @@
-"""The floor of a clip: under whatever supports the body."""
+"""The floor of a clip, below the parts that support the body."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from marey.motion.support import RADII
 Array = NDArray[np.floating]
 _FEET = [7, 8, 10, 11]
 PERCENTILE = 2
-"""Of the frames, in which the body may pass under the floor."""
+"""Percentage of frames in which the body may be below the floor."""
 LEAST_SUPPORTS, LEAST_EXTENT = 10, 1.5
-"""Frames in which a foot stands, and metres that they cover in a direction, from which a floor's slope is fitted."""
+"""Least number of frames with a standing foot, and their extent in metres, for fitting a floor's slope."""
 LEAST_RISE, LARGEST_SLOPE = 0.02, 0.03
-"""Metres that the floor of a capture rises over that extent for its tilt to be clear; and how steep it may be: more is
-a slope that was walked on."""
-_EXPLAINED = 0.7  # of the spread of the supports' heights, that is left on a tilted floor, at most
-_STANDS = 0.15  # m/s of a joint that carries the body
+"""Least rise of a floor over that extent for a correction, metres, and largest slope: a steeper one was a real
+slope."""
+_EXPLAINED = 0.7  # largest remaining share of the spread of support heights after fitting a tilted floor
+_STANDS = 0.15  # m/s, largest speed of a joint that carries the body
 _ROUNDS, _OUTLIER = 8, 0.02
-_NEAR = (-0.3, 0.08)  # metres: bodies lie on flesh that radii do not know; higher is in the air
+_NEAR = (-0.3, 0.08)  # metres: `RADII` ignore flesh under lying bodies; higher bodies are in the air
 
 
 def levelled(joints: Array, fps: float = 20.0) -> Array:
-    """The clip (T, 22, 3), its floor made level where the supports show clearly that the capture's tilts.
+    """Level the floor of a clip (T, 22, 3) if its supports clearly show a tilt.
 
-    The heights of standing supports are fitted as a plane, those far off it weighed down; the clip is sheared, which
-    keeps what is upright upright.
+    A plane is fitted robustly to the heights of standing supports. The clip is sheared, which keeps vertical directions
+    vertical.
     """
     places = _supports(joints, fps)
     if len(places) < LEAST_SUPPORTS:
@@ -43,7 +43,7 @@ def levelled(joints: Array, fps: float = 20.0) -> Array:
 
 
 def _supports(joints: Array, fps: float) -> Array:
-    """Where standing feet touch the floor (N, 3): the lowest of their joints in each frame, while it does not move."""
+    """Contact points (N, 3) of standing feet: the lowest foot joint of each frame while it does not move."""
     height = joints[:, _FEET, 1] - RADII[_FEET]
     lowest = np.array(_FEET)[height.argmin(axis=1)]
     frames = np.arange(len(joints) - 1)
@@ -54,8 +54,8 @@ def _supports(joints: Array, fps: float) -> Array:
 
 
 def _plane(places: Array) -> tuple[Array, float, float]:
-    """Slope (2,) of the plane through most of the places, and how far they are off the level, and off the plane
-    (medians, metres). Along directions in which they cover less than `LEAST_EXTENT` it has no slope."""
+    """Fit a plane robustly: slope (2,), and median distances of the places from their level and from the plane, metres.
+    The slope is zero in directions with an extent below `LEAST_EXTENT`."""
     across = places[:, [0, 2]] - places[:, [0, 2]].mean(axis=0)
     _, _, axes = np.linalg.svd(across, full_matrices=False)
     axes = axes[np.ptp(across @ axes.T, axis=0) >= LEAST_EXTENT]
@@ -70,12 +70,12 @@ def _plane(places: Array) -> tuple[Array, float, float]:
 
 
 def on_floor(joints: Array, rule: Literal["support", "feet", "file"]) -> Array:
-    """The clip (T, 22, 3) with its floor at height 0.
+    """Move a clip (T, 22, 3) so that its floor is at height 0.
 
-    `support`: level (`levelled`), and no part of the body but for the lowest 2 % of the frames is lower than its radius
-    over the floor, so that people lie, crawl and stand on their hands upon it; `feet`: the same for the joints of the
-    feet alone; `file`: under the lowest part of the body where that is near height 0 of the file; else the floor is
-    there, as under a leap that never lands.
+    `support`: level (`levelled`), and joints are at least their radius above the floor except in the lowest 2 % of the
+    frames, so that people lie, crawl and stand on their hands on it; `feet`: for the joints of the feet only, without
+    radii and levelling; `file`: below the lowest part of the body if that is near height 0 of the file, otherwise at
+    height 0, as for a leap without a landing.
     """
     out = np.array(joints, np.float64)
     if rule == "support":

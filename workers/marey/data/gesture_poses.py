@@ -1,8 +1,8 @@
-"""Gestures put onto a body that stands: arms moved along smooth ways, the trunk bent, the feet left where they are.
+"""Pose editing of a standing body: move arms along smooth paths and bend the trunk while the feet stay in place.
 
-Captures for commercial use hold two waves, two raised arms and a bow. `marey.data.gestures` draws more of them on
-captured idles with what is here. Directions are in the frame of the body: outward (away from the body on the arm's own
-side), up, forward.
+Captures for commercial use have two waves, two raised arms and a bow; `marey.data.gestures` makes more of them from
+captured idles with these functions. Directions are in the frame of the body: outward (away from the body on the arm's
+own side), up, forward.
 """
 
 from __future__ import annotations
@@ -30,35 +30,35 @@ _CARRIED = [j for j in range(22) if j not in _LEGS[2:]]
 """Joints that move with the hips."""
 _SPINE = (3, 6, 9)
 _NECK = 12
-_COLLAR_LIFT = np.radians(22.0)  # of a shoulder whose arm points straight up
+_COLLAR_LIFT = np.radians(22.0)  # lift of the shoulder if the arm points straight up
 _LIFT_FROM, _LIFT_TO = np.radians(-20.0), np.radians(80.0)
-_VIA = {"upper": (35.0, -25.0), "fore": (20.0, 25.0)}  # an arm goes up past the front of the body, the elbow bent
-_BACK = 0.12  # metres by which hips go back as the trunk comes level
-_DOWN = 0.03  # metres by which they go down meanwhile
-_PELVIS_SHARE = 0.45  # of a bow, by the hips; the spine has the rest
-_SWING_FROM = 0.7  # of the way up, from which a hand swings
+_VIA = {"upper": (35.0, -25.0), "fore": (20.0, 25.0)}  # an arm rises in front of the body with a bent elbow
+_BACK = 0.12  # metres that the hips move back in a bow to the level
+_DOWN = 0.03  # metres that they move down in it
+_PELVIS_SHARE = 0.45  # share of a bow by the hips; the spine bends by the rest
+_SWING_FROM = 0.7  # share of the rise after which a hand swings
 
 
 def eased(x: Array) -> Array:
-    """0 to 1 with neither speed nor acceleration at both ends."""
+    """Ease 0 … 1, with zero speed and acceleration at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10 - 15 * x + 6 * x * x)
 
 
 def envelope(frames: int, start: float, rise: float, hold: float, fall: float) -> Array:
-    """(frames,) 0 before `start`, 1 while held, 0 after; all in seconds."""
+    """Envelope (frames,): 0 before `start`, 1 while held, 0 after; times in seconds."""
     t = np.arange(frames) / FPS - start
     return eased(t / rise) * (1 - eased((t - rise - hold) / fall))
 
 
 def direction(azimuth: float, elevation: float) -> Array:
-    """(3,) outward, up, forward; azimuth in degrees from forward to outward, elevation in degrees over the level."""
+    """Unit vector (outward, up, forward); azimuth from forward to outward and elevation above level, degrees."""
     a, e = np.radians(azimuth), np.radians(elevation)
     return np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
 
 
 class StandingBody:
-    """A standing motion (T, 22, 3) at 20 fps whose poses are changed; metres, Y up."""
+    """A standing motion (T, 22, 3) at 20 fps for pose editing; metres, Y up."""
 
     def __init__(self, joints: Array) -> None:
         self.joints = np.array(joints, np.float64)
@@ -69,26 +69,26 @@ class StandingBody:
         self._up = np.stack([zero, one, zero], axis=-1)
 
     def _axes(self, side: str) -> Array:
-        """(T, 3, 3) rows: outward, up, forward."""
+        """Axes of the body (T, 3, 3) in rows: outward, up, forward."""
         return np.stack([_SIGN[side] * self._left, self._up, self._forward], axis=1)
 
     def local(self, vectors: Array, side: str) -> Array:
-        """Vectors (T, 3) of the world, in the body's frame."""
+        """Convert vectors (T, 3) from the world to the body's frame."""
         return np.einsum("tij,tj->ti", self._axes(side), vectors)
 
     def world(self, vectors: Array, side: str) -> Array:
-        """The inverse of `local`."""
+        """Invert `local`."""
         return np.einsum("tij,ti->tj", self._axes(side), vectors)
 
     def turn(self, joint: int, axis: str, degrees: Array, *, besides: Sequence[int] = ()) -> None:
-        """Rotate everything beyond a joint, and `besides`, about it.
+        """Rotate all descendants of a joint, and `besides`, about it.
 
         Args:
             joint: its number.
             axis: `left` (positive: forward and down), `forward` (positive: towards the body's right) or `up`
                 (positive: towards its left).
             degrees: (T,).
-            besides: more joints.
+            besides: further joints.
         """
         along = {"left": self._left, "forward": self._forward, "up": self._up}[axis]
         turned = from_rotvec(along * np.radians(degrees)[:, None])
@@ -97,11 +97,11 @@ class StandingBody:
         self.joints[:, moved] = pivot + rotate(turned[:, None], self.joints[:, moved] - pivot)
 
     def move_arm(self, side: str, way: Array, upper: Array, fore: Array, lag: float) -> None:
-        """Move an arm from where it is to another direction and back.
+        """Move an arm from its current direction to another and back.
 
         Args:
             side: of the arm.
-            way: (T,) how far it has gone, 0 to 1.
+            way: (T,) progress of the movement, 0 to 1.
             upper, fore: (T, 3) or (3,) directions of upper arm and forearm at 1, in the body's frame.
             lag: seconds by which the forearm follows the upper arm.
         """
@@ -130,11 +130,11 @@ class StandingBody:
         self.joints[:, wrist] = self.joints[:, elbow] + _LENGTH[wrist] * self.world(bones[1], side)
 
     def reach(self, side: str, target: Array) -> tuple[Array, Array]:
-        """Directions (T, 3) of upper arm and forearm that bring the wrist to a place, the elbow down and outward.
+        """Directions (T, 3) of upper arm and forearm that put the wrist at a target, the elbow down and outward.
 
         Args:
             side: of the arm.
-            target: (T, 3) the wrist seen from the shoulder, in the body's frame, metres.
+            target: (T, 3) the wrist relative to the shoulder, in the body's frame, metres.
         """
         _, _, elbow, wrist = ARMS[side]
         upper, lower = _LENGTH[elbow], _LENGTH[wrist]
@@ -147,21 +147,21 @@ class StandingBody:
         return normalize(bent), normalize(distance * axis - bent)
 
     def from_shoulder(self, side: str, points: Array) -> Array:
-        """Points (T, 3) of the world, seen from a shoulder in the body's frame."""
+        """Convert points (T, 3) of the world to the body's frame, relative to a shoulder."""
         return self.local(points - self.joints[:, ARMS[side][1]], side)
 
     def lean(self, degrees: Array, axis: str, joints: Sequence[int] = _SPINE) -> None:
-        """Bend the spine by `degrees` (T,) in all; see `turn`."""
+        """Bend the spine by `degrees` (T,) in total; see `turn`."""
         for joint in joints:
             self.turn(joint, axis, degrees / len(joints))
 
     def bow(self, degrees: Array, *, arms_hang: float, head: float) -> None:
-        """Bend forward over feet that stay.
+        """Bend forward without moving the feet.
 
         Args:
             degrees: (T,) of the trunk.
-            arms_hang: 0: the arms keep their place at the trunk; 1: they hang straight down.
-            head: degrees of the neck for each of the trunk; negative: the eyes stay ahead.
+            arms_hang: 0: the arms move with the trunk; 1: they hang straight down.
+            head: degrees of the neck per degree of the trunk; negative: the gaze stays ahead.
         """
         hips = self.joints[:, [1, 2]].copy()
         self.turn(0, "left", _PELVIS_SHARE * degrees, besides=(1, 2))
@@ -174,7 +174,7 @@ class StandingBody:
         self.joints[:, _CARRIED] -= _BACK * sine * self._forward[:, None] + _DOWN * sine * self._up[:, None]
 
     def solved(self) -> Array:
-        """(T, 22, 3): the poses, bones of the skeleton's lengths, knees solved between hips and feet."""
+        """The poses (T, 22, 3) with bones of the skeleton's lengths and knees solved between hips and feet."""
         return with_bones(self.joints)
 
 
@@ -183,7 +183,7 @@ def _lift(elevation: Array) -> Array:
 
 
 def _beyond(joint: int) -> list[int]:
-    """Joints whose place depends on a joint; not the legs, which are solved."""
+    """Descendants of a joint, without the legs, which are solved."""
     found = [joint]
     for j, parent in enumerate(HUMANML3D.parents):
         if parent in found and j not in _LEGS:
@@ -192,7 +192,7 @@ def _beyond(joint: int) -> list[int]:
 
 
 def swung(vectors: Array, degrees: Array) -> Array:
-    """Directions (3,) or (T, 3), swung outward (positive) and inward by `degrees` (T,) in the plane of the chest."""
+    """Rotate directions (3,) or (T, 3) by `degrees` (T,) in the plane of the chest; positive is outward."""
     vectors = np.broadcast_to(vectors, (len(degrees), 3))
     cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.stack(
@@ -201,11 +201,11 @@ def swung(vectors: Array, degrees: Array) -> Array:
 
 
 def swings(way: Array, rate: Callable[[Array], Array] | float) -> Array:
-    """(T,) -1 to 1: to and fro while the way is nearly done.
+    """Oscillation (T,) between -1 and 1 while the movement is nearly complete.
 
     Args:
         way: (T,) see `StandingBody.move_arm`.
-        rate: swings to and fro in a second.
+        rate: full swings per second.
     """
     t = np.arange(len(way)) / FPS
     begin = t[int(np.argmax(way >= _SWING_FROM))]

@@ -1,8 +1,8 @@
-"""Hand gestures, bows and nods made on captured idles, for actions that hardly any capture shows.
+"""Synthetic hand gestures, bows and nods on captured idles, for actions that few captures show.
 
-Each stands on a captured idle, whose feet, breath and sway it keeps; side, height, pace, length and number are drawn.
-Such clips are marked as made, serve training alone, and are at most half of what is drawn of an action
-(`marey.data.sampling`). `gestures.toml` holds what is said of each kind, in three voices.
+Each gesture modifies a captured idle and keeps its feet, breath and sway; side, height, pace, length and number are
+random. These clips are marked as `made`, are used for training only, and are at most half of the draws of an action
+(`marey.data.sampling`). `gestures.toml` has captions of each kind in three voices.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from marey.data.soundness import is_broken
 Array = NDArray[np.floating]
 
 COUNTS = {"wave": 160, "raise-arm": 160, "bow": 120, "guide": 60, "clap": 60, "nod": 60}
-"""Clips of each action that are made."""
+"""Number of clips to make of each action."""
 SIDES = (LEFT, RIGHT)
 BOTH = "both"
 CAPTIONS = 2
-"""Of each voice, for each clip."""
+"""Number of captions per voice and clip."""
 _BASE = "idle"
 _LEAST_BASE = 30  # frames of an idle
-_STANDS = 0.15  # metres that its hips may move
-_UPRIGHT = 0.88  # metres of the hips over the floor; they stand at 1.0
+_STANDS = 0.15  # metres that the hips of an idle may move
+_UPRIGHT = 0.88  # metres of the hips over the floor; about 1.0 when upright
 _ANKLES = 0.16  # metres over the floor
-_HANGS = 0.2  # metres by which the wrists are under the shoulders
-_ASIDE = 0.42  # metres of the wrists from the hips, seen from above
-_SLIPS = 0.01  # metres that a solved foot may be off
+_HANGS = 0.2  # metres that the wrists are below the shoulders
+_ASIDE = 0.42  # metres, horizontal distance of the wrists from the hips
+_SLIPS = 0.01  # metres, largest error of a foot after solving the legs
 _TIMES = {2: "twice", 3: "three times"}
 
 
@@ -50,11 +50,11 @@ class Gesture:
     """A drawn gesture.
 
     Attributes:
-        seconds: its length, standing before and after it included.
-        kinds: keys of `gestures.toml` that are true of it.
-        change: puts it onto a body of that length.
+        seconds: its length, including the time standing before and after it.
+        kinds: keys of `gestures.toml` that apply to it.
+        change: applies it to a body of that length.
         side: left, right, both or empty.
-        times: how often a bow is done.
+        times: number of bows.
     """
 
     seconds: float
@@ -65,7 +65,7 @@ class Gesture:
 
 
 def made_gestures(parts: Sequence[Part]) -> Iterator[Part]:
-    """Gestures on the idles among some parts, which are those of the training split."""
+    """Make gestures on the idles among the parts of the training split."""
     bases = [part for part in parts if _is_base(part)]
     if not bases:
         return
@@ -75,7 +75,7 @@ def made_gestures(parts: Sequence[Part]) -> Iterator[Part]:
 
 
 def _is_base(part: Part) -> bool:
-    """Return True for an idle that stands upright in its place on both feet, with both arms down."""
+    """Return True for an idle that stands upright on both feet without moving away, with both arms down."""
     joints = part.joints
     if part.content != _BASE or len(joints) < _LEAST_BASE:
         return False
@@ -111,7 +111,7 @@ def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
 
 
 def _of_length(joints: Array, frames: int, rng: random.Random) -> Array:
-    """So many frames of an idle; a shorter one goes to and fro, which breath and sway do as well."""
+    """Take `frames` frames of an idle; play a shorter one forward and backward, which suits breath and sway."""
     if len(joints) < frames:
         there_and_back = np.concatenate([joints, joints[-2:0:-1]])
         joints = np.tile(there_and_back, (-(-frames // len(there_and_back)), 1, 1))
@@ -120,7 +120,7 @@ def _of_length(joints: Array, frames: int, rng: random.Random) -> Array:
 
 
 def _captions_of(gesture: Gesture, rng: random.Random) -> tuple[tuple[str, ...], ...]:
-    """Draw captions of a gesture in each voice: of its kind in general or of what is special about it."""
+    """Draw captions of a gesture in each voice, general ones or ones of its special kind."""
     told = []
     for said in _captions().values():
         chosen = [rng.choice(said[rng.choice(gesture.kinds)]) for _ in range(CAPTIONS)]
@@ -139,7 +139,7 @@ def _captions() -> Mapping[str, Mapping[str, Sequence[str]]]:
 
 @dataclass(frozen=True)
 class _Pace:
-    """When a hand goes up, stays and comes down, in seconds."""
+    """Timing of a hand that goes up, stays and comes down, in seconds."""
 
     start: float
     rise: float
@@ -156,7 +156,7 @@ class _Pace:
         return self.start + self.rise + self.hold + self.fall
 
     def total(self, rng: random.Random) -> float:
-        """With some standing after it."""
+        """Duration with a random time of standing after it, seconds."""
         return self.seconds + rng.uniform(0.25, 1.3)
 
     def way(self, body: StandingBody) -> Array:
@@ -168,7 +168,7 @@ _WAVES = {
     "wave-low": {"upper": ((5, 60), (-72, -40)), "fore": ((10, 50), (35, 70)), "swing": (17, 34)},
     "wave-whole": {"upper": ((40, 95), (50, 75)), "fore": ((40, 90), (70, 85)), "swing": (10, 18)},
 }
-"""Azimuths and elevations of upper arm and forearm, and degrees that the forearm swings to each side."""
+"""Azimuths and elevations of upper arm and forearm, and the swing of the forearm to each side, degrees."""
 
 
 def _wave(rng: random.Random) -> Gesture:
@@ -274,7 +274,7 @@ def _clap(rng: random.Random) -> Gesture:
 
 @dataclass(frozen=True)
 class _Arm:
-    """Directions of an arm at the end of its way, how far it swings, and seconds by which the forearm is later."""
+    """Final directions of an arm, its swing in degrees, and the delay of the forearm in seconds."""
 
     upper: Array
     fore: Array
@@ -292,7 +292,7 @@ def _arms(side: str) -> tuple[str, ...]:
 
 
 def _respond(body: StandingBody, way: Array, side: str, twist: float, sway: float) -> None:
-    """The trunk turns towards a lifted arm and leans away from it, by so many degrees."""
+    """Turn the trunk towards a lifted arm by `twist` and lean it away by `sway`, in degrees."""
     if side != BOTH:
         sign = 1.0 if side == LEFT else -1.0
         body.lean(sign * sway * way, "forward")
@@ -302,7 +302,7 @@ def _respond(body: StandingBody, way: Array, side: str, twist: float, sway: floa
 # -- trunk and head --------------------------------------------------------------------------------------------------
 
 _SLIGHT, _DEEP = 36.0, 66.0
-"""Degrees from the hips to the neck; the trunk as a whole tips by three quarters of them."""
+"""Degrees of a bow from the hips to the neck; the trunk as a whole tilts by three quarters of this."""
 
 
 def _bow(rng: random.Random) -> Gesture:

@@ -1,4 +1,4 @@
-"""The grammar that captions are made of: `grammar.toml`, read once."""
+"""The caption grammar: `grammar.toml`, read once."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Words:
 
     Attributes:
         phrases: verb phrases.
-        nouns: without a verb ("a wave of the left hand").
+        nouns: noun phrases without a verb ("a wave of the left hand").
         whole: sentences whose subject is the limb ("the left hand goes up").
-        who: subjects that go with the action ("a runner").
-        manners: verb phrases that say a style as well, by style ("trudges").
+        who: subjects that fit the action ("a runner").
+        manners: verb phrases that include a style, by style ("trudges").
     """
 
     phrases: tuple[str, ...]
@@ -45,8 +45,8 @@ class Joins:
     Attributes:
         two, three: frames for any actions.
         halt: frames for an action in place after travel.
-        same: by action, for two sides of one action.
-        pairs: by `first-second`, for two actions that have words of their own together.
+        same: phrases by action, for one action on both sides in turn.
+        pairs: by `first-second`, for two actions with a joint phrase.
     """
 
     two: tuple[str, ...]
@@ -58,7 +58,7 @@ class Joins:
 
 @dataclass(frozen=True)
 class Detail:
-    """Phrases of a measured detail: after the action, or as a sentence."""
+    """Phrases of a measured detail, to follow the action or as a separate sentence."""
 
     clause: tuple[str, ...]
     sentence: tuple[str, ...]
@@ -80,7 +80,7 @@ class Grammar:
 
 @lru_cache(maxsize=1)
 def grammar() -> Grammar:
-    """The grammar of the package."""
+    """Load the grammar of the package."""
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("grammar.toml").read_text("utf-8"))
     return Grammar(
         subjects=tuple(table["subjects"]),

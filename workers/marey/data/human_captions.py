@@ -1,8 +1,7 @@
-"""Captions in the words of other people: `human_captions.toml`, by three authors without access to the grammar or any
-prompt.
+"""Human captions: `human_captions.toml`, by three authors without access to the grammar or any prompt.
 
-A grammar joins a subject, a verb phrase and an adverb. People also say "Before waving, she walks up to the fence" or
-"left arm up, then the right": a model trained without such sentences followed 78 % of another author's prompts, and
+The grammar joins a subject, a verb phrase and an adverb. People also write "Before waving, she walks up to the fence"
+or "left arm up, then the right": a model trained without such sentences followed 78 % of another author's prompts, and
 95 % of those by the grammar's author.
 """
 
@@ -23,7 +22,7 @@ from marey.data.grammar import grammar
 from marey.data.phrases import fields, fill, filled_if_any, phrase_of, with_adverb
 
 STYLED_SHARE = 0.5
-OWN_SHARE = 0.5  # of the sequences that have words of their own
+OWN_SHARE = 0.5  # share of the sequences with captions of their own
 _ACT = re.compile(r"{([abc])(?:_(ing|base|noun))?}")
 _FORMS = {None: "third", "ing": "gerund", "base": "base"}
 
@@ -33,9 +32,9 @@ class HumanCaptions:
     """Content of `human_captions.toml`.
 
     Attributes:
-        actions: by action, or action and `_one` or `_both` hands: captions of it.
-        same: by action, for one side after the other.
-        pairs: by `first-second`.
+        actions: captions by action, or by action with `_one` or `_both` hands.
+        same: captions by action, for one side after the other.
+        pairs: captions by `first-second`.
         two, stop, three: frames for any actions; `stop` for an action in place after travel.
     """
 
@@ -49,7 +48,7 @@ class HumanCaptions:
 
 @lru_cache(maxsize=1)
 def human_captions() -> HumanCaptions:
-    """The captions of the package."""
+    """Load the captions of the package."""
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("human_captions.toml").read_text("utf-8"))
     actions, same, pairs = (
         {name: tuple(rows) for name, rows in table[key].items()} for key in ("acts", "same", "pairs")
@@ -59,7 +58,7 @@ def human_captions() -> HumanCaptions:
 
 
 def human_caption(facts: Facts, rng: random.Random) -> str | None:
-    """A caption of one action, its style in a sentence or an adverb of its own; None if no author wrote one."""
+    """Draw a caption of one action, with its style as a sentence or an adverb; None if no author wrote one."""
     rows = human_captions().actions.get(_key(facts), ())
     text = _some(rows, fields(facts, rng, "the"), rng) if facts.repeats == 1 else None
     if text is None or rng.random() > STYLED_SHARE:
@@ -71,7 +70,7 @@ def human_caption(facts: Facts, rng: random.Random) -> str | None:
 
 
 def human_sequence(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """A caption of two or three actions in their order in time, which need not be that of the words."""
+    """Draw a caption of two or three actions; it may mention them in another order than they happen."""
     own = _own(parts, rng) if len(parts) == 2 and rng.random() < OWN_SHARE else None
     text = own or _framed(parts, rng)
     style = grammar().styles[parts[0].style]
@@ -86,13 +85,13 @@ def _key(facts: Facts) -> str:
 
 
 def _own(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """The words that these two actions have together."""
+    """Draw a caption for this pair of actions, or None."""
     first, second = parts
     values = {f"{name}_side": facts.side for name, facts in zip("ab", parts, strict=True) if facts.side}
     if first.action == second.action:
         one_each = {first.side, second.side} == {"left", "right"}
         return _some(human_captions().same.get(first.action, ()), values, rng) if one_each else None
-    for facts in parts:  # of a turn and a hand each names its own
+    for facts in parts:  # a turn and a hand have separate fields
         if facts.action == "turn":
             values["side"] = facts.side
         elif facts.side:
@@ -105,7 +104,7 @@ def _limbs(side: str, name: str) -> str:
 
 
 def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """A frame with each action in its place, in the form that the frame asks for."""
+    """Fill a frame with each action in the form that the frame requires."""
     stops = parts[0].action in LOCOMOTION and parts[1].action not in LOCOMOTION
     frames = (
         human_captions().three if len(parts) == 3 else human_captions().two + (human_captions().stop if stops else ())
@@ -123,7 +122,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
 
 
 def _said(facts: Facts, form: str, rng: random.Random) -> str | None:
-    """An action as a verb phrase, or as a noun with its article."""
+    """Express an action as a verb phrase, or as a noun with its article."""
     if form != "noun":
         return conjugate(with_adverb(phrase_of(facts, rng, "the"), ""), _FORMS[form or None])
     if facts.repeats > 1:
@@ -139,6 +138,6 @@ def _styled(text: str, after: str) -> str:
 
 
 def _some(rows: Sequence[str], values: dict[str, str], rng: random.Random) -> str | None:
-    """One of the rows whose fields are all known, filled."""
+    """Draw and fill a row whose fields are all known."""
     found = filled_if_any(rows, values, rng)
     return None if found is None else found[0]

@@ -1,4 +1,4 @@
-"""`index.csv`: one line a clip, or a segment of a long one."""
+"""`index.csv`: one line per clip, or per segment of a long clip."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from marey.data.licences import Tier
 
 MAX_BYTES = 64 * 2**20
 SEPARATOR = "|"
-"""Between several captions in one cell."""
+"""Separator of captions in one cell."""
 UNUSED = "none"
-"""Action of a row that is not to be used: a T-pose, a broken or doubled take."""
+"""Action of an unused row: a T-pose, or a broken or duplicate take."""
 
 
 class Row(BaseModel):
     """One line.
 
     Attributes:
-        file: name of the file, with or without folder and ending.
-        id: name of the clip; the file's, with `@` and the start for a segment, and the end where two begin at one.
-        action: what is done, an id of the vocabulary where it has one; several joined by `; `; `none`: leave it out.
-        style: how it is done.
+        file: name of the file, with or without folder and extension.
+        id: name of the clip; default: the file's, with `@start` for a segment, and the end if two share a start.
+        action: the action, an id of the vocabulary if it has one; several joined by `; `; `none`: omit the clip.
+        style: style of the action.
         captions: true sentences about it.
-        source: the independent capture that it comes from; clips of one source are never in two splits.
-        licence, credit, tier: its terms where they are not those of the set.
-        in_place: a gait on the spot, whose travel is made from the standing foot or which is said to be in place.
+        source: the independent capture it comes from; clips of one source are never in two splits.
+        licence, credit, tier: its terms if they differ from those of the set.
+        in_place: a gait on the spot; its travel is computed from the standing foot, or its captions say "in place".
         side: left, right, both or empty.
-        split: given by the set, or empty: then splits are made by source.
-        start, end: first frame and the one after the last, counted at `Dataset.index_fps`; None: the file's own.
-        error_cm: how far the file's joints are off what was captured, where its maker measured that.
-        facts: what can be seen in it, for those who write captions.
+        split: split given by the set; empty: assigned by source.
+        start, end: first frame (inclusive) and last (exclusive) at `Dataset.index_fps`; None: those of the file.
+        error_cm: error of the file's joints against the capture, if its author measured it.
+        facts: description of the motion, for authors of captions.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -78,12 +78,12 @@ class Row(BaseModel):
 
     @property
     def stem(self) -> str:
-        """Name of the file without folder and ending."""
+        """Name of the file without folder and extension."""
         return stem_of(self.file)
 
 
 def stem_of(name: str) -> str:
-    """Name of a file without folder and ending (`.bvh` alone: clips may have dots in their names)."""
+    """Name of a file without folder and extension (only `.bvh`: names of clips may have dots)."""
     name = name.replace("\\", "/").rsplit("/", 1)[-1]
     return name[:-4] if name.lower().endswith(".bvh") else name
 
@@ -93,7 +93,7 @@ def read_index(path: Path, dataset: Dataset) -> tuple[Row, ...]:
 
     Raises:
         NotFound: no such file.
-        InvalidFile: no CSV with a header, an unknown column in a template, or a bad cell, with its line.
+        InvalidFile: not a CSV file with a header, a template with an unknown column, or an invalid cell, with its line.
     """
     where = str(path)
     try:
@@ -104,7 +104,7 @@ def read_index(path: Path, dataset: Dataset) -> tuple[Row, ...]:
 
 
 def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row, ...]:
-    """Rows of an index's text; `columns` as in `Dataset.columns`."""
+    """Parse the text of an index; `columns` as in `Dataset.columns`."""
     reader = csv.DictReader(io.StringIO(text, newline=""))
     header = tuple(reader.fieldnames or ())
     templates = {name: f"{{{name}}}" for name in Row.model_fields if name in header}
@@ -114,7 +114,7 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
     for ours, template in templates.items():
         for _, field, _, _ in string.Formatter().parse(template):
             if field is not None and field not in header:
-                raise InvalidFile(f"has no column {field!r}, of which `{ours}` is made", where=where)
+                raise InvalidFile(f"has no column {field!r}, which `{ours}` needs", where=where)
     rows, seen = [], set[str]()
     for cells in reader:
         place = f"{where}, line {reader.line_num}"
@@ -137,7 +137,7 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
 
 
 def _named(row: Row, taken: Container[str]) -> Row:
-    """The row with id and source, where it has none. Segments with one start are told apart by their ends."""
+    """Fill a missing id and source of a row. Segments with the same start also get their end in the id."""
     name = row.id or row.stem
     if not row.id and not (row.start is None and row.end is None):
         name += f"@{row.start or 0:g}"

@@ -1,4 +1,4 @@
-"""Summarise a prepared folder for people: counts, lengths, captions, bytes."""
+"""Summary of a prepared folder: counts, lengths, captions, bytes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ class Summary(BaseModel):
 
     Attributes:
         splits: clips by split.
-        hours: of all clips, mirrored and spliced ones included.
+        hours: total length of all clips, including mirrored and spliced ones.
         kinds: captured, mirrored, retimed, looped (another length of one action), spliced (several actions).
         actions: captured and mirrored clips by action and side, then by split.
-        sequences: spliced clips by their actions, the most frequent ones.
+        sequences: spliced clips by their actions, most frequent first.
         styles: captured and mirrored clips by style, then by split.
         lengths: clips by whole seconds, by split.
-        captions: different captions, and examples by action.
+        captions: number of different captions, and examples by action.
         left_out: reasons with the number of clips left out for each.
-        megabytes: of each file.
+        megabytes: size of each file.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -44,7 +44,7 @@ class Summary(BaseModel):
 
 
 def summarize(data: PreparedData) -> Summary:
-    """Summary of an open folder."""
+    """Summarize an open folder."""
     manifest = data.manifest
     real = [clip for clip in data.clips if not clip.spliced]
     return Summary(

@@ -1,7 +1,7 @@
-"""Clips that cannot be trained on as they are: gaits on the spot, and clips of less than a second and a half.
+"""Corrections of clips that are unsuitable for training: gaits on the spot, and clips of up to 1.5 seconds.
 
-A gait on the spot gets the travel that its standing feet imply. A short cycle that closes is repeated. Any other short
-clip is never looped: it gets a piece of a real idle before and after it, by inertialized transitions.
+A gait on the spot gets the travel implied by its standing feet. A short closed cycle is repeated. Any other short clip
+is not looped: it gets a piece of a captured idle before and after it, with inertialized transitions.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from marey.motion.support import RADII
 Array = NDArray[np.floating]
 
 SHORT = 30
-"""Frames: a clip of up to a second and a half is lengthened."""
+"""Frames up to which a clip is lengthened (1.5 seconds)."""
 LEAST_STANCE = 0.3
-CYCLE_FRAMES = 50  # that repeated cycles reach at least
+CYCLE_FRAMES = 50  # least length of repeated cycles
 _CLOSES = 0.03  # metres, mean over joints, between the last pose and the first
-_STANDS = 0.03  # metres over the floor
+_STANDS = 0.03  # metres above the floor
 _CARRIERS = (10, 11, 7, 8, 4, 5, 20, 21)  # toes, ankles, knees, wrists
 _IDLE_FRAMES = (10, 24)
-_HELD_FRAMES = 8  # of the first pose, in which the idle goes over into it: the action itself stays as it was captured
+_HELD_FRAMES = 8  # frames of the first pose for the transition from the idle, so that the action stays as captured
 _LEVEL = np.array([1.0, 0.0, 1.0])
 _WORST_SEAM = 0.25  # see `splice.seam_costs`
 
 
 def travelling(joints: Array) -> Array | None:
-    """A gait on the spot (T, 22, 3) with the steady travel that keeps its standing joints where they stand; None where
-    none stands for `LEAST_STANCE` of the frames, as in a treadmill run drawn in the air."""
+    """Add the constant travel to a gait on the spot (T, 22, 3) that keeps standing joints in place; None if no joint
+    stands for `LEAST_STANCE` of the frames, as in a run in the air."""
     joints = np.asarray(joints, np.float64)
     height = joints[:, _CARRIERS, 1] - RADII[list(_CARRIERS)]
     lowest = height.argmin(axis=1)
@@ -50,17 +50,17 @@ def travelling(joints: Array) -> Array | None:
 
 
 def closes(joints: Array) -> bool:
-    """Return True if the last pose of a clip goes over into its first, travel apart: they are the same, or no further
-    apart than one frame from the next."""
+    """Return True if the clip is a closed cycle: apart from travel, its last and first poses are equal or differ by no
+    more than adjacent frames."""
     local = joints - joints[:, :1] * _LEVEL
     step = np.median(np.linalg.norm(np.diff(local, axis=0), axis=-1).mean(-1))
     return _gap(joints) < max(_CLOSES, float(step))
 
 
 def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
-    """A cycle that closes, gone through until it has so many frames at least; each round goes on where the last one
+    """Repeat a closed cycle until it has at least `frames` frames; each repetition continues where the last one
     ended."""
-    if _gap(joints) >= _CLOSES:  # its last pose is the one before the first
+    if _gap(joints) >= _CLOSES:  # the last pose precedes the first by a frame
         step = (joints[-1, 0] - joints[0, 0]) * _LEVEL / (len(joints) - 1)
         joints = np.concatenate([joints, joints[:1] + step * len(joints)])
     advance = (joints[-1, 0] - joints[0, 0]) * _LEVEL
@@ -70,13 +70,13 @@ def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
 
 
 def _gap(joints: Array) -> float:
-    """Metres between the first pose and the last, travel apart, mean over joints."""
+    """Distance between the first and last poses apart from travel, mean over joints, metres."""
     local = joints - joints[:, :1] * _LEVEL
     return float(np.linalg.norm(local[-1] - local[0], axis=-1).mean())
 
 
 def between_idles(joints: Array, idles: Sequence[Array], seed: str) -> Array | None:
-    """A short clip with real idle before and after it, wherever some idle's pose is near enough; None where neither
+    """Add captured idle before and after a short clip, at each end where an idle has a similar pose; None if neither
     end has one."""
     rng = seeded("idle", seed)
     out = np.asarray(joints, np.float64)
@@ -90,7 +90,7 @@ def between_idles(joints: Array, idles: Sequence[Array], seed: str) -> Array | N
 
 
 def _piece(pose: Array, idles: Sequence[Array], frames: int, *, at_end: bool) -> Array | None:
-    """So many frames of the idle that fits a pose (2, 22, 3) best, ending (`at_end`) or beginning with it."""
+    """Take frames of the idle that best fits a pose (2, 22, 3), ending (`at_end`) or beginning with it; or None."""
     best, least = None, _WORST_SEAM
     here = seam_features(pose, FPS)[:1]
     for idle in idles:

@@ -1,4 +1,4 @@
-"""Licence tiers: which data may be trained on together, and what the weights may then be used for."""
+"""Licence tiers: which data may be combined for training, and the allowed use of the weights."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ TIERS: tuple[Tier, ...] = get_args(Tier)
 
 @dataclass(frozen=True)
 class Terms:
-    """Terms of a set; they travel into every manifest and model card.
+    """Terms of a set, copied into every manifest and model card.
 
     Attributes:
-        name: of the set.
-        title, licence, credit, url: as they must be given.
-        tier: what weights trained on it may be used for.
+        name: name of the set.
+        title, licence, credit, url: attribution, as required by the licence.
+        tier: allowed use of weights trained on the set.
     """
 
     name: str
@@ -32,17 +32,17 @@ class Terms:
 
 
 def tier_of(licence: str) -> Tier:
-    """Tier of a licence by its name, for records that do not state one."""
+    """Tier of a licence by its name, for records without a tier."""
     if re.search(r"\bNC\b|non-?commercial|research only", licence, re.IGNORECASE):
         return "non-commercial"
     return "sharealike" if re.search(r"\bSA\b|share-?alike", licence, re.IGNORECASE) else "commercial"
 
 
 def check_mix(terms: Iterable[Terms], *, where: str | None = None) -> Tier:
-    """The tier of what is made of all of these: the strictest.
+    """Return the tier of a combination of sets: the strictest.
 
     Raises:
-        InvalidInput: sharealike together with non-commercial: no licence would satisfy both.
+        InvalidInput: share-alike and non-commercial sets together; no licence satisfies both.
     """
     by_tier: dict[Tier, list[str]] = {tier: [] for tier in TIERS}
     for entry in terms:

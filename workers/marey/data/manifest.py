@@ -29,7 +29,7 @@ class FileEntry(BaseModel):
 
 
 class SourceEntry(BaseModel):
-    """One set that the data came from, or the clips of it that have terms of their own."""
+    """One source set, or those of its clips that have their own terms."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -51,7 +51,7 @@ class Manifest(BaseModel):
     format: str
     sources: tuple[SourceEntry, ...]
     tier: Tier
-    """Of weights trained on it: the strictest of the sources."""
+    """Tier of weights trained on the data: the strictest of the sources."""
     layout: str
     facing_sigma: float
     fps: float
@@ -61,14 +61,14 @@ class Manifest(BaseModel):
     clips: int
     splits: dict[str, int]
     lengths: dict[str, dict[str, int]]
-    """By split, how many clips have so many seconds (`0-1`, `1-2`, …)."""
+    """Number of clips by split and length in seconds (`0-1`, `1-2`, …)."""
     kinds: dict[str, int]
-    """captured, mirrored, retimed, made, looped, spliced."""
+    """Number of clips by kind: captured, mirrored, retimed, made, looped, spliced."""
     captions: int
     caption_files: dict[str, str] = {}
-    """Files with captions by people, as `set/captions-author.csv`, with the sha256 of each."""
+    """sha256 of each file of human captions, by `set/captions-author.csv`."""
     left_out: dict[str, str]
-    """Captured clips that are not used, each with the reason."""
+    """Omitted captured clips, each with the reason."""
     compositional_pairs: tuple[tuple[str, str], ...]
     files: dict[str, FileEntry]
 
@@ -79,7 +79,7 @@ class Manifest(BaseModel):
 
 
 class Measured(BaseModel):
-    """Measurements on a clip; angles in degrees, positive to the left."""
+    """Measurements on a clip; metres, seconds, and degrees (positive to the left)."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -95,11 +95,11 @@ class Clip(BaseModel):
     """One line of `clips.jsonl`.
 
     `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
-    its first part. `speed` is how much faster it is than captured. `acts` are the actions in order, as the caption
-    grammar calls them, `sides` the measured side of each: left, right, both, or empty. Where several actions were
-    joined, `seams` are the first frames of all but the first action, and `act_captions` say each action alone.
-    `authors` counts the captions of each author, in their order; empty: all by one. `made` says that a gesture in it
-    was not captured (`marey.data.gestures`).
+    its first part. `speed` is relative to the capture. `acts` are the actions in order, as keys of the caption grammar,
+    `sides` the measured side of each: left, right, both, or empty. If several actions are joined, `seams` are the first
+    frames of all but the first action, and `act_captions` describe each action separately. `authors` has the number of
+    captions of each author, in order; empty: all by one author. `made` marks clips with a synthetic gesture
+    (`marey.data.gestures`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -126,5 +126,5 @@ class Clip(BaseModel):
 
     @property
     def captured(self) -> bool:
-        """True for what was captured as it is: not mirrored, joined, made, slower or faster."""
+        """Return True for an unchanged capture: not mirrored, joined, made, slower or faster."""
         return not (self.mirrored or self.spliced or self.made) and self.speed == 1.0

@@ -1,4 +1,4 @@
-"""Files of the product that are computed from prepared data, by `python -m` of the module that knows how."""
+"""Command line of modules that compute files of the product from prepared data (`python -m`)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from marey.motion.files import write_atomically
 def write_measured(
     arguments: Sequence[str] | None, description: str, file: Path, document: Callable[[PreparedData], str]
 ) -> None:
-    """Read the command line of such a module, write the document of a prepared folder, and print it.
+    """Parse the command line of such a module, write the document of a prepared folder, and print it.
 
     Args:
-        arguments: of the command line; None = those of the process.
-        description: for `--help`.
-        file: what is written without `--output`.
-        document: its text.
+        arguments: command line; None = that of the process.
+        description: description for `--help`.
+        file: output file without `--output`.
+        document: returns the text of the file.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("prepared", type=Path, help="Folder of `marey data prepare`.")

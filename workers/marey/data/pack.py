@@ -1,7 +1,7 @@
-"""The joints pack: every clip of an archive retargeted at 20 fps, in one small file that travels between machines.
+"""The joints pack: every clip of an archive retargeted at 20 fps, in one small, portable file.
 
-Nothing in it is mirrored, spliced or encoded: `build.py` makes the whole prepared folder from it, with the same bytes
-every time. Joints are stored relative to the root, where float16 is off by at most 0.25 mm; the root is float32.
+It has no mirrored, spliced or encoded clips: `build.py` makes the prepared folder from it, with the same bytes every
+time. Joints are stored relative to the root in float16 (error at most 0.25 mm), the root in float32.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.licences import Terms
 
 MAX_BYTES = 8 * 2**30
-"""A day of motion takes 1.5 GB."""
+"""Largest size of a pack; a day of motion takes 1.5 GB."""
 FORMAT = "marey-joints-pack-3"
 SPLITS = ("train", "val", "test", "compositional")
 
@@ -33,13 +33,13 @@ class PackClip:
     Attributes:
         id: its name, unique within the data set.
         dataset: name of the set.
-        content, style: action and style of the index; an empty style where there is none.
-        split: train, val, test or compositional; empty: made by source when the data are built.
+        content, style: action and style of the index; the style may be empty.
+        split: train, val, test or compositional; empty: assigned by source in stage 2.
         start, frames: its rows in the pack.
-        source: the independent capture that it comes from.
-        captions: true sentences about it, of each author.
+        source: the independent capture it comes from.
+        captions: true sentences about it, by author.
         side, in_place, facts: see `marey.data.index.Row`.
-        tier, licence, credit: its own terms; empty where they are those of the set.
+        tier, licence, credit: its own terms; empty if they equal those of the set.
     """
 
     id: str
@@ -65,9 +65,9 @@ class JointsPack:
 
     Attributes:
         clips: in the order of the rows.
-        terms: of each set that they come from.
-        left_out: clips of the index that are not here, each with the reason.
-        caption_files: files that captions came from, as `set/captions-author.csv`, with the sha256 of each.
+        terms: terms of each source set.
+        left_out: omitted clips of the index, each with the reason.
+        caption_files: sha256 of each caption file, by `set/captions-author.csv`.
         local: (N, 21, 3) float16, joints 1 to 21 relative to the root, metres.
         root: (N, 3) float32 metres.
     """
@@ -80,12 +80,12 @@ class JointsPack:
     caption_files: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def joints(self, clip: PackClip) -> NDArray[np.float32]:
-        """(T, 22, 3) metres."""
+        """Joints (T, 22, 3) of a clip, metres."""
         rows = slice(clip.start, clip.start + clip.frames)
         return join(self.local[rows], self.root[rows])
 
     def terms_of(self, clip: PackClip) -> Terms:
-        """Terms of a clip: those of its set, but where it has its own.
+        """Terms of a clip: its own, otherwise those of its set.
 
         Raises:
             InvalidInput: the pack has no terms of the clip's set.
@@ -114,7 +114,7 @@ class JointsPack:
         return cls(tuple(table), local, root, tuple(terms), dict(left_out or {}), dict(caption_files or {}))
 
     def save(self, path: Path) -> None:
-        """Write one compressed npz, complete or not at all."""
+        """Write one compressed npz atomically."""
         terms, clips = ([asdict(entry) for entry in entries] for entries in (self.terms, self.clips))
         about = {"left_out": self.left_out, "caption_files": self.caption_files}
         table = json.dumps({"format": FORMAT, "terms": terms, **about, "clips": clips})
@@ -158,13 +158,13 @@ class JointsPack:
 
 
 def split_root(joints: NDArray[np.floating]) -> tuple[NDArray[np.float16], NDArray[np.float32]]:
-    """(T, 22, 3) to joints relative to the root (T, 21, 3) float16, and the root (T, 3) float32."""
+    """Split joints (T, 22, 3) into joints relative to the root (T, 21, 3) float16 and the root (T, 3) float32."""
     root = joints[:, 0].astype(np.float32)
     return (joints[:, 1:] - root[:, None]).astype(np.float16), root
 
 
 def join(local: NDArray[np.float16], root: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The inverse of `split_root`: (T, 22, 3) float32."""
+    """Invert `split_root`: (T, 22, 3) float32."""
     joints = np.empty((len(root), 22, 3), np.float32)
     joints[:, 0] = root
     joints[:, 1:] = local.astype(np.float32) + root[:, None]

@@ -20,13 +20,13 @@ class Part:
     """A captured or mirrored clip of at most MAX_FRAMES + 1 poses.
 
     Attributes:
-        id: `M` + id of the original for a mirrored one; `@k` for a window of a long one.
+        id: id of the captured clip, with `M` before it if mirrored, and `@k` after it for a window of a long clip.
         source: the captured clip.
-        content: its label, sides exchanged when mirrored.
+        content: its label, with sides exchanged if mirrored.
         joints: (T, 22, 3) float32 metres at 20 fps.
-        facts: what it shows.
-        speed: how much faster it is than captured.
-        made: whether its gesture was put onto a captured idle; see `marey.data.gestures`.
+        facts: labels and measurements.
+        speed: speed relative to the capture.
+        made: True if its gesture was added to a captured idle; see `marey.data.gestures`.
     """
 
     id: str

@@ -1,4 +1,4 @@
-"""Select phrases of an action: a phrase with an unmeasured field or a false condition is not used."""
+"""Select phrases of an action, without those that have an unmeasured field or a false condition."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from marey.data.english import number
 from marey.data.grammar import grammar
 
 _FIELD = re.compile(r"{(\w+)}")
-PAIR = (  # what is said of both hands as two
+PAIR = (  # phrases for both hands
     "two hands", "two arms", "the two hands", "the left and the right hand", "the left and the right arm",
     "both of the hands", "one hand and the other", "the hands on both sides",
 )  # fmt: skip
@@ -20,7 +20,7 @@ RIGHT_ANGLE = 16.0  # degrees about 90 within which a turn is called a right ang
 
 
 def pace_of(facts: Facts) -> str | None:
-    """slow, medium or fast; None when the body does not travel."""
+    """Classify the pace as slow, medium or fast; None if the body does not travel."""
     slow, fast = {"run": (1.9, 3.2), "dash": (2.2, 3.4)}.get(facts.action, (0.75, 1.45))
     if facts.action not in LOCOMOTION or facts.gait.path < 0.8:
         return None
@@ -41,14 +41,14 @@ def height_of(facts: Facts) -> str | None:
 
 
 def lasting_of(facts: Facts) -> str | None:
-    """short or long, for gestures that are."""
+    """Classify the duration of a gesture as short or long, or None."""
     if facts.action not in ("raise", "wave"):
         return None
     return "short" if facts.gait.duration < 3.5 else "long" if facts.gait.duration > 5.5 else None
 
 
 def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
-    """Values of the phrases' fields; unmeasured ones are absent."""
+    """Values of the fields of phrases, without unmeasured ones."""
     words = rng.random() < 0.5
     out = {"seconds": number(facts.gait.duration, words=words)} if facts.gait.duration > 1.4 else {}
     if facts.action in LOCOMOTION:
@@ -89,7 +89,7 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
 
 
 def fill(phrase: str, values: dict[str, str]) -> str | None:
-    """The phrase with its fields filled, or None when one was not measured."""
+    """Fill the fields of a phrase; None if one was not measured."""
     if any(name not in values for name in _FIELD.findall(phrase)):
         return None
     text = _FIELD.sub(lambda match: values[match.group(1)], phrase)
@@ -119,14 +119,14 @@ def details(facts: Facts) -> list[str]:
 
 
 def filled(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -> tuple[str, str]:
-    """One of the phrases whose fields were all measured, filled, and as it stands in the grammar."""
+    """Draw a phrase whose fields were all measured; return it filled and as in the grammar."""
     found = filled_if_any(phrases, values, rng)
     assert found is not None, f"no phrase without fields among {phrases[:3]}"
     return found
 
 
 def filled_if_any(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -> tuple[str, str] | None:
-    """The same of phrases that may all want a field that was not measured."""
+    """Draw a phrase like `filled`; None if every phrase has an unmeasured field."""
     for phrase in rng.sample(phrases, len(phrases)):
         text = fill(phrase, values)
         if text is not None:
@@ -135,7 +135,7 @@ def filled_if_any(phrases: Sequence[str], values: dict[str, str], rng: random.Ra
 
 
 def phrase_of(facts: Facts, rng: random.Random, pronoun: str) -> str:
-    """A verb phrase of the action, filled; verbs in angle brackets. After a pace it ends in `and` (`with_adverb`)."""
+    """Draw and fill a verb phrase, with verbs in angle brackets; after a pace it ends in `and` (`with_adverb`)."""
     words = grammar().actions[facts.action]
     manners = words.manners.get(facts.style, ())
     values = fields(facts, rng, pronoun)
@@ -151,7 +151,7 @@ def _repeated(facts: Facts, rng: random.Random) -> str:
 
 
 def with_adverb(phrase: str, after: str) -> str:
-    """Phrase and adverb: `walks slowly and` takes `sadly`, or loses its `and`."""
+    """Append an adverb to a phrase: `walks slowly and` gets `sadly`, or loses its `and`."""
     return f"{phrase} {after}".strip() if after else phrase.removesuffix(" and")
 
 

@@ -1,4 +1,4 @@
-"""Stage 1 of preparing data: a set of BVH files with its `dataset.toml` and `index.csv`, to a joints pack."""
+"""Stage 1 of data preparation: convert BVH files with `dataset.toml` and `index.csv` to a joints pack."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from marey.data.retarget import FPS, read_source, retarget
 from marey.motion.io.bvh import parse_bvh
 
 Progress = Callable[[int, int | None], None]
-"""Called with how many files are done, and how many there are, when that is known."""
+"""Called with the number of finished files and the total, or None if unknown."""
 LEAST_FRAMES = 4
 
 
 @dataclass(frozen=True)
 class CaptureSet:
-    """A set of captures that is described: where it is, what it is, and what each clip shows."""
+    """A set of captures: its path, its description, and the content of each clip."""
 
     path: Path
     dataset: Dataset
@@ -39,11 +39,10 @@ class CaptureSet:
 
     @classmethod
     def known(cls, name: str, path: Path) -> CaptureSet:
-        """A known set, in an archive or folder; its index with the captions beside it is the one described here, or the
-        folder's own.
+        """Open a known set in an archive or folder, with the packaged index and captions, or those of the folder.
 
         Raises:
-            NotFound, InvalidFile: no such set, or no index; a broken caption file.
+            NotFound, InvalidFile: the set is unknown, its index is missing, or a caption file is broken.
         """
         dataset = known_set(name)
         own = SETS / name / INDEX
@@ -54,13 +53,13 @@ class CaptureSet:
         return cls(path, dataset, rows, read_caption_files(path, rows))
 
     def captions_of(self, row: Row) -> tuple[tuple[str, ...], ...]:
-        """Captions of a row by each author; those of the index come first, as one author's."""
+        """Captions of a row by each author; those of the index come first and count as one author."""
         authors = (row.captions, *(file.captions.get(row.id, ()) for file in self.caption_files))
         return tuple(said for said in authors if said)
 
     @classmethod
     def own(cls, folder: Path) -> CaptureSet:
-        """A folder with its own `dataset.toml`, `index.csv` and, where there are any, `captions-*.csv`.
+        """Open a folder with its own `dataset.toml`, `index.csv` and optional `captions-*.csv`.
 
         Raises:
             NotFound, InvalidFile: one of them is missing or broken.
@@ -80,12 +79,12 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
     """Retarget every clip of a set.
 
     Args:
-        captures: what to read.
-        processes: how many retarget at once.
+        captures: the set to read.
+        processes: number of worker processes.
         progress: called for each file.
 
     Raises:
-        NotFound, InvalidFile, TooLarge: what is wrong with the source, with the file's name.
+        NotFound, InvalidFile, TooLarge: the source cannot be read; the message names the file.
         InvalidInput: no clip is left.
     """
     dataset, rows, left_out = captures.dataset, defaultdict[str, list[Row]](list), dict[str, str]()
@@ -145,7 +144,7 @@ def _clip(row: Row, captures: CaptureSet) -> PackClip:
 
 
 def _segment(joints: NDArray[np.float32], row: Row, fps: float) -> NDArray[np.float32]:
-    """The frames of a row, on the floor of the whole take."""
+    """Select the frames of a row; the floor is that of the whole take."""
     first = 0 if row.start is None else round(row.start * FPS / fps)
     last = len(joints) if row.end is None else round((row.end - 1) * FPS / fps) + 1
     return joints[first:last]
@@ -154,7 +153,7 @@ def _segment(joints: NDArray[np.float32], row: Row, fps: float) -> NDArray[np.fl
 def _retarget_all(
     files: Iterable[tuple[str, bytes]], dataset: Dataset, processes: int
 ) -> Iterator[tuple[str, NDArray[np.float32]]]:
-    """Retarget in worker processes, a bounded number of files in flight (an archive unpacks to 548 MB)."""
+    """Retarget in worker processes, with a bounded number of files in memory (an archive unpacks to 548 MB)."""
     files = iter(files)
     if processes <= 1:
         yield from (retarget_file(name, data, dataset) for name, data in files)
@@ -167,7 +166,7 @@ def _retarget_all(
 
 
 def retarget_file(name: str, data: bytes, dataset: Dataset) -> tuple[str, NDArray[np.float32]]:
-    """Name and joints (T, 22, 3) of a BVH file of a set, on its floor."""
+    """Retarget a BVH file of a set; return its name and joints (T, 22, 3) on the floor."""
     where = f"{name}.bvh"
     clip = parse_bvh(data, where=where, unit=dataset.unit, up=dataset.up)
     rig = dataset.rig_of(clip.skeleton.joint_names, where)

@@ -1,4 +1,4 @@
-"""Reader of prepared folders: memory-mapped, checked before use."""
+"""Reader of prepared folders: memory-mapped and checked before use."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from marey.motion.features import FeatureLayout, layout
 
 HINT = "Prepare the data again."
 MAX_LINE = 2**20
-"""Bytes of a clip's line, a hundred times what one takes."""
+"""Largest size of a clip's line in bytes, a hundred times the typical size."""
 
 
 @dataclass(frozen=True)
 class PreparedData:
-    """A prepared folder, open.
+    """An open prepared folder.
 
     Attributes:
         path: the folder.
@@ -50,15 +50,15 @@ class PreparedData:
 
     @classmethod
     def open(cls, path: Path | str, *, verify: bool = True) -> PreparedData:
-        """Open a folder that `marey data prepare` has written.
+        """Open a folder written by `marey data prepare`.
 
         Args:
             path: the folder.
             verify: compare each file with its sha256, and look for numbers that are not finite (about two seconds
-                per gigabyte); sizes, kinds and shapes are always compared.
+                per gigabyte); sizes, types and shapes are always checked.
 
         Raises:
-            NotFound: no such folder, or no manifest in it.
+            NotFound: the folder or its manifest does not exist.
             InvalidFile: another format, a missing, changed or truncated file, or clips that do not fit the arrays.
         """
         path = Path(path)
@@ -76,7 +76,7 @@ class PreparedData:
 
     @property
     def sha256(self) -> str:
-        """Hash of the manifest, which names every file's; fields that it does not have leave it as it was."""
+        """Hash of the manifest, which has the hash of every file; fields absent from the manifest do not change it."""
         return hashlib.sha256(self.manifest.model_dump_json(exclude_unset=True).encode()).hexdigest()
 
     @property
@@ -86,7 +86,7 @@ class PreparedData:
 
     @property
     def caption_counts(self) -> list[tuple[int, ...]]:
-        """How many captions each whole clip has by each author."""
+        """Number of captions by each author, for each clip."""
         return [clip.authors or (len(clip.captions),) for clip in self.clips]
 
     @cached_property
@@ -108,21 +108,21 @@ class PreparedData:
         return self.all_features[clip.start : clip.start + clip.length]
 
     def joints(self, clip: Clip) -> NDArray[np.float32]:
-        """(length + 1, 22, 3) metres of a clip, in the place that features are encoded in."""
+        """(length + 1, 22, 3) metres of a clip, in the canonical frame of its features."""
         rows = slice(clip.joints_start, clip.joints_start + clip.length + 1)
         return join(self._local[rows], self._roots[rows])
 
     def normalize(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Zero mean, unit deviation of each group."""
+        """Normalize features to zero mean and unit deviation per group."""
         return (features - self.mean) / self.std
 
 
 def read_manifest(path: Path) -> Manifest:
-    """The manifest of a folder.
+    """Read the manifest of a folder.
 
     Raises:
-        NotFound: no such folder or manifest.
-        InvalidFile: broken, or of another format.
+        NotFound: the folder or its manifest does not exist.
+        InvalidFile: it is broken or has another format.
     """
     file = path / names.MANIFEST
     try:
@@ -191,7 +191,7 @@ def _read_clips(path: Path) -> Iterable[Clip]:
 
 
 def _check_clips(clips: tuple[Clip, ...], manifest: Manifest, path: Path) -> None:
-    """Each clip lies within the arrays, behind the one before it, and so do its actions."""
+    """Check that clips fill the arrays one after the other, and that seams lie within their clips."""
     if len(clips) != manifest.clips:
         raise InvalidFile(f"holds {len(clips)} clips, the manifest says {manifest.clips}", where=str(path))
     frame, row = 0, 0

@@ -1,7 +1,7 @@
 """Compute the limits of `marey.quality` from real motions: `python -m marey.data.quality_limits PREPARED`.
 
-The limit of a measure is a quantile of the captured clips of a support, not mirrored or spliced: the lowest from the
-99th percentile on at which 98 % of all clips have no flag at all. Floating is limited by the flight of the actions.
+The limit of a measure is a quantile of the captured clips (not mirrored or spliced) of a support: the lowest from the
+99th percentile on at which 98 % of all clips have no flag. Floating is limited by the flight time of the actions.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from marey.vocabulary.entries import Support, load_vocabulary
 PASSING = 0.98
 QUANTILES = (*np.arange(0.990, 0.9995, 0.001).round(4).tolist(), 1.0)
 LEAST = {"penetration_mm": 30.0}
-"""Limits below which none is set: the floor of prepared clips is put under their lowest joint."""
+"""Lower bounds of limits: the floor of prepared clips is fitted to their lowest joint."""
 ENOUGH = 100
-"""Clips of a support from which it has limits of its own; others have those of all clips."""
+"""Number of clips from which a support has its own limits; others use those of all clips."""
 RAISED = re.compile(r"uneven|\bframe\b|\bbar\b|\bhigh (stool|seat|hold)|on top|climbs down|drops to the floor")
-"""Captions of clips that stand or sit on something over the floor, whatever their action says."""
+"""Pattern of captions whose clips stand or sit on an object above the floor, regardless of the action."""
 TILTED = ("07_", "08_")
-"""CMU subjects whose captured floor tilts: their feet end 8 cm and more over it. They are counted apart."""
+"""CMU subjects whose captured floor tilts: their feet end 8 cm or more above it. They are counted separately."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Real:
 
     @property
     def floats(self) -> bool:
-        """True if it leaves the floor for longer than its actions say."""
+        """Return True if the body is off the floor for longer than its actions allow."""
         return self.measures.float_s > self.expected.flight_s and not OFF_FLOOR & set(self.expected.supports)
 
     def within(self, table: Mapping[Support, Mapping[str, float]]) -> bool:
-        """Return True if no measure is beyond the limits."""
+        """Return True if no measure exceeds its limit."""
         beyond = any(
             getattr(self.measures, name) > max(table[support][name] for support in self.expected.supports)
             for name in LIMITED
@@ -57,7 +57,7 @@ class Real:
 
 
 def read_real(data: PreparedData) -> list[Real]:
-    """Measure the captured clips whose actions the vocabulary has."""
+    """Measure the captured clips whose actions are in the vocabulary."""
     found = [(clip, _expected(clip)) for clip in data.clips if clip.captured]
     return [
         Real(clip.id, expected, measure(data.joints(clip), data.manifest.fps))

@@ -1,9 +1,9 @@
 """Retarget a foreign rig to the 22 joints of HumanML3D at 20 frames per second, with uniform proportions.
 
-The bones of the trunk and arms keep their directions and take the target's lengths, as HumanML3D does (Guo et al. 2022,
-uniform skeleton). Legs are solved from the ground up, because a copied direction on another leg length slides: the toe
-goes exactly where the source's toe goes, scaled by leg length; the ankle follows by the target's foot; the hip is the
-source's hip, scaled; the knee is found by the cosine rule in the plane of the source's knee.
+Trunk and arm bones keep their directions and get the target's lengths, as in HumanML3D (Guo et al. 2022, uniform
+skeleton). Legs are solved from the toes up, because feet slide if directions are copied to other leg lengths: the toe
+has the source's position, scaled by leg length; the ankle follows from the target's foot; the hip has the source's
+position, scaled; the knee is found by the cosine rule in the plane of the source's knee.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _REST: Array = HUMANML3D.offsets.astype(np.float64)
 _LENGTH: Array = np.linalg.norm(_REST, axis=1)
 _LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 _ARMS = ((13, 16, 18, 20), (14, 17, 19, 21))
-_KNEE_PRIOR = 0.03  # metres of "forward" added to the source's knee direction: decides for a stretched leg only
-_SAME_WIDTH = 0.03  # metres: half hips of people differ by so much
+_KNEE_PRIOR = 0.03  # metres of "forward" added to the source's knee direction; matters only for a stretched leg
+_SAME_WIDTH = 0.03  # metres; smaller differences in half the hip width are ignored
 _SWAY = 0.25  # seconds
 _MAX_REACH = 0.9995  # a fully stretched leg has no knee plane
 
@@ -54,9 +54,9 @@ class SourceMotion:
 
 
 def read_source(clip: BvhClip, rig: Rig, *, where: str, unit: Unit = "cm") -> SourceMotion:
-    """Take what retargeting needs from a clip: the rig's points, resampled to 20 fps.
+    """Read the rig's points from a clip, resampled to 20 fps.
 
-    `marey.motion.io.bvh` has left out a T-pose first frame already.
+    `marey.motion.io.bvh` has already removed a first frame in T-pose.
 
     Raises:
         InvalidFile: a joint of the rig is missing, or fewer than four frames are left.
@@ -87,7 +87,7 @@ def read_source(clip: BvhClip, rig: Rig, *, where: str, unit: Unit = "cm") -> So
 
 
 def _offsets(clip: BvhClip, rig: Rig, index: list[int], where: str, unit: float) -> Array:
-    """(22, 3) metres of the rig's points from their joints."""
+    """Offsets (22, 3) of the rig's points from their joints, metres."""
     out = np.zeros((len(index), 3))
     for k, (point, j) in enumerate(zip(rig.points, index, strict=True)):
         out[k] = np.array(point.offset) * unit
@@ -99,8 +99,8 @@ def _offsets(clip: BvhClip, rig: Rig, index: list[int], where: str, unit: float)
 
 
 def _flat_feet(clip: BvhClip, rig: Rig, index: list[int], offsets: Array) -> tuple[Array, float]:
-    """Directions (2, 3) to the body's left in the frames of both ankles, and the pitch of the foot's bone, of a flat
-    foot: as the rig says, or as the rest pose shows."""
+    """Direction to the body's left in the frame of each ankle (2, 3), and the pitch of the foot bone in degrees, while
+    the foot is flat: from the rig, or from the rest pose."""
     places = clip.skeleton.rest[index] + offsets
     up = np.array(rig.rest_up)
     bones = normalize(places[[9, 13]] - places[[8, 12]])
@@ -113,10 +113,10 @@ def _flat_feet(clip: BvhClip, rig: Rig, index: list[int], offsets: Array) -> tup
 
 
 def resample_points(points: Array, fps: float, target: float) -> Array:
-    """Points (T, ..., 3) at another frame rate by Catmull-Rom splines; whole ratios pick frames and change nothing.
+    """Resample points (T, ..., 3) to another frame rate by Catmull-Rom splines; integer ratios select frames unchanged.
 
-    A straight line between two poses of a punch is 7 mm off at 30 fps; the spline is third order. Bones are brought
-    back to their length by retargeting.
+    Linear interpolation of a punch has an error of 7 mm at 30 fps; the spline is third order. Retargeting restores the
+    bone lengths.
     """
     count = int(np.floor((len(points) - 1) * target / fps + 1e-6)) + 1
     time = np.arange(count) * (fps / target)
@@ -130,8 +130,8 @@ def resample_points(points: Array, fps: float, target: float) -> Array:
 
 
 def retarget(source: SourceMotion, rig: Rig, *, unit: Unit = "cm") -> Array:
-    """Joints (T, 22, 3) of HumanML3D in metres: bones of exactly its lengths, at the height that the file has, facing
-    +Z in frame 0 over the origin. The floor is found by `floor.on_floor`."""
+    """Retarget to joints (T, 22, 3) of HumanML3D in metres, with exactly its bone lengths and the heights of the file,
+    facing +Z over the origin in frame 0. `floor.on_floor` finds the floor."""
     s = source.joints
     pelvis, spine = s[:, 0], s[:, 1]
     legs, arms = (s[:, 6:10], s[:, 10:14]), (s[:, 14:18], s[:, 18:22])
@@ -168,8 +168,8 @@ def retarget(source: SourceMotion, rig: Rig, *, unit: Unit = "cm") -> Array:
 
 
 def leg_scale(legs: tuple[Array, Array], sole_pitch: float, *, whole: bool) -> float:
-    """Length of the target's legs over the source's, from hip to ankle, or the `whole` from hip to the toe of a flat
-    foot: the feet of some bodies are a third of the leg."""
+    """Ratio of the target's leg length to the source's, from hip to ankle; `whole`: from hip to the toe of a flat foot,
+    because the feet of some bodies are a third of the leg."""
     lengths = np.mean([_bone(leg, 0, 1) + _bone(leg, 1, 2) for leg in legs])
     if not whole:
         return float((_LENGTH[4] + _LENGTH[7]) / lengths)
@@ -178,8 +178,8 @@ def leg_scale(legs: tuple[Array, Array], sole_pitch: float, *, whole: bool) -> f
 
 
 def _standing_axes(hips: Array, legs: tuple[Array, Array], *, turned: bool) -> tuple[Array, Array, Array]:
-    """Where knees point, where hips move on the target's feet (both (T, 3)), and what is up for them: of the body
-    where its orientation is known, as in one that lies; else of the floor."""
+    """Forward for the knees, forward for the shift of the hips, and up, (T, 3) each: axes of the body if its
+    orientation is known, which matters for a lying body; otherwise of the floor."""
     if turned:
         return hips[..., 2], hips[..., 2], hips[..., 1]
     across = legs[0][:, 0] - legs[1][:, 0]
@@ -188,9 +188,9 @@ def _standing_axes(hips: Array, legs: tuple[Array, Array], *, turned: bool) -> t
 
 
 def _narrower(legs: tuple[Array, Array], hips: Array, scale: float) -> Array:
-    """(T, 3) by which the right foot moves to the left, and the left one to the right, on hips that are narrower than
-    the source's: without it bodies with short legs stand with their legs apart. It follows the hips slowly, so that
-    standing feet do not slide with every sway; hips of much the same width move nothing."""
+    """Shift (T, 3) of the right foot to the left for hips narrower than the source's; the left foot moves by its
+    negative. Without it, bodies with short legs stand with their legs apart. The shift is smoothed, so that standing
+    feet do not slide with every sway, and zero if the hip widths are nearly equal."""
     wider = scale * float(np.linalg.norm(legs[0][:, 0] - legs[1][:, 0], axis=-1).mean()) / 2 - _REST[1, 0]
     if abs(wider) < _SAME_WIDTH:
         return np.zeros((len(hips), 3))
@@ -199,7 +199,7 @@ def _narrower(legs: tuple[Array, Array], hips: Array, scale: float) -> Array:
 
 def _turn_trunk(out: Array, trunk: Array) -> None:
     """Place trunk and shoulders by the rotations of the source's joints."""
-    parts = {3: 0, 6: 1, 9: 2, 12: 3, 13: 3, 14: 3, 15: 4, 16: 5, 17: 6}  # joint: what turns the bone to it
+    parts = {3: 0, 6: 1, 9: 2, 12: 3, 13: 3, 14: 3, 15: 4, 16: 5, 17: 6}  # joint: rotation of its bone
     for joint, turn in parts.items():
         out[:, joint] = out[:, HUMANML3D.parents[joint]] + _turn(trunk[:, turn], _REST[joint])
 
@@ -225,7 +225,7 @@ def _bone(limb: Array, a: int, b: int) -> float:
 
 
 def _frame(up: Array, left: Array) -> Array:
-    """Rotation matrices (T, 3, 3) with columns left, up, forward; `up` is kept, `left` squared to it."""
+    """Rotation matrices (T, 3, 3) with columns left, up, forward; `up` is kept, `left` is made perpendicular to it."""
     y = normalize(up)
     z = normalize(cross(left, y))
     return np.stack([cross(y, z), y, z], axis=-1)
@@ -236,32 +236,32 @@ def _turn(frames: Array, vector: Array) -> Array:
 
 
 def _sole(leg: Array, lateral: Array, sole_pitch: float) -> Array:
-    """Frames (T, 3, 3) of a foot: identity turned by its heading while the sole is flat on the floor."""
+    """Rotation matrices (T, 3, 3) of a foot: only its heading while the sole is flat on the floor."""
     bone = normalize(leg[:, 3] - leg[:, 2])
     x = normalize(lateral - bone * np.einsum("ti,ti->t", lateral, bone)[:, None])
-    up = cross(bone, x)  # square to the bone, in the foot's plane
+    up = cross(bone, x)  # perpendicular to the bone, in the foot's plane
     pitch = np.radians(sole_pitch)
     z = np.cos(pitch) * bone + np.sin(pitch) * up
     return np.stack([x, cross(z, x), z], axis=-1)
 
 
 def _ankle_shift(legs: tuple[Array, Array], sole_pitch: float, scale: float) -> tuple[float, float]:
-    """Difference of the ankles' position over the flat toe between target and source, forward and up: hips follow
-    it."""
+    """Difference in ankle position relative to a flat toe between target and source, forward and up, metres; the hips
+    are shifted by it."""
     bone = scale * np.mean([_bone(leg, 2, 3) for leg in legs])
     pitch = np.radians(sole_pitch)
     return float(bone * np.cos(pitch) - _REST[10, 2]), float(-_REST[10, 1] - bone * np.sin(pitch))
 
 
 def _knee_pole(leg: Array, forward: Array) -> Array:
-    """(T, 3) where the source's knee points, off the line from hip to ankle, with a little forward added."""
+    """Direction (T, 3) from the line between hip and ankle to the source's knee, with a little forward added."""
     axis = normalize(leg[:, 2] - leg[:, 0])
     bend = leg[:, 1] - leg[:, 0]
     return bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None] + _KNEE_PRIOR * forward
 
 
 def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float]) -> tuple[Array, Array]:
-    """Knee (T, 3) by the cosine rule, bent towards `pole`, and the ankle (T, 3), pulled in where it is out of reach."""
+    """Solve the knee (T, 3) by the cosine rule, bent towards `pole`; move the ankle (T, 3) into reach if needed."""
     upper, lower = lengths
     line = ankle - hip
     distance = np.linalg.norm(line, axis=-1, keepdims=True)
@@ -274,7 +274,7 @@ def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float
 
 
 def canonical(joints: Array) -> Array:
-    """The same motion facing +Z in frame 0, its root over the origin (heights are kept)."""
+    """Rotate and move a motion (T, 22, 3) to face +Z over the origin in frame 0; heights are kept."""
     across = joints[0, 1] - joints[0, 2] + joints[0, 16] - joints[0, 17]
     forward = np.cross(across, _UP)
     heading = np.arctan2(forward[0], forward[2])

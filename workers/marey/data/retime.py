@@ -1,4 +1,4 @@
-"""One action, longer or shorter than it was captured."""
+"""Lengthen or shorten a single action."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ LIMIT = MAX_FRAMES + 1  # poses
 _LEAST_STEPS = 15
 _WORST_STEP = WORST_SEAM / 4
 Made = tuple[Array, tuple[Part, ...], int]
-"""Joints (T, 22, 3), the clips they are from, and how often the action is done."""
+"""Joints (T, 22, 3), source clips, and number of repetitions of the action."""
 
 
 def crop(part: Part, target: int, rng: random.Random) -> Made:
-    """A random crop of `target` poses; the whole clip if it is shorter."""
+    """Take a random crop of `target` poses, or the whole clip if it is shorter."""
     length = min(target, len(part.joints))
     first = rng.randint(0, len(part.joints) - length)
     return part.joints[first : first + length].astype(np.float64), (part,), 1
 
 
 def loop(part: Part, target: int) -> Made | None:
-    """A gait that goes on: jump back to the frame that fits best, as often as it takes."""
+    """Loop a gait: repeatedly jump back to the best matching frame."""
     frames = len(part.joints)
     half = max(frames // 2, 8)
     i, j, cost = best_cut(part, range(max(half, frames - 30), frames), part, range(min(half, 30)))
@@ -42,7 +42,7 @@ def loop(part: Part, target: int) -> Made | None:
 
 
 def stretch(part: Part, target: int, rng: random.Random, *, repeat_share: float = 0.35) -> Made | None:
-    """A gesture at another length: held or waved longer or shorter, done again, or with more standing around it."""
+    """Change the length of a gesture: hold or wave for longer or shorter, repeat it, or stand for longer around it."""
     a, b = core(part)
     whole = part.joints.astype(np.float64)
     last = len(whole) - 1
@@ -62,7 +62,7 @@ def stretch(part: Part, target: int, rng: random.Random, *, repeat_share: float 
     joints = whole[: y + 1]
     if part.facts.action == "raise" and target > len(whole):
         return held_longer(whole, x, y, target - len(whole)), (part,) * 2, 1
-    if target < len(whole):  # skip a piece of the hold
+    if target < len(whole):  # skip part of the hold
         third = max((y - x) // 3, 1)
         leave, enter = range(max(x, 1), x + third + 1), range(max(x, y - third), min(y + 1, last))
         i, j, cost = best_cut(part, leave, part, enter)
@@ -80,10 +80,10 @@ def stretch(part: Part, target: int, rng: random.Random, *, repeat_share: float 
 
 
 def held_longer(joints: Array, first: int, last: int, more: int) -> Array:
-    """Slow down the frames first..last of (T, 22, 3) so that they take `more` frames longer; gives (T + more, 22, 3).
+    """Slow down the frames first..last of (T, 22, 3) by `more` frames; return (T + more, 22, 3).
 
-    Loops of a held hand would swing it to and fro, which is a wave. Time runs at its own speed at both ends and slows
-    down within some frames, so that the rise before and the fall after are as captured.
+    Looping a held hand would move it back and forth like a wave. Time runs at normal speed at both ends and slows down
+    over a few frames, so that the rise before and the fall after are as captured.
     """
     steps = last - first + more
     ends = np.minimum(np.arange(steps), np.arange(steps)[::-1])
@@ -97,16 +97,16 @@ def held_longer(joints: Array, first: int, last: int, more: int) -> Array:
 
 
 def on_a_way(turn: Part, walk: Part, target: int, before: float) -> Made | None:
-    """A turn in the middle of a longer walk.
+    """Put a turn into a longer walk.
 
     Args:
         turn: the captured turn.
-        walk: a straight walk in the same style; it is looped where it is too short.
+        walk: a straight walk in the same style; it is looped if too short.
         target: poses of the result, LIMIT at most.
         before: share of the added poses that lie before the turn, 0 to 1.
 
     Returns:
-        None where the seams cost too much or there is no room for more steps.
+        None if the seams cost too much or there is no room for more steps.
     """
     first, last = core(turn)
     room = target - len(turn.joints)
@@ -132,7 +132,7 @@ def on_a_way(turn: Part, walk: Part, target: int, before: float) -> Made | None:
 
 
 def _way(walk: Part, frames: int) -> Part | None:
-    """A walk of so many poses, or one that is longer already."""
+    """Loop a walk to `frames` poses; return a longer walk unchanged."""
     if len(walk.joints) >= frames:
         return walk
     made = loop(walk, frames)

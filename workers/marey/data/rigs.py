@@ -1,4 +1,4 @@
-"""Rigs as data: all that retargeting needs to know of a rig, as a `[[rig]]` table of `dataset.toml` says it."""
+"""Rigs as data: everything that retargeting needs about a rig, from a `[[rig]]` table of `dataset.toml`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Vector = tuple[float, float, float]
 
 
 class Point(BaseModel):
-    """A point of the rig: a joint, the End Site behind it (`Foot_L:end`), or a place fixed in the joint's frame.
+    """A point of the rig: a joint, its End Site (`Foot_L:end`), or a point fixed in the joint's frame.
 
     Attributes:
         joint: name of the joint.
-        end: take its End Site.
+        end: use its End Site.
         offset: from the joint, in the joint's frame and in the file's unit.
     """
 
@@ -42,19 +42,18 @@ class Rig(BaseModel):
 
     Attributes:
         name: short name.
-        pelvis, spine: the joint that carries the hips, and the first spine joint over it.
-        middle: the spine joint under the chest; with `spine` or `chest` again where there is none between.
+        pelvis, spine: the joint that carries the hips, and the first spine joint above it.
+        middle: the spine joint below the chest; repeat `spine` or `chest` if there is none between them.
         chest, neck, head: the joint that carries the arms, and those above it.
         left_leg, right_leg: hip, knee, ankle, toe.
-        left_arm, right_arm: clavicle, shoulder, elbow, wrist; the chest again where there is no clavicle.
-        trunk: `rotations`: each part of the trunk turns as its joint turns away from the rest pose, in which the body
-            stands upright; `positions`: it points where the joints' positions point, for a rig whose rest pose is
-            something else.
+        left_arm, right_arm: clavicle, shoulder, elbow, wrist; repeat the chest if there is no clavicle.
+        trunk: `rotations`: trunk orientations come from joint rotations relative to the rest pose, in which the body
+            stands upright; `positions`: they come from joint positions, for a rig with another rest pose.
         rest_left, rest_up: axes of the rest pose (all rotations zero) that point to the body's left and up.
         left_foot, right_foot: direction in the ankle's frame that points to the body's left while the foot is flat.
-        sole_pitch: degrees by which the line from ankle to toe points down while the sole is flat on the floor. Where
-            these three are not given, feet are flat in the rest pose.
-        toe_height: of the toe joint over the file's floor while it stands, in the file's unit.
+        sole_pitch: degrees by which the line from ankle to toe points down while the sole is flat on the floor. Without
+            these three, feet are flat in the rest pose.
+        toe_height: height of the toe joint above the floor while it stands, in the file's unit.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -86,7 +85,7 @@ class Rig(BaseModel):
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
-        """All points that are read: trunk, then left leg, right leg, left arm, right arm."""
+        """All points to read: trunk, then left leg, right leg, left arm, right arm."""
         trunk = (self.pelvis, self.spine, self.middle, self.chest, self.neck, self.head)
         return (*trunk, *self.left_leg, *self.right_leg, *self.left_arm, *self.right_arm)
 
@@ -97,10 +96,10 @@ class Rig(BaseModel):
 
     @property
     def turning(self) -> tuple[str, ...]:
-        """Joints whose rotations turn the trunk: pelvis, three of the spine, neck, clavicles."""
+        """Joints whose rotations orient the trunk: pelvis, three spine joints, neck, clavicles."""
         clavicles = (self.left_arm[0], self.right_arm[0])
         return tuple(p.joint for p in (self.pelvis, self.spine, self.middle, self.chest, self.neck, *clavicles))
 
     def fits(self, names: frozenset[str]) -> bool:
-        """Return True if a skeleton with joints of these names is of this rig."""
+        """Return True if a skeleton with these joint names has this rig."""
         return names.issuperset(self.joint_names)

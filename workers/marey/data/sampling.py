@@ -12,22 +12,22 @@ from marey.data.manifest import Clip
 from marey.data.splits import actions_of
 
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
-"""Share of the draws that are sequences of two and of three actions; clips of one action have the rest."""
+"""Shares of the draws for sequences of two and three actions; the rest goes to clips of one action."""
 
 ACT_WEIGHT = {"walk": 3.0, "walk_back": 2.5, "bow": 2.0, "turn": 1.5}
-"""How much more often clips of an action are drawn. A gait is harder to learn than a raised hand (the steps
-must follow each other, and the feet stand), and there are 14 bows and 14 ways backward."""
+"""Factors by which clips of an action are drawn more often. A gait is harder to learn than a raised hand (steps must
+alternate, and feet must not slide), and there are only 14 bows and 14 walks backward."""
 
 
 def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     """Probability of each clip (N,), summing to 1.
 
-    The training split has 1,064 raised hands and one kick. Clips of one action weigh count^-0.5 of their class,
-    shared out within the class by count^-0.5 of the style: a class with 100 times fewer clips is drawn 10 times
-    more rarely, not 100 times; some actions count more (`ACT_WEIGHT`). A class is an action, whatever data set its
-    clips come from; a clip whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences
-    have a fixed share (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights. Made clips are at
-    most half of what is drawn of a class.
+    The training split has 1,064 raised hands and one kick. Clips of one action have the weight count^-0.5 of their
+    class, distributed within the class by count^-0.5 of the style: a class with 100 times fewer clips is drawn 10 times
+    less often, not 100 times; some actions count more (`ACT_WEIGHT`). A class is an action in all data sets; a clip
+    whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences have a fixed share
+    (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights. Made clips are at most half of the
+    draws of a class.
     """
     weights = np.zeros(len(clips))
     single = [k for k, clip in enumerate(clips) if len(clip.acts) == 1]
@@ -64,7 +64,7 @@ def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
 
 
 def _made_halved(shares: Mapping[int, float], clips: Sequence[Clip]) -> Mapping[int, float]:
-    """Shares of the clips of a class, with at most half of their sum for made ones where there are captured ones."""
+    """Limit made clips to half of the shares of a class that also has captured clips."""
     made = sum(share for k, share in shares.items() if clips[k].made)
     captured = sum(shares.values()) - made
     if not captured or made <= captured:
@@ -74,14 +74,14 @@ def _made_halved(shares: Mapping[int, float], clips: Sequence[Clip]) -> Mapping[
 
 
 def draw_captions(authors: NDArray[np.int64], draws: NDArray[np.floating]) -> NDArray[np.int64]:
-    """A caption of each clip, every author alike, and every caption of an author alike.
+    """Draw a caption of each clip, uniformly over authors, then over the captions of an author.
 
     Args:
         authors: (B, A) captions of each author, in their order, 0 beyond the last; each row has at least one.
         draws: (B,) random numbers in 0 … 1.
 
     Returns:
-        (B,) its number among all captions of the clip.
+        (B,) index among all captions of the clip.
     """
     scaled = draws * (authors > 0).sum(axis=1)
     author = np.floor(scaled).astype(np.int64)
@@ -100,6 +100,6 @@ def author_table(counts: Iterable[Sequence[int]]) -> NDArray[np.int64]:
 
 
 def classes_of(clip: Clip) -> tuple[str, ...]:
-    """Classes of a clip that is no sequence: the actions of its label; the kind alone where that is free text, as in
+    """Classes of a clip of one action: the actions of its label, or only its kind if the label has free text, as in
     `dance - ballet, pirouette`."""
     return actions_of(clip.content.split(" - ")[0]) or (clip.content,)

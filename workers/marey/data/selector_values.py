@@ -1,7 +1,7 @@
 """Compute the values of real clips by the selector: `python -m marey.data.selector_values PREPARED`.
 
-A motion's percentile among real clips of its action is read from the quantiles that this writes. Clips count that are
-captured as they are (not mirrored, spliced or of another speed) and show one action; of those with enough of them.
+A motion's percentile among real clips of its action is read from the quantiles in this file. Only unchanged captures
+(not mirrored, spliced or retimed) of one action count, for actions with enough of them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from marey.selector.motion import SHORTEST
 from marey.selector.records import FILE, PERCENT
 
 ENOUGH = 10
-"""Clips of an action from which it has quantiles."""
+"""Number of clips from which an action has quantiles."""
 PASSING = 0.75
-"""Share of them that shows the action by its rule; with a smaller one the rule is too strict for a percentile."""
+"""Least share of them that passes the rule of the action; below it, the rule is too strict for a percentile."""
 
 
 def read_values(data: PreparedData) -> dict[str, list[float]]:

@@ -9,13 +9,13 @@ from marey.motion.rotations import cross, normalize
 
 Array = NDArray[np.floating]
 
-# Walks and dances reach 3,450 m/s^3, punches and blows of a sword 9,800; a joint that jumps by 42 cm for one frame
+# Walks and dances reach 3,450 m/s^3, punches and sword strokes 9,800; a joint that jumps by 42 cm for one frame
 # reaches the limit. Deep squats fold a foot by 148 degrees on some rigs, broken captures by 155 to 177.
 LARGEST_JERK = 10_000.0
 LARGEST_FOOT_FOLD = 150.0
 LEAST_KNEE = -15.0
 FOLDED_KNEE = -160.0
-"""Below it a knee is bent to 180 degrees and a little further, as squats are on some rigs, and not backward."""
+"""Below this angle a knee is bent slightly beyond 180 degrees, as in squats on some rigs, not backward."""
 _LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 
 

@@ -1,9 +1,9 @@
 """Join real clips with inertialized transitions (Bollo 2018, "Inertialization", GDC: the difference of pose and
 velocity at the seam is added to the second clip and decays by a quintic).
 
-The second clip is turned to the heading of the first and put so that a standing foot stays where it stands. Root, toes,
-foot directions and bone directions are inertialized apart; bones keep their length, and knees are solved between hip
-and ankle, so that a standing foot does not slide under a body that slows down or sets off.
+The second clip is rotated to the heading of the first and moved so that a standing foot stays in place. Root, toes,
+foot directions and bone directions are inertialized separately; bones keep their length, and knees are solved between
+hip and ankle, so that a standing foot does not slide while the body slows down or starts to move.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ _PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
 _LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
 _LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 _LEG_JOINTS = {4, 5, 7, 8, 10, 11}
-_DIRECTED = tuple(j for j in range(1, 22) if j not in _LEG_JOINTS)  # in order: parents come first
-_STAND_SPEED = 0.35  # metres a second under which a low toe stands
+_DIRECTED = tuple(j for j in range(1, 22) if j not in _LEG_JOINTS)  # in order, parents first
+_STAND_SPEED = 0.35  # metres a second; a low toe that is slower stands
 _STAND_HEIGHT = 0.05
-_STEP_FROM = 0.015  # metres by which a standing foot may be displaced without lifting it
+_STEP_FROM = 0.015  # metres; a standing foot displaced by less is not lifted
 
 
 def quintic(offset: Array, velocity: Array, frames: int) -> Array:
-    """Decay of an offset (...,) with initial velocity a frame to nothing: (frames, ...) at 1, 2, …, `frames`.
+    """Decay of an offset (...,) with an initial velocity per frame to zero: (frames, ...) at 1, 2, …, `frames`.
 
     x(0) and x'(0) are given, x''(0) = 0, and x, x', x'' vanish at the end.
     """
@@ -41,7 +41,7 @@ def quintic(offset: Array, velocity: Array, frames: int) -> Array:
 
 
 def place_after(first: Array, second: Array, fps: float) -> Array:
-    """The second clip (T, 22, 3), turned and moved over the floor to go on where the first one ends."""
+    """Rotate and move the second clip (T, 22, 3) over the floor so that it continues the first."""
     turn = np.radians(heading(first[-8:], fps)[-1] - heading(second[:8], fps)[0])
     c, s = np.cos(turn), np.sin(turn)
     turned = second @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
@@ -52,13 +52,13 @@ def place_after(first: Array, second: Array, fps: float) -> Array:
 
 
 def _stands(points: Array, fps: float) -> bool:
-    """Return True if a toe (n >= 2, 3) stands at the seam."""
+    """Return True if a toe (n >= 2, 3) is standing at the seam."""
     speed = np.linalg.norm(points[1] - points[0]) * fps
     return bool(speed < _STAND_SPEED and points[:, 1].min() < _STAND_HEIGHT)
 
 
 def _shared_foot(first: Array, second: Array, fps: float) -> int | None:
-    """Toe joint that stands on both sides of the seam; the slower one of two, None when there is none."""
+    """Toe joint that stands on both sides of the seam (the slower one of two), or None."""
     best, least = None, np.inf
     for _, _, _, toe in _LEGS:
         if _stands(first[-2:, toe], fps) and _stands(second[:2, toe], fps):
@@ -69,9 +69,9 @@ def _shared_foot(first: Array, second: Array, fps: float) -> int | None:
 
 
 def join_clips(first: Array, second: Array, fps: float) -> Array:
-    """One motion of two: all of the first (T1, 22, 3), then the second but its first frame, (T1 + T2 - 1, 22, 3).
+    """Join two motions (T1, 22, 3) and (T2, 22, 3): the first, then the second without its first frame (T1 + T2 - 1).
 
-    Both need two frames at least; the second is placed by `place_after`.
+    Both need at least two frames; the second is placed by `place_after`.
     """
     first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
     second = place_after(first, second, fps)
@@ -86,7 +86,7 @@ def _blend(first: Array, second: Array, frames: int, fps: float) -> tuple[Array,
     target = second[1 : frames + 1]
 
     def decayed(a: Array, b: Array, seam: Array) -> Array:
-        """`a`: the last two frames of the first clip, `b`: the first two of the second, `seam`: what is added to."""
+        """Add the decaying offset between the last two frames `a` and the first two frames `b` to `seam`."""
         return seam + quintic(a[1] - b[0], (a[1] - a[0]) - (b[1] - b[0]), frames)
 
     ends = (first[-2:], second[:2])
@@ -100,16 +100,16 @@ def _blend(first: Array, second: Array, frames: int, fps: float) -> tuple[Array,
 
 
 def turned(first: Array, second: Array, target: Array) -> Array:
-    """Unit vectors (n, K, 3), inertialized as rotations: what turns those of the second clip into those of the first
-    at the seam, and how fast that changes, decays.
+    """Inertialize unit vectors (n, K, 3) as rotations: the rotation from the second clip to the first at the seam, and
+    its rate of change, decay to zero.
 
-    As vectors they could not be: where an arm swings by more than a right angle within the blend, its direction and the
-    decaying difference all but cancel, and the arm jumps (1 in 20 joins had more jerk than any capture).
+    Differences of vectors do not work: if an arm swings by more than a right angle within the blend, its direction and
+    the decaying difference nearly cancel, and the arm jumps (1 in 20 joins had more jerk than any capture).
 
     Args:
         first: (2, K, 3) the last two frames of the first clip.
         second: (2, K, 3) the first two of the second.
-        target: (n, K, 3) the second clip's from its second frame on.
+        target: (n, K, 3) the second clip, from its second frame on.
     """
     now = to_rotvec(between(second[0], first[1])).astype(np.float64)
     before = to_rotvec(between(normalize(2 * second[0] - second[1]), first[0]))
@@ -118,7 +118,7 @@ def turned(first: Array, second: Array, target: Array) -> Array:
 
 
 def _lift(before: Array, after: Array, frames: int, fps: float) -> Array:
-    """(n, 2) extra height of a foot that stands on both sides of the seam, but elsewhere: it makes a small step."""
+    """Extra height (n, 2) for a small step of a foot that stands on both sides of the seam, but in different places."""
     out = np.zeros((frames, 2))
     bump = np.sin(np.pi * np.arange(1, frames + 1) / (frames + 1)) ** 2
     for side, toe in enumerate((10, 11)):
@@ -134,7 +134,7 @@ def _directions(joints: Array) -> Array:
 
 
 def _poles(joints: Array) -> Array:
-    """(n, 2, 3) where the knees point: off the line from hip to ankle, a little of the body's forward added; unit."""
+    """Unit vectors (n, 2, 3) from the line between hip and ankle to the knee, with a little forward added."""
     left = joints[:, 1] - joints[:, 2]
     forward = normalize(cross(left, np.broadcast_to([0.0, 1.0, 0.0], left.shape)))
     out = []
@@ -163,7 +163,7 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
 
 
 def with_bones(joints: Array) -> Array:
-    """The same poses (T, 22, 3) with bones of the skeleton's lengths, the toes where they are."""
+    """Restore the skeleton's bone lengths in poses (T, 22, 3); the toes stay in place."""
     return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], _poles(joints))
 
 
@@ -171,9 +171,9 @@ def with_bones(joints: Array) -> Array:
 
 
 def seam_features(joints: Array, fps: float) -> Array:
-    """(T, K) description of each frame for finding seams: pose and velocities in the body's frame, in metres.
+    """Features (T, K) of each frame for finding seams: pose and velocities in the body's frame, in metres.
 
-    Feet weigh double, since a foot that is elsewhere must step; velocities count as what they cover in 0.15 s.
+    Feet have double weight, since a displaced foot must step; velocities count as the distance covered in 0.15 s.
     """
     angle = np.radians(heading(joints, fps))
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -191,6 +191,6 @@ def seam_features(joints: Array, fps: float) -> Array:
 
 
 def seam_costs(first: Array, second: Array) -> Array:
-    """(T1, T2) mean squared difference of seam features: how badly frame i of one goes over to frame j of the other."""
+    """Cost (T1, T2) of a seam between frame i of one clip and frame j of the other: mean squared feature difference."""
     squares = (first**2).sum(1)[:, None] + (second**2).sum(1)[None] - 2 * first @ second.T
     return np.maximum(squares, 0.0) / 22

@@ -1,4 +1,4 @@
-"""Splits by source, for clips whose index gives none: no source is ever in two of them."""
+"""Splits by source, for clips without a split in the index: no source is in two splits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TEST_SHARE = 0.12
 
 @dataclass(frozen=True)
 class Sourced:
-    """Source, actions and tier of a clip, of which splits are made."""
+    """Source, actions and tier of a clip, from which splits are made."""
 
     source: str
     actions: tuple[str, ...]
@@ -28,18 +28,18 @@ def actions_of(content: str) -> tuple[str, ...]:
 
 
 def held_out(sources: int) -> tuple[int, int]:
-    """How many sources of an action test and validation hold out: of 8 and more, two or 12 %; of 4 to 7, one; of
-    fewer, none. Validation has one of 12 and more."""
+    """Number of sources of an action to hold out for test and validation. Test: 2 or 12 % of 8 or more; 1 of 4 to 7;
+    otherwise none. Validation: 1 of 12 or more."""
     test = max(2, round(TEST_SHARE * sources)) if sources >= SEVERAL else int(sources >= FEWEST)
     return test, int(sources >= MANY)
 
 
 def splits_by_source(clips: Iterable[Sourced]) -> dict[str, str]:
-    """Split of each source.
+    """Assign a split to each source.
 
-    Actions are filled from the rarest; within one, sources come in the order of their hash, those without which a
-    rare action would be left without training clips last. Tiers are filled one after the other, so that the splits of
-    the commercial sources do not depend on what is added to them.
+    Actions are processed from the rarest; within an action, sources are ordered by hash, with sources of rare actions
+    last, because training needs them. Tiers are processed one after the other, so that the splits of the commercial
+    sources do not depend on further sources.
     """
     clips = list(clips)
     split: dict[str, str] = {}
@@ -57,7 +57,7 @@ def splits_by_source(clips: Iterable[Sourced]) -> dict[str, str]:
 
 
 def _hold_out(of_action: Mapping[str, set[str]], free: set[str], rare: set[str], split: dict[str, str]) -> None:
-    """Add what is held out of the free sources to `split`."""
+    """Add the held-out ones of the free sources to `split`."""
     for action in sorted(of_action, key=lambda name: (len(of_action[name]), name)):
         sources = of_action[action]
         for name, wanted in zip(("test", "val"), held_out(len(sources)), strict=True):

@@ -1,7 +1,7 @@
-"""Sequences of two and three actions from clips that have captions of their own.
+"""Sequences of two and three actions from clips with their own captions.
 
-Studios ask for "bow, then run"; captures hold one action each. Two clips of different actions are joined where their
-poses are near, and what is said of both is what their authors said of each, in order.
+Studios ask for "bow, then run", but a capture shows one action. Clips of different actions are joined where their poses
+are similar; the caption joins the captions of both in order.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from marey.data.splice import join_clips
 from marey.vocabulary.entries import load_vocabulary
 
 PAIRS = {"train": 1.2, "val": 0.2, "test": 0.2}
-"""Pairs for each clip of a split that can be joined; an eighth as many sequences of three."""
+"""Number of pairs per joinable clip of a split; sequences of three are an eighth as many."""
 CANDIDATES = 12
-"""Clips of an action among which the best seam is taken."""
+"""Number of clips of an action to search for the best seam."""
 WORST_SEAM = 0.35
-"""As `cuts.WORST_SEAM`: lying down goes over to standing nowhere below it."""
+"""Limit like `cuts.WORST_SEAM`; every seam from lying to standing costs more."""
 LEAST_FRAMES = 24
 ANYWHERE = ("idle", "walk", "walk-backward", "run", "sprint", "sidestep", "crawl", "sneak", "limp", "fight-stance")
-"""Actions that may be entered and left at any frame; others are shown whole."""
+"""Actions that may begin and end at any frame; other clips are used whole."""
 ENDS = 8
-"""Frames of a whole action that may be cut off at its beginning and at its end."""
+"""Number of frames that may be cut from each end of a whole action."""
 WORDS = 24
-"""A caption with more words is not joined to another."""
+"""Largest number of words of a caption that is joined to another."""
 THEN = (", then ", ", then ", ", and then ", " and then ", "; then ", ", after that ", ". Then ")
 SUBJECT = re.compile(
     r"^(?:(?:an?|the|one|this) (?:\w+ )?(?:person|man|woman|figure|character|dancer|fighter|actor|body|boy|girl|boxer"
@@ -46,7 +46,7 @@ SUBJECT = re.compile(
 
 
 def compose_texts(parts: Sequence[Part], split: str) -> Iterator[Composed]:
-    """Sequences of a split, from parts of that split alone."""
+    """Compose sequences of a split from parts of that split only."""
     composer = _Composer(parts)
     pairs = round(PAIRS.get(split, 0.0) * composer.size)
     for letter, count, wanted in (("T2", 2, pairs), ("T3", 3, pairs // 8)):
@@ -55,7 +55,7 @@ def compose_texts(parts: Sequence[Part], split: str) -> Iterator[Composed]:
 
 
 def joined_texts(actions: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], ...]:
-    """Captions of a sequence by each author who wrote short ones of all its actions, two at most."""
+    """Up to two captions of a sequence by each author with short captions of all its actions."""
     rng = seeded("texts", seed)
     told = []
     for author in range(min(len(facts.text) for facts in actions)):
@@ -76,7 +76,7 @@ def _joined(texts: Sequence[str], rng: random.Random) -> str:
 
 
 class _Composer:
-    """Draws clips of one split and joins them."""
+    """Draw clips of one split and join them."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self._by_action: dict[str, list[Part]] = defaultdict(list)
@@ -89,7 +89,7 @@ class _Composer:
         self._weights = [len(self._by_action[action]) ** 0.5 for action in self.actions]
 
     def sequence(self, name: str, count: int) -> Composed | None:
-        """Different actions, each told by some author of all; None where what was drawn does not fit."""
+        """Join different actions that one author captioned; None if the drawn clips do not fit together."""
         rng = seeded("text sequence", name)
         first = rng.choice(self._by_action[self._draw(rng, ())])
         chosen, starts, stops = [first], [0], list[int]()
@@ -131,8 +131,8 @@ class _Composer:
 
 
 def _leaving(part: Part, start: int, room: int) -> range:
-    """Frames after which a clip that was entered at `start` may be left, with room for so many; empty where it has to
-    be shown whole and is too long."""
+    """Frames after which a clip that begins at `start` may end within `room` frames; empty if it must be used whole and
+    is too long."""
     stop = min(len(part.joints), start + room)
     if part.content in ANYWHERE:
         return range(start + LEAST_FRAMES - 1, stop)
@@ -140,7 +140,7 @@ def _leaving(part: Part, start: int, room: int) -> range:
 
 
 def _join(name: str, parts: Sequence[Part], starts: Sequence[int], stops: Sequence[int]) -> Composed | None:
-    """One motion of the pieces, told and sound, or None."""
+    """Join the pieces to one motion; None if it has no caption or is broken."""
     joints = np.empty((0, 22, 3))
     seams = [0]
     for part, start, stop in zip(parts, starts, stops, strict=True):

@@ -1,4 +1,4 @@
-"""Captions by people, made true of a changed clip: mirrored, made to travel, repeated, or retimed."""
+"""Adaptation of human captions to a changed clip: mirrored, travelling, repeated, or retimed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ _SIDES = re.compile(
     re.IGNORECASE,
 )
 _VERY = re.compile(r"(?P<before>\S+ )?\bright (?=(?:down|away|there|where|up to|after|underneath|on top|back to)\b)")
-"""`right down` is no side, but `from the right down` is one."""
+"""Matches `right` as an adverb (`right down`), as opposed to a side (`from the right down`)."""
 _OWNERS = ("the ", "his ", "her ", "its ", "their ", "your ", "turn ", "turns ", "turning ")
 _OTHER = {"left": "right", "right": "left"}
 
 
 def mirrored(text: str) -> str:
-    """A caption of the mirror image: left and right, and the ways round, exchanged."""
+    """Adapt a caption to the mirror image: exchange left and right, and directions of rotation."""
     adverbs = {
         found.start() + len(found["before"] or "")
         for found in _VERY.finditer(text)
@@ -54,22 +54,22 @@ _PARTED = re.compile(r"^[\s,;]+|[\s,;]+$")
 
 
 def travelling(text: str) -> str | None:
-    """A caption of a gait on the spot, said of one that travels; None where it cannot be said without its place."""
+    """Adapt a caption of a gait on the spot to one that travels; None if the place cannot be removed."""
     return _without(text, _STAYS, _STILL_STAYS)
 
 
 def repeated(text: str) -> str | None:
-    """A caption of one cycle, said of several of them; None where it counts the cycle in its own words."""
+    """Adapt a caption of one cycle to several; None if the count cannot be removed."""
     return _without(text, _CYCLE, _STILL_CYCLE)
 
 
 def retimed(text: str) -> str | None:
-    """A caption of a slower or faster clip: the same, but for one that says how long or how fast in numbers."""
+    """Adapt a caption to a slower or faster clip; None if it gives the duration or speed in numbers."""
     return None if _PACE.search(text) else text
 
 
 def _without(text: str, phrase: re.Pattern[str], rest: re.Pattern[str]) -> str | None:
-    """The text without a phrase, if nothing is left that says it in other words."""
+    """Remove a phrase; None if the rest still has the same statement in other words."""
     left = _PARTED.sub("", phrase.sub("", text))
     left = re.sub(r"\s+([.,;])", r"\1", left)
     if not left.strip(" .") or rest.search(left):
