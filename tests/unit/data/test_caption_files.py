@@ -59,7 +59,7 @@ def test_captions_of_all_authors_join_those_of_the_index_and_the_manifest_names_
     [
         ("id,captions\na@0,walk\nb,walk\n", r"x\.csv, line 3: the index has no clip 'b'"),
         ("id,captions\na@0,walk\na@0,go\n", "line 3: 'a@0' has a line already"),
-        ("id,captions\na@0, | \n", "line 2: says nothing"),
+        ("id,captions\na@0, | \n", "line 2: has no captions"),
         ("id,captions\na@0,walk,slowly\n", "line 2: has not as many cells"),
         ("clip,captions\na@0,walk\n", "its header is not id,captions"),
     ],
@@ -104,5 +104,5 @@ def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder:
     )
     assert np.abs(slower - captured.mean(axis=0)).max() < 0.003
     assert data.manifest.kinds == {"captured": 2, "mirrored": 2, "retimed": 4}
-    with pytest.raises(InvalidInput, match="a share of 0"):
+    with pytest.raises(InvalidInput, match="must be between 0"):
         build([pack], folder / "more", speed=0.9)
