@@ -386,3 +386,24 @@ def test_features_are_normalized_by_mean_and_deviation_and_restored() -> None:
     tokenizer.set_statistics(mean, std)
     torch.testing.assert_close(tokenizer.normalize(mean + 2 * std), torch.full((TINY.features,), 2.0))
     torch.testing.assert_close(tokenizer.restore(tokenizer.normalize(mean + 3)), mean + 3)
+
+
+def test_graph_attention_drops_neighbours_in_training_alone() -> None:
+    torch.manual_seed(0)
+    layer = GraphAttention(4, 0.5)
+    nodes, adjacency = torch.randn(1, 3, 4), torch.full((1, 3, 3), 3)
+    layer.eval()
+    assert torch.equal(layer(nodes, adjacency), layer(nodes, adjacency))
+    layer.train()
+    assert not torch.equal(layer(nodes, adjacency), layer(nodes, adjacency))
+
+
+def test_the_null_condition_replaces_the_first_token_of_dropped_samples() -> None:
+    torch.manual_seed(0)
+    condition = Condition(TINY.condition, 8).eval()
+    condition.null.data.fill_(7.0)
+    nodes = torch.randn(2, TINY.condition.slots, TINY.condition.text_width)
+    plain, some = condition(nodes), condition(nodes, torch.tensor([True, False]))
+    assert torch.equal(some[1], plain[1])
+    assert torch.equal(some[0, 1:], plain[0, 1:])
+    assert (some[0, 0] == 7.0).all()

@@ -270,3 +270,14 @@ def test_a_stage_joins_the_other_processes_first(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("marey.models.hgm3.train.start_process_group", joined)
     with pytest.raises(InterruptedError):
         train_stage("masked", TrainOptions(tmp_path, tmp_path, named_config("tiny"), Budget(1)))
+
+
+def test_the_first_code_is_a_target_like_any_other(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    stage.module.masked.head.bias.data.fill_(-50).index_fill_(0, torch.tensor([0]), 50.0)
+    sample = drawn_sample(stage)
+    valid = sample.tokens >= 0
+    losses, masked, right, _ = stage._piece(replace(sample, tokens=torch.where(valid, 0, -1)), 0.0)
+    assert masked.any()
+    assert right[masked].all()
+    assert float(losses[masked].detach().max()) < 1e-3
