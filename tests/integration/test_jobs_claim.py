@@ -268,6 +268,26 @@ def test_a_lost_lease_marks_its_items_solo_and_costs_no_attempt(engine: sa.Engin
         assert audit(conn) == []
 
 
+def test_a_new_stage_starts_with_fresh_attempts(engine: sa.Engine) -> None:
+    submit_items(engine, 2)
+    lost = claim_some(engine, "text", worker="dies")
+    let_expire(engine, lost.lease_token)
+    sweep(engine)
+    assert claim_some(engine, "text", worker="another").solo
+    with transaction(engine) as conn:
+        (alone,) = conn.execute(sa.text("SELECT token FROM lease")).scalars()
+        conn.execute(sa.text("UPDATE item SET attempts = 1 WHERE lease_token = :token"), {"token": alone})
+    parse_texts(engine)
+    let_expire(engine, alone)
+    sweep(engine)
+    parse_texts(engine)
+    claimed = claim_some(engine)
+    assert (claimed.solo, len(claimed.items)) == (False, 2)
+    assert [item.attempts for item in claimed.items] == [0, 0]
+    with transaction(engine) as conn:
+        assert audit(conn) == []
+
+
 def test_items_that_must_run_alone_go_one_at_a_time_with_fresh_ones_beside_them(engine: sa.Engine) -> None:
     submit_items(engine, 8)
     parse_texts(engine)

@@ -66,6 +66,13 @@ def test_a_row_holds_whole_settings_as_integers_however_they_were_written(config
     assert len({row.batch_key for row in rows}) == 1
 
 
+def test_variants_of_a_row_count_up_from_its_seed(config: Settings) -> None:
+    generator = capabilities_of(bundle(config, FOREIGN), config)
+    rows = list(new_items([(Item("walk", seed=7, variants=3), generator), (Item("walk", variants=2), generator)]))
+    assert [(row.index, row.variant, row.seed) for row in rows[:3]] == [(0, 0, 7), (0, 1, 8), (0, 2, 9)]
+    assert [(row.index, row.variant, row.seed - rows[3].seed) for row in rows[3:]] == [(1, 0, 0), (1, 1, 1)]
+
+
 def test_candidates_and_redraws_are_settings_of_models_that_can_choose(config: Settings) -> None:
     known = bundle(config, KNOWN)
     assert check_settings(known, {"best_of": 4, "redraws": 1, "steps": 8}) == {"best_of": 4, "redraws": 1, "steps": 8}
