@@ -1,6 +1,6 @@
 """Measure the rules of the referee on real clips: `python -m marey.evaluator.referee_rates SET PATH … -o PAGE`.
 
-Writes the page and, with `--accepted`, the list of rules that are precise enough (`marey.referee.accepted`).
+Writes the page and, with `--accepted`, the list of rules that are precise enough (`referee/accepted.toml`).
 
 Clips are judged as they were captured: retargeted, put on their floor and cut by the index of their set, but neither
 mirrored nor lengthened. A rule *passes* a clip of its own action; it *falsely passes* a clip of another action, where
