@@ -11,6 +11,7 @@ from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, outside_range
 from marey.registry import Setting, find_model
+from marey.vocabulary.lengths import stated_length
 
 MAX_FRAMES = 2**53
 """The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""
@@ -56,6 +57,20 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
     low, high = seconds_of(bundle)
     if seconds is not None and not low <= seconds <= high:
         raise InvalidInput(outside_range(seconds, low, high, bundle.manifest.name))
+
+
+def length_of(bundle: Bundle, item: Item) -> float | None:
+    """Return the seconds of an item's motion: its own, or those that its prompt states; None = the model decides.
+
+    A stated length out of the bundle's range is not used; `ScopeReport` warns of it.
+    """
+    if item.seconds is not None:
+        return item.seconds
+    stated = stated_length(item.prompt).seconds
+    if stated is None:
+        return None
+    low, high = seconds_of(bundle)
+    return stated if low <= stated <= high else None
 
 
 def settings_of(bundle: Bundle) -> tuple[Setting, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
-from marey.bundles.limits import check_seconds, check_settings, sampling_of, seconds_of, settings_of, variety_settings
+from marey.bundles.limits import check_seconds, check_settings, length_of, sampling_of, seconds_of, settings_of, variety_settings
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
@@ -45,7 +45,8 @@ class GeneratorCapabilities:
 
     def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
         """Return the scope of a prompt, and count it; None if the bundle lists no actions."""
-        return report.judge(prompt, self.bundle.manifest.name, self.bundle.manifest.actions)
+        lengths = (self.min_seconds, self.max_seconds)
+        return report.judge(prompt, self.bundle.manifest.name, self.bundle.manifest.actions, lengths=lengths)
 
     def scope_key(self, prompt: str, scope: Scope | None) -> str | None:
         """Return the key of the encoder's verdict; None if the words decide."""
@@ -111,9 +112,10 @@ def new_items(
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         scope = None if report is None else generator.judge(item.prompt, report)
+        fields = {**item.spec(), "seconds": length_of(generator.bundle, item)}
         for variant in range(item.variants):
             yield NewItem(
-                **item.spec(),
+                **fields,
                 index=index,
                 model=generator.bundle.manifest.model,
                 bundle=reference,

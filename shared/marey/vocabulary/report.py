@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
+from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope
 
 MAX_EXAMPLES = 3
@@ -26,6 +27,7 @@ NOTES = {
     "negation": "what is not to be done may be done",
     "objects": "objects are mimed",
     "counts": "may be done another number of times",
+    "length": "a stated length is not used: it is that of a part, or out of the model's range",
     "several-people": "one person is shown",
 }
 """Expectation for prompts of a verdict or with a flag; the flags that are not here come with `unknown`."""
@@ -77,19 +79,24 @@ class ScopeReport:
     """Prompts with each flag that are not `unknown` anyway."""
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
 
-    def judge(self, prompt: str, bundle: str, lists: ActionLists | None) -> Scope | None:
+    def judge(
+        self, prompt: str, bundle: str, lists: ActionLists | None, *, lengths: tuple[float, float] | None = None
+    ) -> Scope | None:
         """Return the scope of the next prompt, and count it.
 
         Args:
             prompt: as `check_prompt` returns it.
             bundle: name of the bundle that will read it.
             lists: actions of the bundle; None = it lists none, and the prompt has no scope.
+            lengths: shortest and longest motion of the bundle, in seconds; None = not examined.
         """
         index, self.total = self.total, self.total + 1
         if lists is None:
             self.unlisted += 1
             return None
         scope = self.decided.get((bundle, prompt)) or match_scope(prompt, lists)
+        if lengths is not None and _exceeds(prompt, *lengths):
+            scope = replace(scope, flags=(*scope.flags, "length"))
         if scope.left is not None:
             self._leave(bundle, prompt)
         verdict = scope.verdict
@@ -170,6 +177,11 @@ def refusal(scope: Scope) -> str | None:
     unknown = ", ".join(repr(_cut(each.text)) for each in scope.actions if each.verdict == "unknown")
     why = f" ({', '.join(scope.flags)})" if scope.flags else ""
     return f"names an action that the model does not know: {unknown}{why}"
+
+
+def _exceeds(prompt: str, low: float, high: float) -> bool:
+    seconds = stated_length(prompt).seconds
+    return seconds is not None and not low <= seconds <= high
 
 
 def _cut(text: str) -> str:

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
+from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.lexicon import Lexicon, Meaning
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
 from marey.vocabulary.word_lists import load_word_lists
@@ -133,6 +134,8 @@ class ScopeMatcher:
         words = self._phrases.words(prompt)
         found = self._phrases.find(words)
         flags = list(self._flagger.details(words, found))
+        if stated_length(prompt).is_partial:
+            flags.append("length")
         foreign = self._flagger.foreign(words, found)
         if foreign is not None or not found:
             left = "verb" if foreign is None and self._phrases.names_person(words) else None

@@ -128,3 +128,12 @@ def test_a_variety_is_one_of_three_words() -> None:
     for wrong in ("huge", 3, ""):
         _, (problem,) = read_item({"prompt": "walk", "variety": wrong})
         assert problem.field == "variety"
+
+
+def test_a_row_has_the_length_that_its_prompt_states(config: Settings) -> None:
+    generator = capabilities_of(bundle(config, KNOWN), config)
+    prompt = "a person walks for three seconds"
+    items = [Item(prompt), Item(prompt, seconds=2.0), Item("a person walks"), Item("a person walks for an hour")]
+    too_long = Item("a person walks for a minute")
+    rows = new_items((item, generator) for item in [*items, too_long])
+    assert [row.seconds for row in rows] == [3.0, 2.0, None, None, None]

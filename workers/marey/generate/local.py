@@ -59,7 +59,7 @@ class LocalModel:
         Args:
             prompts: one or several; a row's own values override the arguments below.
             seed: of variant 0 of each prompt, variant k has seed + k; None = drawn.
-            seconds: length; None = the model decides.
+            seconds: length; None = what the prompt states, else the model decides.
             variants: motions of each prompt; None = 1.
             fps: frames a second of the clips; None = the model's.
             best_of: candidates of each motion, of which the best is kept, 1 to 8; None = 1.
@@ -95,7 +95,7 @@ class LocalModel:
     ) -> Iterator[MotionClip]:
         """Generate motions as `generate` does, and yield each when it is ready."""
         platform = {OUTPUT_FPS: fps, BEST_OF: best_of, REDRAWS: redraws}
-        from marey.bundles.limits import sampling_of
+        from marey.bundles.limits import length_of, sampling_of
 
         sampling = {**(settings or {}), **{name: value for name, value in platform.items() if value is not None}}
         defaults = {
@@ -108,7 +108,7 @@ class LocalModel:
         rows = [prompts] if isinstance(prompts, str) else prompts
         raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))
         items = [*read_items(raws, where="prompts", check=self._check)]
-        wanted = [each for item in items for each in _wanted(item, sampling_of(self._bundle, item))]
+        wanted = [each for item in items for each in _wanted(item, length_of(self._bundle, item), sampling_of(self._bundle, item))]
         for _, clip, _ in self._studio.make(wanted):
             yield clip
 
@@ -180,7 +180,7 @@ def _raw(row: Row, defaults: Mapping[str, object]) -> object:
     return whole
 
 
-def _wanted(item: Item, settings: Mapping[str, float]) -> Iterator[Wanted]:
+def _wanted(item: Item, seconds: float | None, settings: Mapping[str, float]) -> Iterator[Wanted]:
     seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
     for variant in range(item.variants):
-        yield Wanted(item.prompt, seed + variant, item.seconds, settings)
+        yield Wanted(item.prompt, seed + variant, seconds, settings)

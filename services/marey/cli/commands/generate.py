@@ -208,6 +208,7 @@ def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, st
 
 def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: options.ScopeOption) -> None:
     """Refuse prompts that the bundle does not know, or warn of them, by words and meaning."""
+    from marey.bundles.limits import seconds_of
     from marey.vocabulary.report import ScopeReport
 
     manifest = studio.bundle.manifest
@@ -215,12 +216,12 @@ def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, poli
         return
     if policy is options.ScopeOption.REFUSE:
         _refuse(reader, items, studio.bundle, studio)
-    report = ScopeReport()
+    report, lengths = ScopeReport(), seconds_of(studio.bundle)
     if manifest.actions is not None:
         scopes = {item.prompt: studio.match_scope(item.prompt, manifest.actions) for item in items}
         report.decided = {(manifest.name, prompt): scope for prompt, scope in scopes.items()}
     for item in items:
-        report.judge(item.prompt, manifest.name, manifest.actions)
+        report.judge(item.prompt, manifest.name, manifest.actions, lengths=lengths)
     console.warn_all(report.warnings())
 
 
@@ -262,16 +263,16 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
     Raises:
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
     """
-    from marey.bundles.limits import sampling_of
+    from marey.bundles.limits import length_of, sampling_of
     from marey.cli.roles.generating import Wanted
 
     names = FileNames(template)
 
     def of(index: int, item: Item) -> Iterator[Planned]:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
-        settings = sampling_of(bundle, item)
+        settings, seconds = sampling_of(bundle, item), length_of(bundle, item)
         for variant in range(item.variants):
-            wanted = Wanted(item.prompt, seed + variant, item.seconds, settings)
+            wanted = Wanted(item.prompt, seed + variant, seconds, settings)
             name = item.name or slug(item.prompt)
             naming = Naming(
                 index,

@@ -1,0 +1,57 @@
+"""Lengths that prompts state in words."""
+
+import pytest
+
+from marey.vocabulary.lengths import StatedLength, stated_length
+from marey.vocabulary.report import ScopeReport
+from marey.vocabulary.scope import ActionLists, match_scope
+
+LISTS = ActionLists(("walk", "wave"))
+
+
+@pytest.mark.parametrize(
+    ("prompt", "seconds"),
+    [
+        ("a person walks for six seconds", 6.0),
+        ("A 3-second idle", 3.0),
+        ("2s of waving", 2.0),
+        ("she runs, 4 sec", 4.0),
+        ("For 2.5 seconds she waves", 2.5),
+        ("he waves for one and a half seconds", 1.5),
+        ("half a second of jumping", 0.5),
+        ("dances for half a minute", 30.0),
+        ("dances for a minute", 60.0),
+        ("waves for three whole seconds", 3.0),
+        ("waves. Length: 4 seconds.", 4.0),
+        ("walks for 2 seconds, then waves for 3 seconds", 5.0),
+        ("a dance from the 1980s", None),
+        ("80s disco", None),
+        ("after two seconds he waves", None),
+        ("waits, and two seconds later he falls", None),
+        ("the first three seconds are idle", None),
+        ("the second dancer waves", None),
+        ("takes 3 steps", None),
+    ],
+)
+def test_the_stated_length_is_that_of_the_whole_motion(prompt: str, seconds: float | None) -> None:
+    assert stated_length(prompt) == StatedLength(seconds)
+
+
+@pytest.mark.parametrize("prompt", ["walks, then waves for 3 seconds", "he waits for a second before he jumps"])
+def test_the_length_of_a_part_is_not_that_of_the_motion(prompt: str) -> None:
+    assert stated_length(prompt) == StatedLength(is_partial=True)
+    assert "length" in match_scope(prompt, LISTS).flags
+
+
+def test_a_length_out_of_the_range_is_warned_of() -> None:
+    report = ScopeReport()
+    scope = report.judge("a person walks for twenty seconds", "tiny", LISTS, lengths=(1.0, 9.8))
+    assert scope is not None
+    assert scope.flags == ("length",)
+    assert report.warnings() == [
+        "'a person walks for twenty seconds': a stated length is not used: it is that of a part, or out of the model's"
+        " range"
+    ]
+    within = report.judge("a person walks for six seconds", "tiny", LISTS, lengths=(1.0, 9.8))
+    assert within is not None
+    assert within.flags == ()
