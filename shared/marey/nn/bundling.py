@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.bundles import Bundle, BundleWriter, TextSpec
+from marey.bundles.eight_bit import restore
 from marey.core.errors import InvalidBundle
 from marey.motion.features import layout
 
@@ -96,8 +97,11 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     Raises:
         InvalidBundle: the tensors do not fit the network.
     """
-    state = {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
     where = f"{bundle.path}: {part}"
+    try:
+        state = {name: torch.tensor(value) for name, value in restore(bundle.tensors(part)).items()}
+    except InvalidBundle as error:
+        raise InvalidBundle(error.message, where=where) from error
     try:
         found: Any = network.load_state_dict(state, strict=False)
     except RuntimeError as error:  # a shape differs

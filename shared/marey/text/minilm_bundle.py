@@ -1,8 +1,5 @@
-"""The bundle of MiniLM: all-MiniLM-L6-v2 with the matrices of embeddings and layers in 8 bits.
-
-A matrix W (rows, columns) is stored as `<name>.weight` in int8 and `<name>.scale` (rows,) in float32; their product,
-row by row, is W to half of 1/127 of the largest number of each row.
-"""
+"""The bundle of MiniLM: all-MiniLM-L6-v2 with the matrices of embeddings and layers in 8 bits
+(`marey.bundles.eight_bit`)."""
 
 from __future__ import annotations
 
@@ -20,6 +17,7 @@ from tokenizers import Tokenizer
 from torch import Tensor
 
 from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.bundles.eight_bit import quantize, restore, scale_of
 from marey.core.documents import read_json
 from marey.core.errors import InvalidBundle, InvalidFile
 
@@ -42,11 +40,11 @@ def load_weights(bundle: Bundle) -> dict[str, Tensor]:
     Raises:
         InvalidBundle: the bundle is damaged, or does not hold six layers of width 384.
     """
-    stored = bundle.tensors(PART)
     try:
-        weights = {name: torch.as_tensor(_restored(name, stored)) for name in stored if not name.endswith(".scale")}
-    except (KeyError, ValueError) as error:
-        raise InvalidBundle(f"a matrix does not fit its scales: {error}", where=str(bundle.path)) from error
+        restored = restore(bundle.tensors(PART))
+    except InvalidBundle as error:
+        raise InvalidBundle(error.message, where=str(bundle.path)) from error
+    weights = {name: torch.as_tensor(value.astype(np.float32)) for name, value in restored.items()}
     _check(weights, bundle.path)
     return weights
 
@@ -114,26 +112,10 @@ def quantized(weights: Mapping[str, NDArray[np.generic]]) -> Arrays:
         if name.startswith(UNUSED):
             continue
         if MATRIX.fullmatch(name):
-            kept[name], kept[_scale_of(name)] = _quantized(value.astype(np.float32))
+            kept[name], kept[scale_of(name)] = quantize(value.astype(np.float32))
         else:
             kept[name] = value.astype(np.float16 if value.ndim > 1 else np.float32)
     return kept
-
-
-def _quantized(matrix: NDArray[np.float32]) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    scale = np.maximum(np.abs(matrix).max(axis=1) / 127, np.finfo(np.float32).tiny).astype(np.float32)
-    return np.rint(matrix / scale[:, None]).clip(-127, 127).astype(np.int8), scale
-
-
-def _restored(name: str, stored: Mapping[str, NDArray[np.generic]]) -> NDArray[np.float32]:
-    value = stored[name]
-    if not MATRIX.fullmatch(name):
-        return value.astype(np.float32)
-    return value.astype(np.float32) * stored[_scale_of(name)].astype(np.float32)[:, None]
-
-
-def _scale_of(name: str) -> str:
-    return name.removesuffix("weight") + "scale"
 
 
 def _check(weights: Mapping[str, Tensor], where: Path) -> None:

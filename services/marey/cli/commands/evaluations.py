@@ -285,6 +285,12 @@ def actions(
     ] = None,
     seeds: Seeds = 4,
     settings: evaluating.Settings = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            "--record", metavar="DATA", help="Write the result into the bundle; DATA is the folder it was trained on."
+        ),
+    ] = None,
     threads: Threads = 0,
     output: ReportFolder = None,
     as_json: console.Json = False,
@@ -292,7 +298,7 @@ def actions(
     """Measure which actions of the vocabulary a bundle supports, by held-out prompts. Needs no server."""
     from marey.cli.roles.actions import measure_actions
 
-    _measure(lambda how: measure_actions(bundle, chosen or (), how), seeds, settings, threads, output, as_json)
+    _measure(lambda how: measure_actions(bundle, chosen or (), how, record=record), seeds, settings, threads, output, as_json)
 
 
 @app.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -60,6 +61,24 @@ def show(
     if metrics:
         for metric, value in found["metrics"].items():
             console.result(f"{'metric':<12} {metric} = {value:g}")
+
+
+@app.command()
+def quantize(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A model, a bundle, or its folder.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the copy, whose name is the bundle's.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing folder.")] = False,
+) -> None:
+    """Write a copy of a generator with its matrices in 8 bits: half the size, and slightly other motions."""
+    from marey.core.extras import needs_extra
+
+    try:
+        from marey.bundles import choose_bundle
+        from marey.bundles.eight_bit import write_eight_bit
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    made = write_eight_bit(choose_bundle(name), output, overwrite=overwrite)
+    console.result(made.reference)
 
 
 def _server_named() -> bool:

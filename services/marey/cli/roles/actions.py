@@ -12,6 +12,7 @@ from marey.core.extras import needs_extra
 from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:
+    from marey.bundles import Bundle
     from marey.motion.clip import MotionClip
     from marey.referee.prompts import ActionPrompt
 
@@ -51,24 +52,45 @@ class MeasureOptions:
     progress: Callable[[int, int], None]
 
 
-def measure_actions(bundle: str, actions: Sequence[str], options: MeasureOptions) -> RefereeReport:
+def measure_actions(
+    bundle: str, actions: Sequence[str], options: MeasureOptions, *, record: Path | None = None
+) -> RefereeReport:
     """Generate the held-out prompts of actions with a bundle, and let the referee judge the exported joints.
 
     Args:
         actions: ids of the vocabulary; none = all.
+        record: the prepared folder that the bundle was trained on; its manifest and card get the result.
 
     Raises:
         NotFound, InvalidBundle: of the bundle.
-        InvalidInput: no such action or setting.
+        NotFound, InvalidFile: of the prepared folder.
+        InvalidInput: no such action or setting; or a part of the actions or seeds is to be recorded.
     """
     run = _Run.of(bundle, options)
+    from marey.referee.adherence import LEAST_SEEDS
+
+    if record is not None and (actions or options.seeds < LEAST_SEEDS):
+        raise InvalidInput(f"only all actions with {LEAST_SEEDS} seeds or more are recorded", where="--record")
+    takes = None if record is None else _takes(record)
     from marey.referee import Body
     from marey.referee.adherence import document, judge_trial, markdown, rates
     from marey.referee.prompts import action_prompts
 
     asked = _of_actions(action_prompts(), actions)
     trials = [judge_trial(prompt, seed, Body(clip.joints, clip.fps)) for prompt, seed, clip in run.motions(asked)]
-    return run.report(markdown(run.reference, rates(trials)), document(run.reference, run.settings, trials))
+    found = rates(trials)
+    if takes is not None:
+        from marey.referee.standings import record as record_standings
+
+        record_standings(run.bundle, found, takes)
+    return run.report(markdown(run.reference, found), document(run.reference, run.settings, trials))
+
+
+def _takes(prepared: Path) -> Mapping[str, int]:
+    from marey.data.prepared import PreparedData
+    from marey.referee.standings import training_takes
+
+    return training_takes(PreparedData.open(prepared, verify=False).clips)
 
 
 def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:
@@ -136,7 +158,8 @@ class _Run:
     """A loaded generator with its settings."""
 
     def __init__(self, generator: Any, options: MeasureOptions, values: Mapping[str, Any]) -> None:
-        self.reference: str = generator.bundle.reference
+        self.bundle: Bundle = generator.bundle
+        self.reference: str = self.bundle.reference
         self._generator = generator
         self._options = options
         self._settings = generator.settings(values)
@@ -156,13 +179,20 @@ class _Run:
 
     def motions(self, prompts: Sequence[P]) -> Iterator[tuple[P, int, MotionClip]]:
         """Generate each prompt with each seed."""
+        from marey.bundles.limits import length_of
         from marey.generation.port import Request
+        from marey.items.item import Item
         from marey.training.adherence import finished, pipeline_of
 
         generator, settings = self._generator, self._settings
         texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
-        seeds = range(self._options.seeds)
-        jobs = [(prompt, Request(text, seed)) for seed in seeds for prompt, text in zip(prompts, texts, strict=True)]
+        lengths = [length_of(generator.bundle, Item(prompt.text)) for prompt in prompts]
+        frames = [None if seconds is None else round(seconds * generator.limits.fps) for seconds in lengths]
+        jobs = [
+            (prompt, Request(text, seed, wanted))
+            for seed in range(self._options.seeds)
+            for prompt, text, wanted in zip(prompts, texts, frames, strict=True)
+        ]
         for start in range(0, len(jobs), generator.batch):
             part = jobs[start : start + generator.batch]
             clips = finished(generator, [request for _, request in part], settings)

@@ -1,0 +1,88 @@
+"""What a bundle states about its actions, from measured adherence and the takes that it learned from: the lists in its
+manifest and the table in its card."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from marey.bundles import Bundle
+from marey.bundles.manifest import MANIFEST_NAME
+from marey.data.manifest import Clip
+from marey.data.splits import actions_of
+from marey.motion.files import write_atomically
+from marey.referee.adherence import ActionRate
+from marey.vocabulary.scope import ActionLists
+
+FEW_TAKES = 4
+"""Fewer takes than these make a supported action one of `single_take`."""
+CARD = "README.md"
+BEGIN, END = "<!-- actions -->", "<!-- end of actions -->"
+
+
+def training_takes(clips: Iterable[Clip]) -> dict[str, int]:
+    """Return the number of captured takes of each action in the training split; made gestures count as one take."""
+    takes = defaultdict[str, set[str]](set)
+    for clip in clips:
+        if clip.split == "train" and len(clip.acts) == 1 and (clip.captured or clip.made):
+            for action in actions_of(clip.content.split(" - ")[0]):
+                takes[action].add("made" if clip.made else f"{clip.dataset}/{clip.id.split('@')[0]}")
+    return {action: len(found) for action, found in takes.items()}
+
+
+def lists_of(rates: Sequence[ActionRate], takes: Mapping[str, int]) -> ActionLists:
+    """Return the lists of a manifest.
+
+    An action that was trained on and is not supported is `tried`, whether it was measured or not.
+    """
+    supported = sorted(rate.action for rate in rates if rate.standing == "supported" and ";" not in rate.action)
+    few = {action for action in supported if takes.get(action, 0) < FEW_TAKES}
+    tried = sorted(action for action in takes if action not in supported)
+    return ActionLists(
+        supported=tuple(action for action in supported if action not in few),
+        single_take=tuple(sorted(few)),
+        tried=tuple(tried),
+    )
+
+
+def card_table(rates: Sequence[ActionRate], takes: Mapping[str, int]) -> str:
+    """Return the card's section: takes, adherence and interval of each action, the best first."""
+    lines = [
+        BEGIN,
+        "| action | takes | adherence | 95 % interval | prompts | motions | |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for rate in sorted(rates, key=lambda rate: (-rate.share, rate.action)):
+        count = takes.get(rate.action, 0)
+        learned = "" if ";" in rate.action else str(count) if count else "none"
+        lines.append(
+            f"| {rate.action} | {learned} | {rate.share:.0%} | {rate.low:.0%} to {rate.high:.0%} "
+            f"| {rate.phrasings} | {rate.motions} | {rate.standing} |"
+        )
+    return "\n".join([*lines, END])
+
+
+def record(bundle: Bundle, rates: Sequence[ActionRate], takes: Mapping[str, int]) -> ActionLists:
+    """Write the lists into the manifest of a bundle and the table into its card; the weights' hash stays.
+
+    Raises:
+        InvalidInput: the folder cannot be written.
+    """
+    lists = lists_of(rates, takes)
+    manifest = bundle.manifest.model_copy(update={"actions": lists})
+    write_atomically(bundle.path / MANIFEST_NAME, f"{manifest.model_dump_json(indent=1, exclude_unset=True)}\n".encode())
+    card = bundle.path / CARD
+    text = card.read_text(encoding="utf-8") if card.exists() else f"# {manifest.name}\n"
+    write_atomically(card, _with_table(text, card_table(rates, takes)).encode())
+    return lists
+
+
+def _with_table(card: str, table: str) -> str:
+    """Return a card with its table replaced, or added at the end."""
+    before, begin, rest = card.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        return f"{card.rstrip()}\n\n## Actions\n\n{table}\n"
+    return before + table + after
+
