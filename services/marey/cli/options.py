@@ -88,7 +88,10 @@ Template = Annotated[
     ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files with other content.")]
-Seconds = Annotated[float | None, typer.Option("--seconds", help="Length in seconds; default: as the prompt states, else the model's estimate.")]
+Seconds = Annotated[
+    float | None,
+    typer.Option("--seconds", help="Length in seconds; default: as the prompt states, else the model's estimate."),
+]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first variant; default: random.")]
 Variants = Annotated[int | None, typer.Option("--variants", help="Motions per prompt; a row's own value overrides it.")]
 Tags = Annotated[

@@ -10,7 +10,15 @@ from dataclasses import dataclass
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
-from marey.bundles.limits import check_seconds, check_settings, length_of, sampling_of, seconds_of, settings_of, variety_settings
+from marey.bundles.limits import (
+    check_seconds,
+    check_settings,
+    length_of,
+    sampling_of,
+    seconds_of,
+    settings_of,
+    variety_settings,
+)
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings

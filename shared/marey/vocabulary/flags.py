@@ -11,9 +11,18 @@ from marey.vocabulary.phrases import Match, Word
 from marey.vocabulary.word_lists import WordLists
 
 Flag = Literal[
-    "negation", "objects", "counts", "length", "several-people", "other-subject", "other-language", "no-action", "gibberish"
+    "negation",
+    "objects",
+    "counts",
+    "length",
+    "several-people",
+    "other-subject",
+    "other-language",
+    "no-action",
+    "gibberish",
 ]
-"""`length`: a stated one is that of a part, or out of the bundle's range; `objects`: mimed, the motion shows the body alone; `counts`: may be done another number of times."""
+"""`objects`: mimed, the motion shows the body alone; `length`: a stated one is that of a part, or out of the bundle's
+range; `counts`: may be done another number of times."""
 
 _FOREIGN_SHARE = 0.3
 """Share of the words that are another language's and not English, from which on the prompt is; twice that with any."""

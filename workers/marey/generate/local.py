@@ -108,7 +108,11 @@ class LocalModel:
         rows = [prompts] if isinstance(prompts, str) else prompts
         raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))
         items = [*read_items(raws, where="prompts", check=self._check)]
-        wanted = [each for item in items for each in _wanted(item, length_of(self._bundle, item), sampling_of(self._bundle, item))]
+        wanted = [
+            each
+            for item in items
+            for each in _wanted(item, length_of(self._bundle, item), sampling_of(self._bundle, item))
+        ]
         for _, clip, _ in self._studio.make(wanted):
             yield clip
 

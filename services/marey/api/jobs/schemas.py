@@ -44,7 +44,9 @@ class NewItemBody(BaseModel):
         description="Name of the motion, in any script; clients derive its file name from it.",
         json_schema_extra=ITEM_NAME,
     )
-    seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = as the prompt states, else the model decides.")
+    seconds: float | None = Field(
+        None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = as the prompt states, else the model decides."
+    )
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Seed of variant 0; variant k uses seed + k.")
     variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
     model: str | None = Field(None, description="Model, bundle or exact bundle.", json_schema_extra=ITEM_MODEL)

@@ -298,7 +298,9 @@ def actions(
     """Measure which actions of the vocabulary a bundle supports, by held-out prompts. Needs no server."""
     from marey.cli.roles.actions import measure_actions
 
-    _measure(lambda how: measure_actions(bundle, chosen or (), how, record=record), seeds, settings, threads, output, as_json)
+    _measure(
+        lambda how: measure_actions(bundle, chosen or (), how, record=record), seeds, settings, threads, output, as_json
+    )
 
 
 @app.command()

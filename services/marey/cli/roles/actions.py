@@ -14,7 +14,10 @@ from marey.registry import get_model, resolve
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.motion.clip import MotionClip
+    from marey.referee.adherence import ActionRate
     from marey.referee.prompts import ActionPrompt
+
+    Motion = tuple[ActionPrompt, int, MotionClip]
 
 
 class _Prompt(Protocol):
@@ -71,26 +74,50 @@ def measure_actions(
 
     if record is not None and (actions or options.seeds < LEAST_SEEDS):
         raise InvalidInput(f"only all actions with {LEAST_SEEDS} seeds or more are recorded", where="--record")
-    takes = None if record is None else _takes(record)
+    learning = None if record is None else _Learning(record)
     from marey.referee import Body
     from marey.referee.adherence import document, judge_trial, markdown, rates
     from marey.referee.prompts import action_prompts
 
     asked = _of_actions(action_prompts(), actions)
-    trials = [judge_trial(prompt, seed, Body(clip.joints, clip.fps)) for prompt, seed, clip in run.motions(asked)]
+    trials = [
+        judge_trial(prompt, seed, Body(clip.joints, clip.fps))
+        for prompt, seed, clip in (run.motions(asked) if learning is None else learning.watched(run.motions(asked)))
+    ]
     found = rates(trials)
-    if takes is not None:
-        from marey.referee.standings import record as record_standings
-
-        record_standings(run.bundle, found, takes)
+    if learning is not None:
+        learning.record(run.bundle, found)
     return run.report(markdown(run.reference, found), document(run.reference, run.settings, trials))
 
 
-def _takes(prepared: Path) -> Mapping[str, int]:
-    from marey.data.prepared import PreparedData
-    from marey.referee.standings import training_takes
+class _Learning:
+    """The data that a bundle was trained on, beside the motions that it makes."""
 
-    return training_takes(PreparedData.open(prepared, verify=False).clips)
+    def __init__(self, prepared: Path) -> None:
+        from marey.data.prepared import PreparedData
+        from marey.evaluator.copies import TrainingPoses
+        from marey.evaluator.standings import training_takes
+
+        data = PreparedData.open(prepared, verify=False)
+        self._skeleton = data.layout.skeleton
+        self._takes = training_takes(data.clips)
+        self._training = TrainingPoses.of(data)
+        self._distances: list[tuple[str, float]] = []
+
+    def watched(self, motions: Iterator[Motion]) -> Iterator[Motion]:
+        """Yield the motions, and measure how near they are to the training clips."""
+        from marey.evaluator.copies import poses
+
+        for prompt, seed, clip in motions:
+            nearest = self._training.nearest(poses(clip.joints, clip.fps, self._skeleton))
+            self._distances.append(("; ".join(prompt.actions), nearest.millimetres))
+            yield prompt, seed, clip
+
+    def record(self, bundle: Bundle, rates: Sequence[ActionRate]) -> None:
+        """Write lists and table into the bundle."""
+        from marey.evaluator.standings import Learned, record, share_of_copies
+
+        record(bundle, rates, Learned(self._takes, share_of_copies(self._distances)))
 
 
 def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:

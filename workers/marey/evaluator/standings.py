@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from dataclasses import dataclass
 
 from marey.bundles import Bundle
 from marey.bundles.manifest import MANIFEST_NAME
 from marey.data.manifest import Clip
 from marey.data.splits import actions_of
+from marey.evaluator.copies import COPY_MM
 from marey.motion.files import write_atomically
 from marey.referee.adherence import ActionRate
 from marey.vocabulary.scope import ActionLists
@@ -19,6 +20,27 @@ FEW_TAKES = 4
 """Fewer takes than these make a supported action one of `single_take`."""
 CARD = "README.md"
 BEGIN, END = "<!-- actions -->", "<!-- end of actions -->"
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What a bundle learned its actions from.
+
+    Attributes:
+        takes: captured takes of each action in the training split.
+        copies: share of the motions of each action that are nearer than `COPY_MM` to a training clip.
+    """
+
+    takes: Mapping[str, int]
+    copies: Mapping[str, float]
+
+
+def share_of_copies(distances: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Return the share of copies among the motions of each action, given as (action, millimetres)."""
+    found = defaultdict[str, list[bool]](list)
+    for action, distance in distances:
+        found[action].append(distance < COPY_MM)
+    return {action: sum(copies) / len(copies) for action, copies in found.items()}
 
 
 def training_takes(clips: Iterable[Clip]) -> dict[str, int]:
@@ -46,35 +68,37 @@ def lists_of(rates: Sequence[ActionRate], takes: Mapping[str, int]) -> ActionLis
     )
 
 
-def card_table(rates: Sequence[ActionRate], takes: Mapping[str, int]) -> str:
-    """Return the card's section: takes, adherence and interval of each action, the best first."""
+def card_table(rates: Sequence[ActionRate], learned: Learned) -> str:
+    """Return the card's section: takes, adherence and interval, and copies of each action, the best first."""
     lines = [
         BEGIN,
-        "| action | takes | adherence | 95 % interval | prompts | motions | |",
-        "|---|---|---|---|---|---|---|",
+        "| action | takes | adherence | 95 % interval | prompts | motions | copies | |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for rate in sorted(rates, key=lambda rate: (-rate.share, rate.action)):
-        count = takes.get(rate.action, 0)
-        learned = "" if ";" in rate.action else str(count) if count else "none"
+        count = learned.takes.get(rate.action, 0)
+        takes = "" if ";" in rate.action else str(count) if count else "none"
         lines.append(
-            f"| {rate.action} | {learned} | {rate.share:.0%} | {rate.low:.0%} to {rate.high:.0%} "
-            f"| {rate.phrasings} | {rate.motions} | {rate.standing} |"
+            f"| {rate.action} | {takes} | {rate.share:.0%} | {rate.low:.0%} to {rate.high:.0%} "
+            f"| {rate.phrasings} | {rate.motions} | {learned.copies[rate.action]:.0%} | {rate.standing} |"
         )
     return "\n".join([*lines, END])
 
 
-def record(bundle: Bundle, rates: Sequence[ActionRate], takes: Mapping[str, int]) -> ActionLists:
+def record(bundle: Bundle, rates: Sequence[ActionRate], learned: Learned) -> ActionLists:
     """Write the lists into the manifest of a bundle and the table into its card; the weights' hash stays.
 
     Raises:
         InvalidInput: the folder cannot be written.
     """
-    lists = lists_of(rates, takes)
+    lists = lists_of(rates, learned.takes)
     manifest = bundle.manifest.model_copy(update={"actions": lists})
-    write_atomically(bundle.path / MANIFEST_NAME, f"{manifest.model_dump_json(indent=1, exclude_unset=True)}\n".encode())
+    write_atomically(
+        bundle.path / MANIFEST_NAME, f"{manifest.model_dump_json(indent=1, exclude_unset=True)}\n".encode()
+    )
     card = bundle.path / CARD
     text = card.read_text(encoding="utf-8") if card.exists() else f"# {manifest.name}\n"
-    write_atomically(card, _with_table(text, card_table(rates, takes)).encode())
+    write_atomically(card, _with_table(text, card_table(rates, learned)).encode())
     return lists
 
 
@@ -85,4 +109,3 @@ def _with_table(card: str, table: str) -> str:
     if not begin or not end:
         return f"{card.rstrip()}\n\n## Actions\n\n{table}\n"
     return before + table + after
-
