@@ -15,8 +15,8 @@ from marey.bundles import Bundle
 from marey.core import defaults
 from marey.registry import get_model, model_names, resolve, streaming_models
 
-STARTERS = tuple(f"{name}-starter" for name in model_names())
-"""The shipped bundles, by name."""
+GENERATORS = tuple(sorted(name for model in model_names() for name in get_model(model).bundles))
+"""The shipped bundles of models, by name."""
 TEXT_BUNDLES = ("minilm-l6", "srl-light", "srl-open")
 """The shipped bundles that read prompts."""
 OTHERS = tuple(name for name in model_names() if name != defaults.MODEL)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from marey.bundles.bundle import Bundle
 from marey.bundles.find import find_bundle, has_bundle, list_bundles
 from marey.bundles.manifest import BundleManifest
-from marey.bundles.places import STARTER, how_to_get
+from marey.bundles.places import STARTER, how_to_get, preferred
 from marey.core.errors import InvalidBundle, NotFound, Refused
 from marey.core.settings import Settings, settings
 
@@ -16,8 +16,8 @@ from marey.core.settings import Settings, settings
 def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:
     """Return the generator bundle of a model (`hgm3`), a bundle's name, exact reference or path.
 
-    A model's own bundle is `<model>-starter` if it exists; else the first trained one by name; else the first with
-    random weights.
+    Of a model's bundles it is the first that the model prefers (`ModelSpec.bundles`); else the first trained one by name;
+    else the first with random weights.
 
     Raises:
         NotFound: unknown bundle and unknown model.
@@ -26,8 +26,9 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
     config = config or settings()
     if "/" in name or name.startswith(".") or "@" in name or has_bundle(name, config):
         return find_bundle(name, config=config, verify=verify)
-    if has_bundle(f"{name}-starter", config):
-        return find_bundle(f"{name}-starter", config=config, verify=verify)
+    for known in preferred(name):
+        if has_bundle(known, config):
+            return find_bundle(known, config=config, verify=verify)
     found = [b for b in list_bundles(config=config, kind="generator") if b.manifest.model == name]
     if not found:
         known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))

@@ -7,6 +7,7 @@ and is never imported.
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from functools import lru_cache
 from importlib.metadata import entry_points
 from importlib.util import find_spec
@@ -14,11 +15,10 @@ from pathlib import Path
 
 from marey.core.checkout import checkout
 from marey.core.settings import Settings
-from marey.registry import find_model, model_names
+from marey.registry import ModelSpec, find_model, model_names
 
 GROUP = "marey.bundles"
 OPEN, STARTER = "marey-bundles-open", "marey-bundles-starter"
-STARTER_ENDING = "-starter"
 _OF_THE_PLATFORM = {"minilm-l6": OPEN, "srl-light": OPEN, "srl-open": OPEN, "evaluator-starter": STARTER}
 
 log = logging.getLogger(__name__)
@@ -54,12 +54,20 @@ def installed() -> tuple[Path, ...]:
 
 def distributions() -> dict[str, str]:
     """The distribution on the package index that brings each known bundle: of the platform, and of installed models."""
-    specs = filter(None, map(find_model, model_names()))
-    return _OF_THE_PLATFORM | {spec.name + STARTER_ENDING: spec.distribution for spec in specs if spec.distribution}
+    return _OF_THE_PLATFORM | {name: package for spec in _specs() for name, package in spec.bundles.items()}
+
+
+def preferred(model: str) -> tuple[str, ...]:
+    """Return the names of a model's trained bundles, the preferred one first; none for an unknown model."""
+    spec = find_model(model)
+    return () if spec is None else tuple(spec.bundles)
+
+
+def _specs() -> Iterator[ModelSpec]:
+    return filter(None, map(find_model, model_names()))
 
 
 def how_to_get(name: str) -> str:
     """Return a sentence that names the distribution of a bundle, or of a model's own bundle; empty for other names."""
-    known = distributions()
-    distribution = known.get(name) or known.get(name + STARTER_ENDING)
+    distribution = distributions().get(next(iter(preferred(name)), name))
     return f" It comes with `pip install {distribution}`." if distribution else ""

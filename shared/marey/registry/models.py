@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
@@ -126,7 +126,7 @@ class ModelSpec:
         training: None = it is not trained here.
         tokenizer: `(parameters) -> MotionTokenizer`, untrained; its weights come from the part `tokenizer` of a bundle
             or run. None = the model has no such part.
-        distribution: the package on the index that provides the bundle `<name>-starter`; None = there is none.
+        bundles: its trained bundles, the preferred one first, each with the package on the index that provides it.
         random_bundle: `(path) -> Bundle` with random weights, for tests and demos.
         live_adherence: `(generator, prompts, *, steers, walks) -> {title: sessions}`; see `marey eval adherence`.
         self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> number of kept motions`.
@@ -145,7 +145,7 @@ class ModelSpec:
     live: str | None = None
     training: Training | None = None
     tokenizer: str | None = None
-    distribution: str | None = None
+    bundles: Mapping[str, str] = field(default_factory=dict[str, str])
     random_bundle: str | None = None
     live_examples: str | None = None
     live_adherence: str | None = None

@@ -12,7 +12,13 @@ _TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve t
 seventeen eighteen nineteen twenty"""
 _NUMBERS = {
     **{name: float(value) for value, name in enumerate(_TO_TWENTY.split(), 1)},
-    **{"thirty": 30.0, "forty": 40.0, "fifty": 50.0, "sixty": 60.0, "ninety": 90.0, "a": 1.0, "an": 1.0},
+    "thirty": 30.0,
+    "forty": 40.0,
+    "fifty": 50.0,
+    "sixty": 60.0,
+    "ninety": 90.0,
+    "a": 1.0,
+    "an": 1.0,
 }
 _WORDS = "|".join(sorted(_NUMBERS, key=len, reverse=True))
 _UNIT = r"(?P<unit>seconds?|secs?|s|minutes?|mins?)"
@@ -30,7 +36,7 @@ _BEFORE = re.compile(r"\b(?:after|every|each|first|last|next|another|per|within|
 """Words before a time that is a moment or a part, not a length: "after two seconds", "the first three seconds"."""
 _AFTER = re.compile(r"^[ ]?(?:later|ago|in\b|apart|into|mark|hand|from now|at a time|between)")
 _NEXT = re.compile(r"\b(?:then|before|after|afterwards?|followed by|finally|next)\b|[;.!?](?:\s|$)")
-"""What separates actions in the order of time."""
+"""Separators of actions in the order of time."""
 _DECADE = re.compile(r"[5-9]0s")
 _LABEL = re.compile(r"\b(?:length|duration|total|time|lasting|takes?|overall)\b")
 

@@ -10,9 +10,11 @@ import pytest
 
 from marey.bundles import Bundle
 from marey.bundles.places import distributions
+from marey.core import defaults
 from marey.motion.io.bvh_write import write_bvh
+from marey.registry import get_model
 from tests.support.marey import REPOSITORY
-from tests.support.models import STARTERS
+from tests.support.models import GENERATORS
 from tests.support.releases import installed_release
 from tests.support.walker import walker
 from tests.support.wheels import build_wheel, install_from_index, this_wheel
@@ -56,6 +58,9 @@ def test_an_extra_brings_what_its_commands_import(
     if extra == "motion":
         assert (tmp_path / "walk.png").read_bytes().startswith(b"\x89PNG")
     if extra == "server":
-        assert [json.loads(line)["name"] for line in printed.splitlines()] == list(STARTERS)
+        assert [json.loads(line)["name"] for line in printed.splitlines()] == list(GENERATORS)
     if extra == "worker":
-        assert json.loads(printed)["bundle"] == Bundle.open(REPOSITORY / "models" / "hgm3-starter").reference
+        assert (
+            json.loads(printed)["bundle"]
+            == Bundle.open(REPOSITORY / "models" / next(iter(get_model(defaults.MODEL).bundles))).reference
+        )

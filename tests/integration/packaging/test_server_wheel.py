@@ -16,9 +16,9 @@ import pytest
 from marey.bundles.places import OPEN, STARTER, distributions
 from marey.motion.clip import load_npz
 from marey.motion.io.bvh import read_bvh
-from marey.registry import model_names
+from marey.registry import get_model, model_names
 from tests.support.evaluations import write_evaluator
-from tests.support.models import STARTERS, TEXT_BUNDLES, add_text_bundles, random_bundle
+from tests.support.models import GENERATORS, TEXT_BUNDLES, add_text_bundles, random_bundle
 from tests.support.releases import Release, installed_release, wait_until
 from tests.support.wheels import Environment, bundles_wheel, make_environment, this_wheel
 
@@ -28,8 +28,9 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """Marey and both distributions of bundles: small ones in place of those that were trained."""
     folder = tmp_path_factory.mktemp("server")
     models = folder / "models"
-    for model, starter in zip(model_names(), STARTERS, strict=True):
-        random_bundle(model, models / starter)
+    for model in model_names():
+        for name in get_model(model).bundles:
+            random_bundle(model, models / name)
     write_evaluator(models, "evaluator-starter")
     add_text_bundles(models)
     bundles = [bundles_wheel(family, models, folder / family) for family in ("open", "starter")]
@@ -61,7 +62,7 @@ def served(marey: Release) -> Iterator[Release]:
 
 def test_installed_bundles_are_found(marey: Release) -> None:
     listed = [json.loads(line) for line in marey.run("models", "list", "--local", "--json").splitlines()]
-    assert [model["name"] for model in listed] == list(STARTERS)
+    assert [model["name"] for model in listed] == list(GENERATORS)
     assert all(model["random"] for model in listed), "those of the wheels, not those of the checkout"
 
 
@@ -85,7 +86,7 @@ def test_a_server_makes_motions_and_pages_to_review_them(served: Release) -> Non
     served.run("review", line["job"], "-o", "review.html")
     assert "a person waves" in (served.folder / "review.html").read_text()
     checks = [json.loads(each) for each in served.run("doctor", "--json").splitlines()]
-    assert {*STARTERS, *TEXT_BUNDLES, "evaluator-starter"} <= {
+    assert {*GENERATORS, *TEXT_BUNDLES, "evaluator-starter"} <= {
         check["message"].partition("@")[0] for check in checks if check["name"] == "models"
     }
 
@@ -113,11 +114,11 @@ def test_a_missing_bundle_names_its_distribution(marey: Release, tmp_path: Path)
     for path, hidden in aside:
         path.rename(hidden)
     try:
-        for arguments in (("generate", "a person walks"), ("generate", "x", "--bundle", "hgm3-starter")):
-            with pytest.raises(AssertionError, match=f"pip install {STARTER}"):
+        for arguments in (("generate", "a person walks"), ("generate", "x", "--bundle", "srl-light")):
+            with pytest.raises(AssertionError, match=f"pip install {OPEN}"):
                 bare.run(*arguments)
-        with pytest.raises(AssertionError, match=f"pip install {OPEN}"):
-            bare.run("generate", "x", "--bundle", "srl-light")
+        with pytest.raises(AssertionError, match=f"pip install {STARTER}"):
+            bare.run("generate", "x", "--bundle", "evaluator-starter")
     finally:
         for path, hidden in aside:
             hidden.rename(path)

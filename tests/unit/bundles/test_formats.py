@@ -21,7 +21,7 @@ from marey.text.keys import PIPELINE_VERSION, feature_key
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists
 from tests.support.marey import REPOSITORY
-from tests.support.models import STARTERS
+from tests.support.models import GENERATORS
 
 SHIPPED = {
     "evaluator-starter": "54df3f67fce4",
@@ -118,10 +118,10 @@ def test_shipped_bundles_are_of_the_second_format() -> None:
     """In the first, a bundle that reads prompts through another encoder would keep its hash."""
     found = {path.parent.name: json.loads(path.read_text())["format"] for path in MANIFESTS}
     assert found == dict.fromkeys(found, 2)
-    assert {*SHIPPED, *STARTERS} <= set(found)
+    assert {*SHIPPED, *GENERATORS} <= set(found)
 
 
-@pytest.mark.parametrize("name", STARTERS)
+@pytest.mark.parametrize("name", GENERATORS)
 def test_shipped_bundles_list_actions_of_the_vocabulary_once_each(name: str) -> None:
     lists = Bundle.open(REPOSITORY / "models" / name, verify=False).manifest.actions
     assert lists is not None

@@ -17,10 +17,10 @@ from marey.bundles.places import OPEN, STARTER, distributions, folders, installe
 from marey.core import checkout
 from marey.core.errors import NotFound
 from marey.core.settings import Settings
-from marey.registry import model_names
+from marey.registry import get_model, model_names
 from tests.support.live_api import write_bundle
 from tests.support.marey import REPOSITORY
-from tests.support.models import STARTERS
+from tests.support.models import GENERATORS
 
 PACKAGES = {
     path.parent: tomllib.loads(path.read_text()) for path in REPOSITORY.glob("models/packages/*/pyproject.toml")
@@ -88,12 +88,13 @@ def test_a_wheel_has_no_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert checkout.checkout() == tmp_path
 
 
-@pytest.mark.parametrize("name", [*model_names(), *STARTERS])
+@pytest.mark.parametrize("name", [*model_names(), *GENERATORS])
 def test_without_a_bundle_its_distribution_is_named(tmp_path: Path, name: str) -> None:
     config = Settings(home=tmp_path, models=tmp_path)
     with pytest.raises(NotFound) as refused:
         choose_bundle(name, config=config)
-    assert f"pip install {STARTER}" in (refused.value.hint or "")
+    known = next(iter(get_model(name).bundles)) if name in model_names() else name
+    assert f"pip install {distributions()[known]}" in (refused.value.hint or "")
     with pytest.raises(NotFound) as refused:
         choose_evaluator(None, config=config)
     assert f"pip install {STARTER}" in (refused.value.hint or "")

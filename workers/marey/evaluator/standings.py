@@ -1,5 +1,4 @@
-"""What a bundle states about its actions, from measured adherence and the takes that it learned from: the lists in its
-manifest and the table in its card."""
+"""Statements of a bundle about its actions, measured: lists in the manifest, a table in the card."""
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ BEGIN, END = "<!-- actions -->", "<!-- end of actions -->"
 
 @dataclass(frozen=True)
 class Learned:
-    """What a bundle learned its actions from.
+    """Sources of a bundle's actions.
 
     Attributes:
         takes: captured takes of each action in the training split.

@@ -105,12 +105,13 @@ class _Learning:
         self._distances: list[tuple[str, float]] = []
 
     def watched(self, motions: Iterator[Motion]) -> Iterator[Motion]:
-        """Yield the motions, and measure how near they are to the training clips."""
+        """Yield the motions, and measure how near those of the first seed are to the training clips."""
         from marey.evaluator.copies import poses
 
         for prompt, seed, clip in motions:
-            nearest = self._training.nearest(poses(clip.joints, clip.fps, self._skeleton))
-            self._distances.append(("; ".join(prompt.actions), nearest.millimetres))
+            if seed == 0:
+                nearest = self._training.nearest(poses(clip.joints, clip.fps, self._skeleton))
+                self._distances.append(("; ".join(prompt.actions), nearest.millimetres))
             yield prompt, seed, clip
 
     def record(self, bundle: Bundle, rates: Sequence[ActionRate]) -> None:

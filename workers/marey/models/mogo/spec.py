@@ -45,7 +45,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         unpack="marey.models.mogo.assembly:unpack",
     ),
     tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
-    distribution="marey-bundles-starter",
+    bundles={"mogo-starter": "marey-bundles-starter"},
     random_bundle="marey.models.mogo.bundle:random_bundle",
     live_adherence="marey.models.mogo.adherence:judge_streams",
     ablations=(
