@@ -16,8 +16,8 @@ from marey.core.settings import Settings, settings
 def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:
     """Return the generator bundle of a model (`hgm3`), a bundle's name, exact reference or path.
 
-    Of a model's bundles it is the first that the model prefers (`ModelSpec.bundles`); else the first trained one by name;
-    else the first with random weights.
+    Of a model's bundles it is the first that the model prefers (`ModelSpec.bundles`); else the first trained one by
+    name; else the first with random weights.
 
     Raises:
         NotFound: unknown bundle and unknown model.
