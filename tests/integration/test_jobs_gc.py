@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
+from collections.abc import Sequence
 
 import pytest
 import sqlalchemy as sa
@@ -13,7 +14,7 @@ from marey.db import transaction
 from marey.jobs import Policy, asset_key, begin_assets, cancel, commit_motions, get_motion, sweep
 from marey.jobs.leases import Claim, NewMotion
 from marey.storage import AssetStore, FolderStore
-from marey.takes import GarbageReport, collect_garbage, delete, list_motions, remove_stale_assets
+from marey.takes import GarbageReport, collect_garbage, delete, gc, list_motions, remove_stale_assets
 from tests.servers.jobs import claim_some, let_expire, motion_of, parse_texts, submit_items
 
 HOUR_AGO = sa.text("UPDATE asset SET announced_at = now() - interval '61 minutes'")
@@ -119,6 +120,27 @@ def test_the_sweeper_waits_an_hour_with_what_is_being_written(engine: sa.Engine,
     assert sweep(engine).stale_assets == 2
     assert remove_stale_assets(engine, folder_store) == 2
     assert list(folder_store.keys()) == []
+
+
+def test_content_that_is_announced_after_the_listing_stays(engine: sa.Engine, folder_store: FolderStore) -> None:
+    submit_items(engine, 1)
+    parse_texts(engine)
+    claimed = claim_some(engine)
+    motion = motion_of(claimed.items[0].id)
+    folder_store.put(key_of(motion), str(motion.item).encode())
+
+    known = gc._known
+
+    def known_then_announced(engine: sa.Engine, keys: Sequence[str]) -> set[str]:
+        found = known(engine, keys)
+        with transaction(engine) as conn:  # a worker, while the collector looks at the list
+            begin_assets(conn, claimed.lease_token, [motion.files["npz"]])
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gc, "_known", known_then_announced)
+        assert collect_garbage(engine, folder_store).orphans == 0
+    assert folder_store.get(key_of(motion)) == str(motion.item).encode()
 
 
 def test_a_store_outage_stops_the_collection_and_loses_nothing(engine: sa.Engine, folder_store: FolderStore) -> None:

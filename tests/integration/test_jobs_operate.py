@@ -9,7 +9,8 @@ import pytest
 import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
-from marey.db import transaction
+from marey.db import Listener, transaction
+from marey.db.database import QUEUE_CHANNEL
 from marey.db.pages import Page
 from marey.jobs import (
     ItemFailure,
@@ -113,6 +114,22 @@ def test_verbs_that_change_nothing_write_no_event(engine: sa.Engine) -> None:
         assert pause(conn, "default", job).event_seq == seq
         seq = resume(conn, "default", job).event_seq
         assert resume(conn, "default", job).event_seq == seq
+
+
+def test_resume_wakes_the_queues_that_have_something_to_do(engine: sa.Engine, database_url: str) -> None:
+    job = submit_items(engine, 2)
+    parse_texts(engine)
+    with transaction(engine) as conn:
+        pause(conn, "default", job)
+    with Listener(database_url, (QUEUE_CHANNEL,)) as listener:
+        with transaction(engine) as conn:
+            resume(conn, "default", job)
+        assert [note.payload for note in listener.wait(5)] == ["hgm3"], "the text queue is empty"
+        claim_some(engine, limit=2)
+        for verb in (pause, resume):
+            with transaction(engine) as conn:
+                verb(conn, "default", job)
+        assert listener.wait(0.1) == []
 
 
 def test_priority_and_comment_are_kept_and_told(engine: sa.Engine) -> None:
