@@ -81,7 +81,7 @@ def _quantized(tensors: Tensors) -> Tensors:
     kept: Tensors = {}
     for name, value in tensors.items():
         if name.endswith("weight") and value.dtype.kind == "f" and value.ndim > 1 and value.size >= LEAST:
-            kept[name], kept[scale_of(name)] = quantize(value)
+            kept[name], kept[scale_of(name)] = quantize(value.astype(np.float32))
         else:
             kept[name] = value
     return kept

@@ -6,7 +6,7 @@ import hashlib
 import json
 import secrets
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
@@ -120,10 +120,10 @@ def new_items(
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         scope = None if report is None else generator.judge(item.prompt, report)
-        fields = {**item.spec(), "seconds": length_of(generator.bundle, item)}
+        spec = replace(item, seconds=length_of(generator.bundle, item)).spec()
         for variant in range(item.variants):
             yield NewItem(
-                **fields,
+                **spec,
                 index=index,
                 model=generator.bundle.manifest.model,
                 bundle=reference,
