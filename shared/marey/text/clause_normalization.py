@@ -90,7 +90,7 @@ def _subject_later(clause: Clause) -> bool:
 
 
 def _done_within(clause: Clause, start: int) -> bool:
-    """Return True if a verb stands there or up to two words on; not for "the other arm hanging"."""
+    """Return True if a verb is at this word or up to two words later; not for "the other arm hanging"."""
     return any(clause.is_verb(k) and not clause.bare(k).endswith("ing") for k in range(start, start + 3))
 
 

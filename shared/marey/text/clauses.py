@@ -31,7 +31,7 @@ class Clause:
         return self.bares[index] if 0 <= index < len(self.words) else ""
 
     def stopped(self, index: int, stops: str = STOPS) -> bool:
-        """Return True if a stop stands behind the word, or if the word is the first."""
+        """Return True if a stop follows the word, or the word is the first."""
         return index < 0 or self.words[index][-1:] in stops
 
     def cut(self, start: int, stop: int | None = None) -> Clause:

@@ -79,11 +79,11 @@ class TextEncoder(Protocol):
 
 
 def encoder_sha256(name: str, *, config: Settings | None = None) -> str:
-    """The hash of the weights of an installed encoder, as bundles name it. Loads no model.
+    """Return the hash of the weights of an installed encoder, as bundles name it. Loads no model.
 
     Raises:
         NotFound: it is not installed; the hint says how to get it.
-        InvalidBundle, InvalidFile: what is installed is broken.
+        InvalidBundle, InvalidFile: the installed one is damaged.
     """
     if name in BUNDLES:
         return find_encoder(name, config=config).weights_sha256
@@ -91,7 +91,7 @@ def encoder_sha256(name: str, *, config: Settings | None = None) -> str:
 
 
 def find_encoder(name: str, path: Path | None = None, *, config: Settings | None = None) -> Bundle:
-    """The bundle of an encoder of `BUNDLES`; its files are checked when they are loaded.
+    """Return the bundle of an encoder of `BUNDLES`; its files are checked when they are loaded.
 
     Args:
         name: `minilm`.
@@ -111,7 +111,7 @@ def find_encoder(name: str, path: Path | None = None, *, config: Settings | None
 
 
 def find_weights(name: str, *, config: Settings | None = None) -> Path:
-    """The folder of weights of an encoder of `HUB`: beside the bundles, or in the hub's cache on this machine.
+    """Return the folder of weights of an encoder of `HUB`: beside the bundles, or in the hub's cache on this machine.
 
     Raises:
         NotFound: there is none; the hint says how to get it.

@@ -62,7 +62,7 @@ class TextFeatures:
 
     @classmethod
     def from_blob(cls, blob: bytes) -> TextFeatures:
-        """Read what `to_blob` wrote.
+        """Read the output of `to_blob`.
 
         Raises:
             InvalidFile: not such a blob, or a damaged one.

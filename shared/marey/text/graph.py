@@ -73,7 +73,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class SemanticGraph:
-    """Nodes stand motion first, then actions, then specifics, each in the order of first mention by a frame."""
+    """Graph of a sentence. Nodes are in the order motion, actions, specifics, each by first mention in a frame."""
 
     text: str
     words: tuple[str, ...]
@@ -124,7 +124,7 @@ class SemanticGraph:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> SemanticGraph:
-        """Read what `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
+        """Read the output of `to_json`. Raises KeyError, TypeError or ValueError for anything else."""
         cut = data["cut"]
         graph = cls(
             text=str(data["text"]),
@@ -158,7 +158,7 @@ class SemanticGraph:
 
 
 def build_graph(text: str, frames: Sequence[Frame], *, max_actions: int, max_specifics: int) -> SemanticGraph:
-    """The graph of a sentence from its predicate frames.
+    """Build the graph of a sentence from its predicate frames.
 
     Arguments with the same span merge into one node with several edges (GraphMotion repeats them for each verb,
     which fills its eight slots with the same subject). Frames fill the slots in order; `cut` says what was left

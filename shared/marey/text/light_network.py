@@ -24,7 +24,7 @@ REACH = 16  # distances beyond it are one
 
 @dataclass(frozen=True)
 class LightConfig:
-    """Sizes of the network; stands whole in the bundle's manifest."""
+    """Sizes of the network, stored in the bundle's manifest."""
 
     tags: tuple[str, ...]
     layers: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
@@ -136,7 +136,10 @@ class LightNetwork(nn.Module):
 
 
 def word_distances(hidden: Tensor, reach: int = REACH) -> Tensor:
-    """(T, T) for `hidden` (B, T, width): how far a word stands behind another, 0 = `reach` or more before it."""
+    """Return the distance of each word behind each other word, (T, T) for `hidden` (B, T, width).
+
+    0 = `reach` or more before it.
+    """
     words = torch.arange(hidden.shape[1], device=hidden.device)
     return (words - words[:, None]).clamp(-reach, reach) + reach
 

@@ -1,6 +1,6 @@
 """Load an encoder, a labeller or a rewriter by its name in `TextSpec`.
 
-Each is imported when it is asked for: a process that reads prompts with MiniLM never imports `transformers`.
+Each is imported on first use: a process that reads prompts with MiniLM never imports `transformers`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Scope of a prompt by its meaning: what its words leave undecided, by the nearest phrases of the vocabulary.
+"""Scope of a prompt by its meaning: the nearest phrases of the vocabulary decide where its words do not.
 
 Phrases and prompts are compared by the cosine of their sentence vectors. The limits are those of `MEANING_ENCODERS`,
 set on the sets `development` and `meaning` of `marey.checks.scope_prompts`; a change raises `MEANING_VERSION`.
@@ -30,7 +30,7 @@ Pooled = Callable[[Sequence[str]], list[NDArray[np.float32]]]
 
 
 class MeaningJudge:
-    """Decides what words leave undecided. Vectors of phrases are made when they are first needed, and kept."""
+    """Judge of prompts that words leave undecided. Vectors of phrases are computed on first use and kept."""
 
     def __init__(self, pooled: Pooled) -> None:
         self._pooled = pooled

@@ -107,7 +107,7 @@ class _Layers(nn.Module):
 class _Layer(nn.Module):
     """Post-norm self-attention and feed-forward of BERT, query, key and value in one product.
 
-    In int8 it is compiled, so it may use what TorchScript knows: no globals, for example.
+    In int8 it is compiled, so it is limited to TorchScript: no globals, for example.
     """
 
     def __init__(self, weights: dict[str, Tensor], prefix: str, *, int8: bool) -> None:
@@ -134,11 +134,11 @@ class _Layer(nn.Module):
         self.outer_norm = norm("output")
 
     def forward(self, hidden: Tensor, groups: list[tuple[int, int]]) -> Tensor:
-        """(N, 384) to the same.
+        """Apply the layer to states (N, 384).
 
         Args:
-            hidden: the tokens of all texts; texts of equal length stand together.
-            groups: how many texts of which number of tokens follow each other.
+            hidden: the tokens of all texts, ordered by the length of their text.
+            groups: number of texts and number of their tokens, for each length.
         """
         projected = self.project(hidden)
         mixed: list[Tensor] = []

@@ -102,10 +102,10 @@ def import_minilm(folder: Path, output: Path) -> Bundle:
 
 
 def quantized(weights: Mapping[str, NDArray[np.generic]]) -> Arrays:
-    """The tensors as they are stored: matrices in int8 with scales, positions in float16, vectors in float32.
+    """Return the tensors as they are stored: matrices in int8 with scales, positions in float16, vectors in float32.
 
     Args:
-        weights: all tensors of the model, in float32; those that no sentence needs are left out.
+        weights: all tensors of the model, in float32; unused ones are left out.
     """
     kept: Arrays = {}
     for name, value in sorted(weights.items()):

@@ -135,7 +135,7 @@ class OpenAIRewriter:
         return caption
 
     def prefetch(self, prompts: Sequence[str]) -> None:
-        """Ask for several prompts at once; `rewrite` then knows the answers, and what failed."""
+        """Request several prompts at once; `rewrite` then returns their answers and raises their errors."""
         self._failed_ahead = {}
 
         def ask(prompt: str) -> tuple[str, NotRewritten | None]:

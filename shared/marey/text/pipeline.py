@@ -189,8 +189,9 @@ class TextPipeline:
         return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason, actions, rows)
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
-        """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states
-        over its words (`TextSpec.node_features`; the latter as in GraphMotion). Row 0 is always the pooled sentence.
+        """Return one vector per node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token
+        states over its words (`TextSpec.node_features`; the latter as in GraphMotion). Row 0 is always the pooled
+        sentence.
         """
         if self.spec.node_features == "pooled":
             rows = self.pooled([node.text for node in graph.nodes])

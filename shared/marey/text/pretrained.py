@@ -1,4 +1,4 @@
-"""Loading `transformers` models from a folder: offline, safetensors only, errors that say what to do."""
+"""Loading `transformers` models from a folder: offline, safetensors only, with errors that name the remedy."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def load_pretrained(kind: Any, folder: Path, *, weights: bool = False) -> Any:
     """`kind.from_pretrained(folder)`, in evaluation mode where it is a model.
 
     Raises:
-        InvalidFile: what lies there cannot be loaded, or a weight of the model is missing.
+        InvalidFile: the folder cannot be loaded, or a weight of the model is missing.
     """
     try:
         if not weights:

@@ -26,7 +26,7 @@ MOTION_WORDS = tuple(dict.fromkeys(_MOTION_WORDS.split()))
 
 
 class Speller:
-    """Corrects motion words.
+    """Spelling correction for words of motion.
 
     Args:
         known: words that are right as they are.

@@ -132,7 +132,7 @@ def lemma(word: str) -> str:
 
 
 def _restore(stem: str) -> str:
-    """The base form from what stands before -ing or -ed."""
+    """Return the base form of a word from its stem before -ing or -ed."""
     if stem + "e" in ENDS_IN_E:
         return stem + "e"
     if stem.endswith("i"):

@@ -1,1 +1,1 @@
-"""Kinematic checks: what a motion does, judged on its joints alone."""
+"""Kinematic checks of the actions of a motion, on its joints alone."""

@@ -37,7 +37,7 @@ class Expectation:
     """One action that a prompt asks for.
 
     Attributes:
-        action: what is done.
+        action: name of the action.
         side: for turns left or right; for hands left, right or both.
         straight: the way must be straight (for walking, running and walking backward).
     """
@@ -105,7 +105,7 @@ def _turn(m: Stretch, want: Expectation) -> str:
 
 
 def _arms(m: Stretch, side: Side) -> tuple[list[Arm], list[Arm]]:
-    """The arms asked for, and the others."""
+    """Return the requested arms, and the others."""
     named = list(zip(m.arms, ("left", "right"), strict=True))
     return [a for a, name in named if side in (name, "both")], [a for a, name in named if side not in (name, "both")]
 

@@ -130,7 +130,7 @@ def footfalls(joints: Array, fps: float) -> list[int]:
 
 
 def airborne(joints: Array, fps: float) -> float:
-    """Share of frames in which no foot is near the floor: both feet 3 cm over where feet stand in this clip."""
+    """Return the share of frames without a foot near the floor: both 3 cm above their standing height in the clip."""
     feet = joints[:, [*ANKLES, *TOES], 1] - np.array([0.06, 0.06, 0.0, 0.0])
     lowest = feet.min(axis=1)
     return float(np.mean(lowest > np.percentile(lowest, 3) + 0.03))

@@ -22,7 +22,7 @@ class HeldOutPrompt:
 
     Attributes:
         text: as a user types it.
-        group: what it is counted under.
+        group: its row in reports.
         expected: actions in order.
         separate: reported apart from the rest (kick, punch, slash, dance).
     """

@@ -66,7 +66,7 @@ class Rates:
     """Pass rates of the checker on real clips.
 
     Attributes:
-        own: by what the clips show (`turn left`, `wave right then walk`), the share that passes its own check.
+        own: share of clips that pass their own check, by content (`turn left`, `wave right then walk`).
         wrong: by check, the share of clips of other contents that pass it.
         wrong_by: (content, check) pairs with their rates, other contents only.
         failures: id and reason of each clip that fails its own check.

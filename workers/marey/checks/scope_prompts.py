@@ -33,7 +33,7 @@ class ScopePrompt:
 
 @dataclass(frozen=True)
 class ScopeRate:
-    """Count of a class: how many prompts, and how many of them got the right answer.
+    """Counts of a class: prompts, and prompts with the right answer.
 
     Right is: in scope not `unknown`; objects flagged as such; all others `unknown`, or, for plausible unknown actions,
     not `known`.

@@ -154,7 +154,7 @@ def _swings(moved: Array, margin: float, least: float, fps: float) -> int:
 
 
 def is_run(joints: Array, fps: float) -> bool:
-    """Running: for a share of the time no foot stands (walks have next to none).
+    """Return True for running: during a share of the time no foot is on the floor (almost none in a walk).
 
     A foot stands while its ankle or toe is slower than about a third of the body. Between 1 and 8 % (a shuffle of an
     old runner, a lively walk) the knees decide: walkers stretch one leg nearly at all times, runners none.

@@ -31,7 +31,7 @@ class TokenBatch:
 
 
 def token_batch(tokens: Sequence[tuple[list[int], Tensor]]) -> TokenBatch:
-    """Pad sentences; each is its token ids and (T, N) weights of the means, as `WordStates.tokens` gives them."""
+    """Pad sentences, each given as token ids and (T, N) weights of the means (`WordStates.tokens`)."""
     rows, length = len(tokens), max(len(ids) for ids, _ in tokens)
     ids = torch.zeros(rows, length, dtype=torch.long)
     mask = torch.zeros(rows, length, dtype=torch.bool)
@@ -67,7 +67,7 @@ class AdaptedMiniLM(nn.Module):
             self.down[_key(name)], self.up[_key(name)] = nn.Parameter(down), nn.Parameter(up)
 
     def forward(self, batch: TokenBatch, layers: Sequence[int]) -> Tensor:
-        """States of words, (B, T, L, 384) of the layers asked for (0 = embeddings)."""
+        """Return states of words, (B, T, L, 384), of the requested layers (0 = embeddings)."""
         weights = self._weights
         table = weights["embeddings.position_embeddings.weight"][: batch.ids.shape[1]]
         hidden = F.embedding(batch.ids, weights["embeddings.word_embeddings.weight"]) + table
@@ -81,7 +81,7 @@ class AdaptedMiniLM(nn.Module):
 
     @torch.no_grad()
     def updates(self, sentences: Sequence[TokenBatch] = ()) -> dict[str, Tensor]:
-        """The updates as they are kept, exact in float16: `<matrix>.up` (out, rank), `<matrix>.down` (rank, in).
+        """Return the updates as stored, exact in float16: `<matrix>.up` (out, rank), `<matrix>.down` (rank, in).
 
         Args:
             sentences: one at a time, to find `<matrix>.smooth` (in,) for int8 with.
@@ -93,7 +93,7 @@ class AdaptedMiniLM(nn.Module):
         return {name: value.half().float() for name, value in (kept | self._smoothing(sentences)).items()}
 
     def _smoothing(self, sentences: Sequence[TokenBatch]) -> dict[str, Tensor]:
-        """Divisors of the features of a matrix's input: for large inputs, except those that meet large weights."""
+        """Return divisors of the features of a matrix's input: above 1 for large inputs with small weights."""
         self._largest = {}
         for sentence in sentences:
             self(sentence, (LAYERS,))

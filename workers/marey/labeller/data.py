@@ -209,7 +209,7 @@ class Augmenter:
 
 
 def _subject(example: Example) -> Argument | None:
-    """The span at the start, if every argument that touches it is the whole of it and no predicate lies before."""
+    """Return the span at the start if every argument that touches it covers it and no predicate precedes it."""
     starts = {(a.start, a.stop) for f in example.frames for a in f.arguments if a.start == 0}
     if len(starts) != 1 or not example.frames:
         return None
