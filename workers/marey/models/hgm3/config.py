@@ -157,7 +157,7 @@ STARTER = HGM3Config(
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=64, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_masked=StageConfig(batch=64, learning_rate=6e-4, decay="cosine", ema=0.998, weight_decay=1e-2),
-    train_residual=StageConfig(batch=128, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
+    train_residual=StageConfig(batch=64, learning_rate=6e-4, decay="cosine", ema=0.998, weight_decay=1e-2),
     train_length=StageConfig(batch=256, learning_rate=1e-3, decay="cosine", ema=0.99),
 )
 
