@@ -18,6 +18,7 @@ from marey.core import checkout
 from marey.core.errors import NotFound
 from marey.core.settings import Settings
 from marey.registry import get_model, model_names
+from tests.support.evaluations import write_generator
 from tests.support.live_api import write_bundle
 from tests.support.marey import REPOSITORY
 from tests.support.models import GENERATORS
@@ -27,6 +28,7 @@ PACKAGES = {
 }
 LICENCE_TEXTS = {
     "Apache-2.0": "apache.org/licenses/LICENSE-2.0",
+    "CC-BY-4.0": "creativecommons.org/licenses/by/4.0/",
     "CC-BY-NC-4.0": "creativecommons.org/licenses/by-nc/4.0/",
     "CC-BY-SA-4.0": "creativecommons.org/licenses/by-sa/4.0/",
 }
@@ -124,3 +126,14 @@ def test_a_distribution_states_its_licences_and_every_credit(folder: Path) -> No
     assert project["license-files"] == ["LICENSE"]
     (package,) = project["entry-points"]["marey.bundles"].values()
     assert all(target == f"{package}/{Path(source).name}" for source, target in held(PACKAGES[folder]).items())
+
+
+@pytest.mark.parametrize("model", model_names())
+def test_of_a_models_bundles_the_preferred_one_is_used(tmp_path: Path, model: str) -> None:
+    config = Settings(home=tmp_path, models=tmp_path)
+    write_generator(tmp_path, "a-studio", model=model)
+    assert choose_bundle(model, config=config).manifest.name == "a-studio"
+    for name in reversed(tuple(get_model(model).bundles)):
+        write_generator(tmp_path, name, model=model)
+        assert choose_bundle(model, config=config).manifest.name == name
+    assert choose_bundle("a-studio", config=config).manifest.name == "a-studio"
