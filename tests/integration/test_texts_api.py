@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any, NoReturn
 
 import httpx2
 import numpy as np
 import pytest
 
 from marey.bundles import BundleWriter, TextSpec
+from marey.core.errors import Unreachable
 from marey.core.settings import settings
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer
 from marey.tenants import create_key
-from marey.text_service.routes import pipeline_of
+from marey.text_service import routes
+from marey.text_service.routes import ParseBody, judge_prompts, pipeline_of
+from marey.vocabulary.scope import ActionLists
 from tests.support.live_api import ApiThread, settings_of, with_text_service
+from tests.support.models import add_text_bundles
 
 PATH = "/v1/texts/parse"
 READER = "hgm3-reader"
+LISTED = "hgm3-listed"
 
 
 @pytest.fixture(scope="module")
@@ -28,15 +34,17 @@ def http(
     with pytest.MonkeyPatch.context() as patch:
         # bundles are found by the process's own settings, the shipped labeller among them
         patch.setattr(settings(), "home", config.home)
-        with BundleWriter(config.home / "models" / READER) as writer:
-            writer.add_part("masked", {"w": np.zeros(3, np.float32)})
-            writer.finish(
-                name=READER, version="1", kind="generator", model="hgm3", config="tiny", licence="MIT", fps=20.0,
-                parameters={"min_frames": 16, "max_frames": 196}, text=TextSpec(),
-            )  # fmt: skip
+        add_text_bundles(config.home / "models")
+        for name, actions in ((READER, None), (LISTED, ActionLists(("walk", "bow", "wave")))):
+            with BundleWriter(config.home / "models" / name) as writer:
+                writer.add_part("masked", {"w": np.zeros(3, np.float32)})
+                writer.finish(
+                    name=name, version="1", kind="generator", model="hgm3", config="tiny", licence="MIT", fps=20.0,
+                    parameters={"min_frames": 16, "max_frames": 196}, text=TextSpec(), actions=actions,
+                )  # fmt: skip
         engine = create_engine(module_database_url)
         with transaction(engine) as conn:
-            key = create_key(conn, "reader", ["read"]).secret
+            key = create_key(conn, "reader", ["read", "submit"]).secret
         with (
             with_text_service(config) as named,
             ApiThread(named) as url,
@@ -84,3 +92,29 @@ def test_too_many_prompts_are_refused(http: httpx2.Client) -> None:
 
 def test_a_key_is_needed(http: httpx2.Client) -> None:
     assert httpx2.post(f"{http.base_url}{PATH}", json={"prompts": ["a person walks"]}).status_code == 401
+
+
+def dry_run(http: httpx2.Client, *prompts: str, model: str = LISTED) -> dict[str, Any]:
+    rows = [{"prompt": prompt, "model": model} for prompt in prompts]
+    answer = http.post("/v1/jobs", params={"validate_only": True}, json={"items": rows})
+    assert answer.status_code == 200, answer.text
+    return answer.json()["scope_report"]
+
+
+def test_a_dry_run_asks_the_encoder_about_what_the_words_leave_undecided(http: httpx2.Client) -> None:
+    judge_prompts(ParseBody(prompts=["she scoots off"], model=LISTED))  # vectors of all phrases, once
+    report = dry_run(http, "a person walks", "a wave of nausea", "a low bow")
+    assert (report["by"], report["known"], report["unknown"]) == ("encoder", 2, 1)
+    assert [example["prompt"] for example in report["examples"]] == ["a wave of nausea"]
+    assert dry_run(http, "a person walks")["by"] == "words"
+
+
+def test_a_dry_run_of_what_cannot_be_judged_is_by_words(http: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert dry_run(http, "a wave of nausea", model=READER)["unlisted"] == 1
+
+    def broken(_: ParseBody) -> NoReturn:
+        raise Unreachable("gone")
+
+    monkeypatch.setattr(routes, "judge_prompts", broken)
+    report = dry_run(http, "a wave of nausea")
+    assert (report["by"], report["known"]) == ("words", 1)

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import httpx2
 import structlog
 from anyio import to_thread
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from starlette.responses import Response
 
 from marey.core import tracing
-from marey.core.errors import InvalidInput, Unreachable
+from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.core.settings import Settings
 from marey.http.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
 from marey.text_service.limits import WordLimit
-from marey.text_service.routes import GraphsView, ParseBody, too_late
+from marey.text_service.routes import GraphsView, ParseBody, ScopesView, too_late
+from marey.vocabulary.scope import Scope, read_scope
 
 CONNECT_SECONDS = 2.0
 SOCKET = "unix://"
 PATH = "/v1/texts/parse"
+SCOPE_PATH = "/v1/texts/scope"
 JSON = "application/json"
 MAX_ANSWER = 8 * 2**20
 """Bytes. The graphs of 64 prompts of maximum length take one of them."""
@@ -44,6 +48,32 @@ class TextService:
         self._http = None if config.text_url is None else _client(config, config.text_url)
 
     async def parse(self, body: ParseBody) -> Response:
+        """Return the graphs of prompts, or the problem that the text service answers.
+
+        Raises:
+            Busy, Unreachable: as `_post`.
+        """
+        return await self._post(PATH, body, GraphsView)
+
+    async def scopes(self, prompts: Mapping[str, Sequence[str]]) -> Mapping[tuple[str, str], Scope]:
+        """Return the encoder's verdicts on prompts, by bundle and prompt; none for a bundle that cannot be judged now.
+
+        Args:
+            prompts: those of each bundle, by its name; at most `MAX_PROMPTS` each.
+        """
+        found: dict[tuple[str, str], Scope] = {}
+        for bundle, texts in prompts.items():
+            try:
+                answer = await self._post(SCOPE_PATH, ParseBody(prompts=list(texts), model=bundle), ScopesView)
+            except MareyError as error:
+                log.info("scope_by_words", bundle=bundle, reason=error.message)
+                continue
+            if answer.status_code == 200:
+                records = ScopesView.model_validate_json(bytes(answer.body)).items
+                found.update(_verdicts(bundle, texts, records))
+        return found
+
+    async def _post(self, path: str, body: ParseBody, view: type[BaseModel]) -> Response:
         """Return the answer of the text service, or its problem.
 
         Raises:
@@ -64,9 +94,9 @@ class TextService:
             try:
                 async with (
                     asyncio.timeout(self._seconds),
-                    self._http.stream("POST", PATH, content=body.model_dump_json(), headers=headers) as answer,
+                    self._http.stream("POST", path, content=body.model_dump_json(), headers=headers) as answer,
                 ):
-                    return await _passed_on(answer)
+                    return await _passed_on(answer, view)
             except TimeoutError:
                 raise too_late(self._seconds) from None
             except httpx2.HTTPError as error:
@@ -76,6 +106,17 @@ class TextService:
         """Close the connections."""
         if self._http is not None:
             await self._http.aclose()
+
+
+def _verdicts(
+    bundle: str, prompts: Sequence[str], records: Sequence[Mapping[str, Any]]
+) -> Mapping[tuple[str, str], Scope]:
+    """Return the scopes of prompts from the records of an answer; none if they are not those of these prompts."""
+    try:
+        return {(bundle, prompt): read_scope(record) for prompt, record in zip(prompts, records, strict=True)}
+    except (KeyError, TypeError, ValueError) as error:
+        log.warning("scope_by_words", bundle=bundle, reason=f"the text service answered no scopes: {error}")
+        return {}
 
 
 def _client(config: Settings, url: str) -> httpx2.AsyncClient:
@@ -95,14 +136,14 @@ def _client(config: Settings, url: str) -> httpx2.AsyncClient:
     )
 
 
-async def _passed_on(answer: httpx2.Response) -> Response:
+async def _passed_on(answer: httpx2.Response, wanted: type[BaseModel]) -> Response:
     """Return the answer if it is the text service's own; answers of other servers are not passed to clients.
 
     Raises:
         Unreachable: it is another server.
     """
     status = answer.status_code
-    view, media_type = (GraphsView, JSON) if status == 200 else (ProblemBody, MEDIA_TYPE)
+    view, media_type = (wanted, JSON) if status == 200 else (ProblemBody, MEDIA_TYPE)
     if status not in PASSED_ON or answer.headers.get("Content-Type", "").partition(";")[0].strip() != media_type:
         raise _away(f"it answered {status}")
     content = bytearray()

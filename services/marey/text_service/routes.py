@@ -1,10 +1,11 @@
-"""`POST /v1/texts/parse` of the text service, and the bodies it shares with the API's route."""
+"""Routes of the text service, `POST /v1/texts/parse` and `/scope`, and the bodies that it shares with the API."""
 
 from __future__ import annotations
 
 import hmac
 import threading
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 import anyio
 from anyio import CapacityLimiter, to_thread
@@ -12,6 +13,7 @@ from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.bundles import TextSpec, choose_bundle, named_by
+from marey.bundles.scope import judges_meaning
 from marey.core import defaults
 from marey.core.errors import InvalidInput, Unauthenticated, Unreachable
 from marey.core.settings import Settings
@@ -21,9 +23,13 @@ from marey.items.item import MODEL
 from marey.items.prompts import check_prompt
 from marey.text.keys import as_served
 from marey.text_service.limits import Ticket, WordLimit
+from marey.vocabulary.scope import match_scope
 
 if TYPE_CHECKING:
+    from marey.text.meaning import MeaningJudge
     from marey.text.pipeline import TextPipeline
+
+View = TypeVar("View", bound=BaseModel)
 
 MAX_PROMPTS = 64
 """Prompts of one request: a second of work; more belong in a job."""
@@ -31,8 +37,9 @@ THREADS = 4
 """Concurrent requests: torch serves one after the other, but a request may wait for a rewriter."""
 MAX_LOADED = 4
 """Cached pipelines: bundles of one text specification share one."""
-_loading = threading.Lock()
+_loading = threading.RLock()
 _loaded: dict[str, TextPipeline] = {}
+_judges: dict[str, MeaningJudge] = {}
 
 
 class ParseBody(BaseModel):
@@ -44,6 +51,12 @@ class ParseBody(BaseModel):
     model: str = Field(
         defaults.MODEL, pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use."
     )
+
+
+class ScopesView(BaseModel):
+    """One scope per prompt, in the order given, as `Scope.as_json` writes it."""
+
+    items: list[dict[str, Any]]
 
 
 class NodeView(BaseModel):
@@ -96,6 +109,23 @@ def parse_prompts(body: ParseBody) -> GraphsView:
     return GraphsView(items=[GraphView.model_validate(each.to_json()) for each in parsed])
 
 
+def judge_prompts(body: ParseBody) -> ScopesView:
+    """Judge each prompt by its words, and by its meaning where they leave it undecided.
+
+    Raises:
+        InvalidInput: the bundle lists no actions.
+    """
+    prompts = [check_prompt(prompt, where=f"prompts.{index}") for index, prompt in enumerate(body.prompts)]
+    with named_by("model"):
+        manifest = choose_bundle(body.model, verify=False).manifest
+    lists = manifest.actions
+    if lists is None or manifest.text is None:
+        raise InvalidInput(f"{body.model!r} lists no actions", where="model", hint="Name a bundle that does.")
+    judge = judge_of(manifest.text) if judges_meaning(manifest.text) else None
+    scopes = [match_scope(prompt, lists) if judge is None else judge.judge(prompt, lists) for prompt in prompts]
+    return ScopesView(items=[scope.as_json() for scope in scopes])
+
+
 def text_router(config: Settings) -> APIRouter:
     """Return the route of the text service.
 
@@ -124,8 +154,15 @@ def text_router(config: Settings) -> APIRouter:
     @router.post("/parse")
     async def parse_texts(body: ParseBody) -> GraphsView:
         """Parse each prompt into its semantic graph."""
-        ticket = limit.take(body.prompts)
-        work = _ParseTask(body, ticket)
+        return await run(parse_prompts, body)
+
+    @router.post("/scope")
+    async def judge_scopes(body: ParseBody) -> ScopesView:
+        """Judge which prompts name actions that a bundle knows."""
+        return await run(judge_prompts, body)
+
+    async def run(function: Callable[[ParseBody], View], body: ParseBody) -> View:
+        work = _Task(function, body, limit.take(body.prompts))
         try:
             with anyio.fail_after(config.text_seconds):
                 return await to_thread.run_sync(work, limiter=threads, abandon_on_cancel=True)
@@ -137,16 +174,16 @@ def text_router(config: Settings) -> APIRouter:
     return router
 
 
-class _ParseTask:
+class _Task(Generic[View]):
     """One request in a thread. It counts as in flight until the thread is done, even after the client disconnected."""
 
-    def __init__(self, body: ParseBody, ticket: Ticket) -> None:
-        self._body, self._ticket, self._started = body, ticket, False
+    def __init__(self, function: Callable[[ParseBody], View], body: ParseBody, ticket: Ticket) -> None:
+        self._function, self._body, self._ticket, self._started = function, body, ticket, False
 
-    def __call__(self) -> GraphsView:
+    def __call__(self) -> View:
         self._started = True
         with self._ticket:
-            return parse_prompts(self._body)
+            return self._function(self._body)
 
     def forget(self) -> None:
         """Release its share if no thread has started it."""
@@ -172,6 +209,17 @@ def pipeline_of(model: str) -> TextPipeline:
     if bundle.manifest.text is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="model", hint="Name a generator.")
     return load_pipeline(bundle.manifest.text)
+
+
+def judge_of(spec: TextSpec) -> MeaningJudge:
+    """Return the judge of prompts by the encoder of a text specification, created once per process."""
+    from marey.text.meaning import MeaningJudge
+
+    with _loading:
+        if spec.encoder not in _judges:
+            encode = load_pipeline(spec).pooled
+            _judges[spec.encoder] = MeaningJudge(encode)
+        return _judges[spec.encoder]
 
 
 def load_pipeline(spec: TextSpec) -> TextPipeline:

@@ -42,6 +42,7 @@ from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from marey.jobs.quality_counts import count_quality
 from marey.jobs.states import ENDED
 from marey.runtime.logs import logger
+from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import ScopePolicy
 
 log = logger(__name__)
@@ -101,7 +102,10 @@ async def submit_job(
     async with kept_body(request, shared, key.tenant) as body:
         submission = await body.run(_read, kind, body.file, fields, shared)
         if validate_only:
-            return await body.run(_check, shared, key, submission)
+            report = await body.run(submission.examine)
+            if report is not None and report.left and (decided := await shared.texts.scopes(report.left)):
+                report = await body.run(submission.examine, decided)
+            return await body.run(_check, shared, key, submission, report)
         sha256 = None
         if idempotency_key:
             sha256 = await body.run(service.request_sha256, str(request.url.query), body.file)
@@ -118,7 +122,9 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
     )
 
 
-def _check(shared: Context, key: tenants.ApiKey, submission: service.Submission) -> JSONResponse:
+def _check(
+    shared: Context, key: tenants.ApiKey, submission: service.Submission, report: ScopeReport | None
+) -> JSONResponse:
     by_bundle = submission.by_bundle
     with db.transaction(shared.engine, db.SEARCH) as conn:
         rooms = tenants.check_quotas(conn, key.tenant, submission.count)
@@ -132,7 +138,7 @@ def _check(shared: Context, key: tenants.ApiKey, submission: service.Submission)
         quotas=[QuotaBody.of(room) for room in rooms],
         waiting=sum(waiting.get(queue, 0) for queue in {jobs.TEXT_QUEUE, *(model for model, _ in by_bundle)}),
         scope=submission.fields.scope,
-        **report_fields(submission.examine()),
+        **report_fields(report),
     )
     return JSONResponse(checked.model_dump(mode="json"))
 

@@ -20,6 +20,7 @@ from marey.items.item import InvalidItems, Item, Problem, read_item, read_items,
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items
 from marey.vocabulary.report import ScopeReport
+from marey.vocabulary.scope import Scope
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100
@@ -57,10 +58,15 @@ class Submission:
         never in memory as a whole."""
         return new_items(self._items(), report=report)
 
-    def examine(self) -> ScopeReport | None:
-        """Return the report on the scopes of all prompts, which are read again."""
+    def examine(self, decided: Mapping[tuple[str, str], Scope] | None = None) -> ScopeReport | None:
+        """Return the report on the scopes of all prompts, which are read again.
+
+        Args:
+            decided: the encoder's verdicts, by bundle and prompt; None = judged by words alone.
+        """
         report = self.new_report()
         if report is not None:
+            report.decided = decided or {}
             for item, generator in self._items():
                 generator.judge(item.prompt, report)
         return report

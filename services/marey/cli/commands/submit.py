@@ -149,9 +149,9 @@ def _show_scope(checked: CheckedJob) -> None:
         return
     if report.unlisted:
         console.say(f"{report.unlisted} prompts have no scope: their bundle lists no actions.")
+    how = "words and meaning" if report.by == "encoder" else "words only"
     console.say(
-        f"Prompts by words only: {report.known} known, {report.close} close, {report.tried} tried, "
-        f"{report.unknown} unknown."
+        f"Prompts by {how}: {report.known} known, {report.close} close, {report.tried} tried, {report.unknown} unknown."
     )
     console.warn_all(checked.warnings)
 
