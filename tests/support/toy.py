@@ -13,7 +13,8 @@ from enum import StrEnum
 
 from marey.core.errors import InvalidInput, NotFound, Unreachable
 from marey.jobs import ClaimedItem
-from marey.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome, TextDone
+from marey.runtime.exports import Export, ExportedFile
+from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome, TextDone
 
 QUEUE = "toy"
 REFERENCE = "tests.support.toy:ToyHandler"

@@ -30,8 +30,9 @@ from marey.jobs import (
     fail_items,
     release,
 )
+from marey.runtime.exports import Export, ExportedFile
 from marey.runtime.faults import as_problem, retry_unreachable
-from marey.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
+from marey.runtime.handler import Done, Failed, Outcome, Scored, TextDone
 from marey.runtime.lease import Heartbeat, HeldLease
 from marey.runtime.logs import logger
 from marey.runtime.telemetry import ids_of

@@ -17,11 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.jobs.leases import Claim, ClaimedItem, PromptScope
+from marey.runtime.exports import Export, ExportedFile
 from marey.runtime.scoring import ScoreInput
 
 
@@ -36,31 +37,6 @@ class Batch:
     """Text features (`TextFeatures.to_blob`) by the items' `text_key`; empty in the text stage."""
     scoring: ScoreInput | None = None
     """Motions of an evaluation, for score items, which have no prompt."""
-
-
-@dataclass(frozen=True)
-class ExportedFile:
-    """One file of a motion or report, in memory: it goes to the asset store under its sha256."""
-
-    format: str
-    """`npz`, `bvh`, …: name in the URL `motions/{id}/files/{format}`; or `html`, `json`, `md`, in
-    `evaluations/{id}/report/{format}`."""
-    content: bytes
-    media_type: str = "application/octet-stream"
-
-
-@dataclass(frozen=True)
-class Export:
-    """Result of a finished item: its files and the columns of its motion row."""
-
-    files: tuple[ExportedFile, ...]
-    frames: int
-    """Poses in the exported clip, at `fps`."""
-    fps: float
-    licence: str
-    """SPDX name or short text of the licence of the weights."""
-    manifest: Mapping[str, Any]
-    """The JSON of the npz's `manifest`: prompt, rewritten prompt, graph, bundle, weights, seed, settings, licence."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from marey.motion.finish import finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import KEY, PromptMatch
-from marey.runtime.handler import Export, ExportedFile
+from marey.runtime.exports import Export, ExportedFile
 from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
 

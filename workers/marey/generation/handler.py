@@ -16,7 +16,8 @@ from marey.generation.candidates import best_clips, split_settings
 from marey.generation.export import export_clip, finish
 from marey.generation.port import Generated, GenerationControl, Generator, Request, S
 from marey.jobs import ClaimedItem
-from marey.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
+from marey.runtime.exports import Export
+from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome
 from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -15,8 +15,10 @@ from marey.core.errors import InvalidInput
 from marey.items.item import MAX_SEED
 from marey.motion.features import FeatureLayout
 from marey.nn.devices import choose_device, fast_bf16
-from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
+
+if TYPE_CHECKING:
+    from marey.streams.recording import StreamRecording  # it would import the database
 
 
 @dataclass(frozen=True)
