@@ -84,13 +84,26 @@ def _progress() -> Generator[Callable[[str, int, int | None], None]]:
 
 @app.command()
 def inspect(
-    folder: Prepared,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A prepared folder, or one with BVH files.")],
     clip: Annotated[str | None, typer.Option("--clip", help="Show one clip with its captions.")] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Write the proposed dataset.toml and index.csv into a folder of BVH files.")
+    ] = False,
     as_json: console.Json = False,
 ) -> None:
-    """Verify a prepared folder's hashes and summarise its content."""
+    """Verify a prepared folder's hashes and summarise its content, or propose the dataset.toml of a folder with BVH
+    files."""
     from marey.cli.roles import data
 
+    if data.is_unprepared(folder):
+        proposed = data.propose_dataset(folder, write=write)
+        for path in proposed.written:
+            console.say(f"{path} was written: fill in what is empty.")
+        if as_json:
+            console.result_json({"dataset": proposed.text})
+        elif not write:
+            console.result(proposed.text.rstrip())
+        return
     found = data.inspect_data(folder, clip)
     if as_json:
         console.result_json(found)

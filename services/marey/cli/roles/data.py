@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.core.errors import InvalidInput, NotFound
+from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
@@ -90,6 +90,47 @@ def prepare_data(
 
     manifest = build(packs, output, speed=speed, progress=partial(progress, "building"))
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
+
+
+@dataclass(frozen=True)
+class ProposedFiles:
+    """A proposed `dataset.toml`, and the paths of written files."""
+
+    text: str
+    written: tuple[Path, ...] = ()
+
+
+def is_unprepared(folder: Path) -> bool:
+    """Return True for a folder with BVH files that is not a prepared one."""
+    return not (folder / "manifest.json").exists() and any(path.suffix.lower() == ".bvh" for path in folder.rglob("*"))
+
+
+def propose_dataset(folder: Path, *, write: bool) -> ProposedFiles:
+    """Propose the `dataset.toml` of a folder with BVH files, and an `index.csv` where there is none.
+
+    Args:
+        folder: with BVH files, at any depth.
+        write: write the files.
+
+    Raises:
+        Conflict: there is a `dataset.toml` already.
+        InvalidFile: no rig is recognised.
+    """
+    try:
+        from marey.data.dataset import DATASET, INDEX
+        from marey.data.propose import index_of, propose
+        from marey.motion.files import write_atomically
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    if write and (folder / DATASET).exists():
+        raise Conflict("already exists", where=str(folder / DATASET), hint="Move it away, or leave out --write.")
+    text = propose(folder).toml()
+    files = {DATASET: text} | ({} if (folder / INDEX).exists() else {INDEX: index_of(folder)})
+    if not write:
+        return ProposedFiles(text)
+    for name, content in files.items():
+        write_atomically(folder / name, content.encode())
+    return ProposedFiles(text, tuple(folder / name for name in files))
 
 
 def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
