@@ -25,6 +25,8 @@ LEAST = 10
 """Frames of the shortest training clip that is compared."""
 CLOSEST = 6
 """Training clips that are aligned; the others' closest poses are further away."""
+SPARSE = 3
+"""Of so many poses of a motion one is compared with all training poses, to find the closest clips."""
 COPY_MM = 25.0
 """A motion nearer than this to a training clip counts as a copy."""
 
@@ -117,8 +119,8 @@ class TrainingPoses:
         Raises:
             ValueError: there are no clips.
         """
-        flat = motion.reshape(len(motion), -1).astype(np.float32)
-        squared = self._squares - 2 * flat @ self._flat.T + np.square(flat).sum(axis=1)[:, None]  # (T, all)
+        flat = motion[::SPARSE].reshape(-1, self._flat.shape[1]).astype(np.float32)
+        squared = self._squares - 2 * flat @ self._flat.T + np.square(flat).sum(axis=1)[:, None]  # (T / 3, all)
         closest = np.minimum.reduceat(np.maximum(squared, 0), self._starts, axis=1)  # (T, clips)
         bound = np.sqrt(closest).mean(axis=0)
         order = np.argsort(bound)[:CLOSEST]
