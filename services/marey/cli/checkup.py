@@ -124,13 +124,13 @@ def models(config: Settings) -> Iterator[Finding]:
     """Check every bundle of this machine: its files, and the encoder and labeller of its prompts."""
     from marey.bundles import find_bundle, scan_bundles
     from marey.bundles.limits import seconds_of
-    from marey.bundles.places import OPEN
+    from marey.bundles.places import STARTER
 
     bundles = scan_bundles(config=config)
     for left_out in bundles.broken:
         yield broken("models", left_out.error)
     if not bundles.found and not bundles.broken:
-        hint = f"`pip install {OPEN}`, or put one into the folder that MAREY_MODELS names."
+        hint = f"`pip install {STARTER}`, or put one into the folder that MAREY_MODELS names."
         yield Finding("models", "warn", "no bundle here", hint)
     for found in bundles.found:
         try:

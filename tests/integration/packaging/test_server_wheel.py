@@ -114,11 +114,12 @@ def test_a_missing_bundle_names_its_distribution(marey: Release, tmp_path: Path)
     for path, hidden in aside:
         path.rename(hidden)
     try:
-        for arguments in (("generate", "a person walks"), ("generate", "x", "--bundle", "srl-light")):
-            with pytest.raises(AssertionError, match=f"pip install {OPEN}"):
+        for arguments in (("generate", "a person walks"), ("generate", "x", "--bundle", "hgm3-starter")):
+            with pytest.raises(AssertionError, match=f"pip install {STARTER}"):
                 bare.run(*arguments)
-        with pytest.raises(AssertionError, match=f"pip install {STARTER}"):
-            bare.run("generate", "x", "--bundle", "evaluator-starter")
+        for name in ("srl-light", "hgm3-open"):
+            with pytest.raises(AssertionError, match=f"pip install {OPEN}"):
+                bare.run("generate", "x", "--bundle", name)
     finally:
         for path, hidden in aside:
             hidden.rename(path)

@@ -27,7 +27,7 @@ RATES = [
     rate("walk; wave", "supported"),
 ]
 COPIES = {rate.action: 0.25 for rate in RATES}
-TAKES = {"walk": 40, "bow": 2, "kick": 9, "punch": 5, "dance": 3}
+TAKES = {"walk": 40, "bow": 2, "kick": 9, "punch": 5, "dance": 3, "fence": 2}
 
 
 def clip(name: str, content: str, **fields: Any) -> Clip:

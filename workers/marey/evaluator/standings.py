@@ -13,6 +13,7 @@ from marey.data.splits import actions_of
 from marey.evaluator.copies import COPY_MM
 from marey.motion.files import write_atomically
 from marey.referee.adherence import ActionRate
+from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists
 
 FEW_TAKES = 4
@@ -55,11 +56,12 @@ def training_takes(clips: Iterable[Clip]) -> dict[str, int]:
 def lists_of(rates: Sequence[ActionRate], takes: Mapping[str, int]) -> ActionLists:
     """Return the lists of a manifest.
 
-    An action that was trained on and is not supported is `tried`, whether it was measured or not.
+    An action of the vocabulary that was trained on and is not supported is `tried`, whether it was measured or not.
     """
     supported = sorted(rate.action for rate in rates if rate.standing == "supported" and ";" not in rate.action)
     few = {action for action in supported if takes.get(action, 0) < FEW_TAKES}
-    tried = sorted(action for action in takes if action not in supported)
+    known = load_vocabulary().actions
+    tried = sorted(action for action in takes if action in known and action not in supported)
     return ActionLists(
         supported=tuple(action for action in supported if action not in few),
         single_take=tuple(sorted(few)),
