@@ -75,7 +75,7 @@ class ProposedRig:
 
 @dataclass(frozen=True)
 class Proposal:
-    """What was found in a folder.
+    """Findings in a folder of BVH files.
 
     Attributes:
         name: of the set, from the folder.
