@@ -32,8 +32,12 @@ def scale_of(name: str) -> str:
     return name.removesuffix("weight") + "scale"
 
 
-def restore(stored: Mapping[str, NDArray[np.generic]]) -> Tensors:
+def restore(stored: Mapping[str, NDArray[np.generic]], *, where: str | None = None) -> Tensors:
     """Return tensors with their matrices of 8 bits as float32; others stay as they are.
+
+    Args:
+        stored: tensors of a part.
+        where: the part, for errors.
 
     Raises:
         InvalidBundle: a matrix has no scales, or they do not fit it.
@@ -44,7 +48,7 @@ def restore(stored: Mapping[str, NDArray[np.generic]]) -> Tensors:
     for name in sorted(matrices):
         value, scale = stored[name], stored.get(scale_of(name))
         if scale is None or scale.shape != value.shape[:1]:
-            raise InvalidBundle(f"the matrix {name!r} of 8 bits does not fit its scales")
+            raise InvalidBundle(f"the matrix {name!r} of 8 bits does not fit its scales", where=where)
         restored[name] = value.astype(np.float32) * scale.astype(np.float32).reshape(-1, *[1] * (value.ndim - 1))
     return restored
 

@@ -66,11 +66,8 @@ def length_of(bundle: Bundle, item: Item) -> float | None:
     """
     if item.seconds is not None:
         return item.seconds
-    stated = stated_length(item.prompt).seconds
-    if stated is None:
-        return None
-    low, high = seconds_of(bundle)
-    return stated if low <= stated <= high else None
+    stated = stated_length(item.prompt)
+    return None if stated.seconds is None else stated.within(*seconds_of(bundle))
 
 
 def settings_of(bundle: Bundle) -> tuple[Setting, ...]:

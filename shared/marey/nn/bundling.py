@@ -98,10 +98,7 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
         InvalidBundle: the tensors do not fit the network.
     """
     where = f"{bundle.path}: {part}"
-    try:
-        state = {name: torch.tensor(value) for name, value in restore(bundle.tensors(part)).items()}
-    except InvalidBundle as error:
-        raise InvalidBundle(error.message, where=where) from error
+    state = {name: torch.tensor(value) for name, value in restore(bundle.tensors(part), where=where).items()}
     try:
         found: Any = network.load_state_dict(state, strict=False)
     except RuntimeError as error:  # a shape differs

@@ -40,10 +40,7 @@ def load_weights(bundle: Bundle) -> dict[str, Tensor]:
     Raises:
         InvalidBundle: the bundle is damaged, or does not hold six layers of width 384.
     """
-    try:
-        restored = restore(bundle.tensors(PART))
-    except InvalidBundle as error:
-        raise InvalidBundle(error.message, where=str(bundle.path)) from error
+    restored = restore(bundle.tensors(PART), where=str(bundle.path))
     weights = {name: torch.as_tensor(value.astype(np.float32)) for name, value in restored.items()}
     _check(weights, bundle.path)
     return weights

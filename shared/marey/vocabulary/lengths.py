@@ -53,6 +53,10 @@ class StatedLength:
     seconds: float | None = None
     is_partial: bool = False
 
+    def within(self, low: float, high: float) -> float | None:
+        """Return the length if a motion of `low` to `high` seconds can have it, else None."""
+        return self.seconds if self.seconds is not None and low <= self.seconds <= high else None
+
 
 def stated_length(prompt: str) -> StatedLength:
     """Return the length that a prompt states.

@@ -180,8 +180,8 @@ def refusal(scope: Scope) -> str | None:
 
 
 def _exceeds(prompt: str, low: float, high: float) -> bool:
-    seconds = stated_length(prompt).seconds
-    return seconds is not None and not low <= seconds <= high
+    stated = stated_length(prompt)
+    return stated.within(low, high) != stated.seconds
 
 
 def _cut(text: str) -> str:

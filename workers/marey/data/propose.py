@@ -112,6 +112,11 @@ class Proposal:
         return "\n".join(lines) + "\n"
 
 
+def bvh_files(folder: Path) -> Iterator[Path]:
+    """Yield the BVH files of a folder, at any depth."""
+    return (path for path in folder.rglob("*") if path.suffix.lower() == ".bvh")
+
+
 def propose(folder: Path) -> Proposal:
     """Look at the BVH files of a folder.
 
@@ -119,7 +124,7 @@ def propose(folder: Path) -> Proposal:
         NotFound: there are none.
         InvalidFile: no file is a human body with joints that are recognised.
     """
-    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".bvh")[:MAX_FILES]
+    paths = sorted(bvh_files(folder))[:MAX_FILES]
     if not paths:
         raise NotFound("there are no BVH files", where=str(folder))
     kinds: dict[tuple[str, ...], list[BvhClip]] = {}
@@ -155,7 +160,7 @@ def index_of(folder: Path) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(("file", "action", "captions", "source"))
-    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".bvh"):
+    for path in sorted(bvh_files(folder)):
         writer.writerow((path.relative_to(folder).as_posix(), "", "", path.stem))
     return out.getvalue()
 

@@ -79,9 +79,9 @@ class OneShot:
         from marey.generation.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
-        fps = self._generator.limits.fps
+        frames_of = self._generator.limits.frames_of
         requests = [
-            Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps), scope=self._scope(w.prompt))
+            Request(text, w.seed, frames_of(w.seconds), scope=self._scope(w.prompt))
             for w, text in zip(wanted, features, strict=True)
         ]
         requests = [self._generator.resolve_length(request) for request in requests]

@@ -113,8 +113,7 @@ class GeneratorHandler(Generic[S]):
         return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
-        fps = self.generator.limits.fps
-        frames = None if item.seconds is None else round(item.seconds * fps)
+        frames = self.generator.limits.frames_of(item.seconds)
         recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
         return Request(text, item.seed, frames, recording, item.scope)

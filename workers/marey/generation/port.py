@@ -41,6 +41,10 @@ class Limits:
     fps: float
     text_width: int
 
+    def frames_of(self, seconds: float | None) -> int | None:
+        """Return the frames of a length; None = the model decides."""
+        return None if seconds is None else round(seconds * self.fps)
+
     def check(self, request: Request) -> None:
         """Check that a request is within the limits.
 

@@ -210,7 +210,7 @@ def judge_bundle(
         prompts,
         seeds=range(seeds),
         settings=generator.settings(settings or {}),
-        frames=None if seconds is None else round(seconds * generator.limits.fps),
+        frames=generator.limits.frames_of(seconds),
         progress=progress,
     )
 

@@ -214,8 +214,8 @@ class _Run:
 
         generator, settings = self._generator, self._settings
         texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
-        lengths = [length_of(generator.bundle, Item(prompt.text)) for prompt in prompts]
-        frames = [None if seconds is None else round(seconds * generator.limits.fps) for seconds in lengths]
+        lengths = (length_of(generator.bundle, Item(prompt.text)) for prompt in prompts)
+        frames = [generator.limits.frames_of(seconds) for seconds in lengths]
         jobs = [
             (prompt, Request(text, seed, wanted))
             for seed in range(self._options.seeds)

@@ -102,7 +102,12 @@ class ProposedFiles:
 
 def is_unprepared(folder: Path) -> bool:
     """Return True for a folder with BVH files that is not a prepared one."""
-    return not (folder / "manifest.json").exists() and any(path.suffix.lower() == ".bvh" for path in folder.rglob("*"))
+    try:
+        from marey.data.manifest import MANIFEST
+        from marey.data.propose import bvh_files
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    return not (folder / MANIFEST).exists() and any(bvh_files(folder))
 
 
 def propose_dataset(folder: Path, *, write: bool) -> ProposedFiles:
