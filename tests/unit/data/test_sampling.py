@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from marey.data.manifest import Clip, Measured
-from marey.data.sampling import author_table, classes_of, draw_captions, sampling_weights
+from marey.data.sampling import ACT_WEIGHT, author_table, classes_of, draw_captions, sampling_weights
 from marey.training.tokenizing import SHARES, tokenizer_weights
 
 STILL = Measured(seconds=1, path=0, turn=0, speed=0, steps=0, side="")
@@ -41,18 +41,23 @@ def mass_of(clips: Sequence[Clip]) -> dict[str, float]:
 
 
 def test_a_class_is_drawn_by_the_root_of_its_clips_whatever_set_they_come_from() -> None:
-    clips = [clip("walk", "one")] * 8 + [clip("walk", "two")] * 8 + [clip("sit", "one")] * 4
+    clips = [clip("kneel", "one")] * 8 + [clip("kneel", "two")] * 8 + [clip("sit", "one")] * 4
     mass = mass_of(clips)
-    assert mass["walk"] / mass["sit"] == pytest.approx(2)
+    assert mass["kneel"] / mass["sit"] == pytest.approx(2)
 
 
 def test_a_clip_with_several_actions_belongs_to_each_in_equal_parts() -> None:
-    clips = [clip("walk")] * 7 + [clip("walk; sit")] * 4 + [clip("sit")] * 2
-    assert classes_of(clips[7]) == ("walk", "sit")
+    clips = [clip("kneel")] * 7 + [clip("kneel; sit")] * 4 + [clip("sit")] * 2
+    assert classes_of(clips[7]) == ("kneel", "sit")
     mass = mass_of(clips)
-    # walk has 7 + 4 / 2 = 9 clips and sit 2 + 4 / 2 = 4: roots 3 and 2
-    assert mass["walk"] == pytest.approx(3 * (7 / 9) / 5)
-    assert mass["walk; sit"] == pytest.approx((3 * (2 / 9) + 2 * (2 / 4)) / 5)
+    # kneel has 7 + 4 / 2 = 9 clips and sit 2 + 4 / 2 = 4: roots 3 and 2
+    assert mass["kneel"] == pytest.approx(3 * (7 / 9) / 5)
+    assert mass["kneel; sit"] == pytest.approx((3 * (2 / 9) + 2 * (2 / 4)) / 5)
+
+
+def test_a_gait_is_drawn_more_often_whether_its_clips_name_it_as_kind_or_as_class() -> None:
+    mass = mass_of([clip("walk-backward")] * 4 + [clip("sit")] * 4)
+    assert mass["walk-backward"] / mass["sit"] == pytest.approx(ACT_WEIGHT["walk-backward"])
 
 
 def test_free_text_after_a_dash_makes_no_class_of_its_own() -> None:

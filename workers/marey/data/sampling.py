@@ -14,9 +14,20 @@ from marey.data.splits import actions_of
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Shares of the draws for sequences of two and three actions; the rest goes to clips of one action."""
 
-ACT_WEIGHT = {"walk": 3.0, "walk_back": 2.5, "bow": 2.0, "turn": 1.5}
-"""Factors by which clips of an action are drawn more often. A gait is harder to learn than a raised hand (steps must
-alternate, and feet must not slide), and there are only 14 bows and 14 walks backward."""
+ACT_WEIGHT = {
+    "walk": 3.0,
+    "run": 2.0,
+    "walk_back": 2.5,
+    "walk-backward": 2.5,
+    "bow": 2.0,
+    "wave": 2.0,
+    "turn": 1.5,
+    "turn-around": 1.5,
+    "stand-up": 1.5,
+    "sit-down": 1.5,
+}
+"""Factors by which clips of a kind or class are drawn more often. A gait is harder to learn than a raised hand (steps
+must alternate, and feet must not slide), and most prompts ask for one; there are few bows and walks backward."""
 
 
 def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
@@ -57,9 +68,9 @@ def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
         for name in names:
             shares[name][k] = per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
     weights = np.zeros(len(clips))
-    for of_class in shares.values():
+    for name, of_class in shares.items():
         for k, share in _made_halved(of_class, clips).items():
-            weights[k] += share * ACT_WEIGHT.get(clips[k].acts[0], 1.0)
+            weights[k] += share * max(ACT_WEIGHT.get(clips[k].acts[0], 1.0), ACT_WEIGHT.get(name, 1.0))
     return weights / weights.sum() if len(weights) else weights
 
 
