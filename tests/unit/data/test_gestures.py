@@ -143,8 +143,8 @@ def test_nothing_is_made_without_an_idle_that_stands() -> None:
 
 
 def test_made_clips_are_at_most_half_of_what_is_drawn_of_an_action() -> None:
-    captured, made = clip("wave"), clip("wave").model_copy(update={"made": True})
-    clips = [captured] * 2 + [made] * 30 + [clip("walk")] * 32
+    captured, made = clip("guide"), clip("guide").model_copy(update={"made": True})
+    clips = [captured] * 2 + [made] * 30 + [clip("sit")] * 32
     weights = sampling_weights(clips)
     assert weights[:2].sum() == pytest.approx(weights[2:32].sum())
     assert weights[:32].sum() == pytest.approx(weights[32:].sum())
