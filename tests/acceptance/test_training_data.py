@@ -24,6 +24,9 @@ def test_a_pack_is_prepared_and_inspected_where_the_archive_is_not(alone: Marey,
     JointsPack.of([(clip, walker(4.0).astype(np.float32))], [known_set("cmu").terms]).save(tmp_path / "a.pack.npz")
     alone("data", "prepare", "pack", tmp_path / "a.pack.npz", "-o", tmp_path / "prepared").ok()
     assert "stroll" in alone("data", "inspect", tmp_path / "prepared", "--clip", "stroll").ok().out
+    alone("data", "inspect", tmp_path / "prepared", "--write").refused(2, "--write", "this folder is prepared")
+    (tmp_path / "take.bvh").touch()
+    alone("data", "inspect", tmp_path, "--clip", "stroll").refused(2, "--clip", "this folder is not prepared")
 
 
 def test_unknown_sources_missing_archives_and_foreign_packs_are_told(alone: Marey, tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from marey.bundles import BundleManifest, TextSpec, find_bundle
+from marey.bundles import Bundle, TextSpec, find_bundle
+from marey.bundles.limits import seconds_of
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.items.item import UnknownAction
@@ -15,7 +16,7 @@ from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served, scope_key
 from marey.text.meaning import MeaningJudge
 from marey.text.pipeline import TextPipeline
-from marey.vocabulary.report import refusal, says_known
+from marey.vocabulary.report import refusal, says_known, with_length
 from marey.vocabulary.scope import ScopePolicy, match_scope
 
 BATCH = 64
@@ -40,8 +41,8 @@ class TextHandler:
         Raises:
             NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or does not match.
         """
-        manifest = find_bundle(bundle, verify=False).manifest
-        spec = manifest.text
+        found = find_bundle(bundle, verify=False)
+        spec = found.manifest.text
         if spec is None:
             raise InvalidBundle("this bundle does not read prompts", where=bundle)
         if spec not in self._pipelines:
@@ -50,7 +51,7 @@ class TextHandler:
                 self._stages[spec] = ScopeStage(MeaningJudge(self._pipelines[spec].pooled))
         self._pipeline, self._scopes = self._pipelines[spec], self._stages.get(spec)
         if self._scopes is not None:
-            self._scopes.bundles[bundle] = manifest
+            self._scopes.bundles[bundle] = found
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
         """Return one bucket: texts are encoded one by one anyway."""
@@ -72,8 +73,8 @@ class ScopeStage:
     """Scopes of prompts, for bundles of one text specification."""
 
     judge: MeaningJudge
-    bundles: dict[str, BundleManifest] = field(default_factory=dict[str, BundleManifest])
-    """Manifests of the bundles that were asked for."""
+    bundles: dict[str, Bundle] = field(default_factory=dict[str, Bundle])
+    """The bundles that were asked for."""
 
     def scope_of(self, item: ClaimedItem, policy: ScopePolicy) -> PromptScope | None:
         """Return the encoder's verdict on an item's prompt; None if the words decide it, or it is not examined.
@@ -83,19 +84,20 @@ class ScopeStage:
         """
         if policy == "ignore":
             return None
-        manifest = self._manifest(item.bundle)
-        lists = manifest.actions
+        bundle = self._bundle(item.bundle)
+        lists = bundle.manifest.actions
         if lists is None or match_scope(item.prompt, lists).left is None:
             return None
         scope = self.judge.judge(item.prompt, lists)
         if policy == "refuse" and (message := refusal(scope)) is not None:
-            raise UnknownAction(f"the prompt {message}", hint=says_known(manifest.name, lists.known))
+            raise UnknownAction(f"the prompt {message}", hint=says_known(bundle.manifest.name, lists.known))
+        scope = with_length(scope, item.prompt, seconds_of(bundle))
         return PromptScope(scope_key(item.prompt, item.bundle, lists), scope.as_json())
 
-    def _manifest(self, bundle: str) -> BundleManifest:
-        if bundle not in self.bundles:
-            self.bundles[bundle] = find_bundle(bundle, verify=False).manifest
-        return self.bundles[bundle]
+    def _bundle(self, name: str) -> Bundle:
+        if name not in self.bundles:
+            self.bundles[name] = find_bundle(name, verify=False)
+        return self.bundles[name]
 
 
 def _outcome(pipeline: TextPipeline, scopes: ScopeStage | None, item: ClaimedItem, policy: ScopePolicy) -> Outcome:

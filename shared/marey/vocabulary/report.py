@@ -95,8 +95,8 @@ class ScopeReport:
             self.unlisted += 1
             return None
         scope = self.decided.get((bundle, prompt)) or match_scope(prompt, lists)
-        if lengths is not None and _exceeds(prompt, *lengths):
-            scope = replace(scope, flags=(*scope.flags, "length"))
+        if lengths is not None:
+            scope = with_length(scope, prompt, lengths)
         if scope.left is not None:
             self._leave(bundle, prompt)
         verdict = scope.verdict
@@ -155,6 +155,19 @@ class ScopeReport:
         return f"{count} of {self.total} prompts, first number {first.index + 1}, {first.prompt!r}{what}"
 
 
+def with_length(scope: Scope, prompt: str, lengths: tuple[float, float]) -> Scope:
+    """Return a scope with the flag `length` if its prompt states a length out of a bundle's range.
+
+    Args:
+        scope: of the prompt.
+        prompt: as `check_prompt` returns it.
+        lengths: shortest and longest motion of the bundle, in seconds.
+    """
+    stated = stated_length(prompt)
+    exceeds = stated.within(*lengths) != stated.seconds
+    return replace(scope, flags=(*scope.flags, "length")) if exceeds else scope
+
+
 def warn_of(prompt: str, bundle: str, lists: ActionLists | None) -> list[str]:
     """Return the warnings of one prompt, by its words; none for a bundle that lists no actions."""
     report = ScopeReport()
@@ -177,11 +190,6 @@ def refusal(scope: Scope) -> str | None:
     unknown = ", ".join(repr(_cut(each.text)) for each in scope.actions if each.verdict == "unknown")
     why = f" ({', '.join(scope.flags)})" if scope.flags else ""
     return f"names an action that the model does not know: {unknown}{why}"
-
-
-def _exceeds(prompt: str, low: float, high: float) -> bool:
-    stated = stated_length(prompt)
-    return stated.within(low, high) != stated.seconds
 
 
 def _cut(text: str) -> str:

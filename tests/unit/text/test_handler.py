@@ -158,6 +158,16 @@ def test_the_encoder_decides_what_the_words_leave(listed: str) -> None:
     assert clear.scope is None
 
 
+def test_the_encoder_s_verdict_keeps_the_flag_of_a_length_out_of_range(listed: str) -> None:
+    long, short = judge(listed, "warn", "a low bow for two minutes", "a low bow for two seconds")
+    assert isinstance(long, TextDone)
+    assert long.scope is not None
+    assert long.scope.scope["flags"] == ["length"]
+    assert isinstance(short, TextDone)
+    assert short.scope is not None
+    assert short.scope.scope["flags"] == []
+
+
 def test_refuse_fails_what_the_encoder_finds_unknown_for_good(listed: str) -> None:
     failed, done = judge(listed, "refuse", "a wave of nausea", "a low bow")
     assert isinstance(failed, Failed)

@@ -95,7 +95,12 @@ def inspect(
     files."""
     from marey.cli.roles import data
 
-    if data.is_unprepared(folder):
+    unprepared = data.is_unprepared(folder)
+    if unprepared and clip is not None:
+        raise InvalidInput("shows a clip of prepared data, and this folder is not prepared", where="--clip")
+    if write and not unprepared:
+        raise InvalidInput("writes into a folder of BVH files, and this folder is prepared", where="--write")
+    if unprepared:
         proposed = data.propose_dataset(folder, write=write)
         for path in proposed.written:
             console.say(f"{path} was written: fill in what is empty.")
