@@ -150,6 +150,22 @@ def test_a_leap_that_never_lands_keeps_the_floor_of_its_file() -> None:
     assert clearance(on_floor(joints - [0.0, 0.45, 0.0], "file")).min() < 0.01
 
 
+def test_a_body_falls_to_the_floor_though_its_file_keeps_the_hips_at_one_height(folder: Path) -> None:
+    joints = waver("left", 4.0)
+    fallen = turned(joints, "X", -90 * np.clip((np.arange(len(joints)) - 20) / 30, 0, 1))
+    for name, rise in (("a", 0.0), ("b", 0.02)):
+        height = 0.9 + rise * np.sin(np.arange(len(joints)) / 5)
+        moved = fallen + np.array([0.0, 1.0, 0.0]) * (height[:, None] - fallen[:, :1, 1])[..., None]
+        (folder / "takes" / f"{name}.bvh").write_bytes(bandai_bvh(moved))
+    (folder / DATASET).write_text(STUDIO.replace('floor = "feet"', 'floor = "support"'))
+    (folder / INDEX).write_text("file,action\ntakes/a.bvh,die\ntakes/b.bvh,die\n")
+    pack = pack_set(CaptureSet.own(folder), processes=1)
+    kept, moving = (pack.joints(clip) for clip in pack.clips)
+    assert np.abs(clearance(kept)).max() < 0.05
+    assert kept[0, 0, 1] - kept[-1, 0, 1] > 0.3
+    assert np.ptp(moving[:, 0, 1]) < 0.1  # a file that holds the height is believed
+
+
 @pytest.mark.parametrize("slope", [(0.02, 0.0), (0.0, -0.018)])
 def test_a_floor_that_clearly_tilts_is_made_level(slope: tuple[float, float]) -> None:
     walk = on_floor(walker(5.0), "support")

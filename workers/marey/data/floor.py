@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.motion.filters import smooth
 from marey.motion.support import RADII
 
 Array = NDArray[np.floating]
@@ -21,6 +22,7 @@ slope."""
 _EXPLAINED = 0.7  # largest remaining share of the spread of support heights after fitting a tilted floor
 _STANDS = 0.15  # m/s, largest speed of a joint that carries the body
 _ROUNDS, _OUTLIER = 8, 0.02
+_FOLLOW = 0.05  # seconds, smoothing of a floor that follows the body
 _NEAR = (-0.3, 0.08)  # metres: `RADII` ignore flesh under lying bodies; higher bodies are in the air
 
 
@@ -67,6 +69,17 @@ def _plane(places: Array) -> tuple[Array, float, float]:
         off = np.abs(places[:, 1] - design @ solved)
     level = np.abs(places[:, 1] - np.median(places[:, 1]))
     return solved[:-1] @ axes, float(np.median(level)), float(np.median(off))
+
+
+def follow_floor(joints: Array, fps: float = 20.0) -> Array:
+    """Move each frame of a clip (T, 22, 3) so that the body is on the floor.
+
+    For files whose hips stay at one height, though the body crouches, lies or sits: what rises in them are the feet.
+    """
+    out = np.array(joints, np.float64)
+    lowest = (out[..., 1] - RADII).min(axis=1, keepdims=True)
+    out[..., 1] -= smooth(lowest, _FOLLOW * fps)
+    return out
 
 
 def on_floor(joints: Array, rule: Literal["support", "feet", "file"]) -> Array:

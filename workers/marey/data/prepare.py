@@ -17,7 +17,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.archive import bvh_files
 from marey.data.caption_files import CaptionFile, read_caption_files
 from marey.data.dataset import DATASET, INDEX, SETS, Dataset, known_set, read_dataset
-from marey.data.floor import on_floor
+from marey.data.floor import follow_floor, on_floor
 from marey.data.index import UNUSED, Row, read_index
 from marey.data.pack import JointsPack, PackClip
 from marey.data.retarget import FPS, read_source, retarget
@@ -26,6 +26,8 @@ from marey.motion.io.bvh import parse_bvh
 Progress = Callable[[int, int | None], None]
 """Called with the number of finished files and the total, or None if unknown."""
 LEAST_FRAMES = 4
+LEAST_RISE = 0.001
+"""Metres by which hips rise and fall at least in a file that holds their height."""
 
 
 @dataclass(frozen=True)
@@ -170,5 +172,8 @@ def retarget_file(name: str, data: bytes, dataset: Dataset) -> tuple[str, NDArra
     where = f"{name}.bvh"
     clip = parse_bvh(data, where=where, unit=dataset.unit, up=dataset.up)
     rig = dataset.rig_of(clip.skeleton.joint_names, where)
-    joints = retarget(read_source(clip, rig, where=where, unit=dataset.unit), rig, unit=dataset.unit)
+    source = read_source(clip, rig, where=where, unit=dataset.unit)
+    joints = retarget(source, rig, unit=dataset.unit)
+    if np.ptp(source.joints[:, 0, 1]) < LEAST_RISE:
+        joints = follow_floor(joints)
     return name, on_floor(joints, dataset.floor).astype(np.float32)
