@@ -21,21 +21,24 @@ def _standing(body: Body, share: float = 0.6) -> bool:
 
 def _guard(body: Body) -> Mask:
     """Return where both hands are held between waist and face, one of them ahead of the trunk, over a ready stance."""
-    held, ahead = np.ones(len(body), np.bool_), np.zeros(len(body), np.bool_)
+    held, ahead, high = np.ones(len(body), np.bool_), np.zeros(len(body), np.bool_), np.zeros(len(body), np.bool_)
     for side in SIDES:
         hand = body.own(f"{side}_wrist")
         held &= (hand[:, 1] > 0.0) & (hand[:, 1] < 0.85) & (hand[:, 2] > -0.1) & (body.bend(side, "elbow") > 40)
-        ahead |= hand[:, 2] > 0.15
-    stance = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1) > 0.3
-    knees = np.maximum(body.bend("L", "knee"), body.bend("R", "knee")) > 20
-    return held & ahead & (stance | knees) & (body.height("pelvis") > 0.7 * HIPS)
+        ahead |= hand[:, 2] > 0.05
+        high |= hand[:, 1] > 0.3
+    stance = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1) > 0.32
+    # Robots and people who wait stand with straight legs, and hands at the waist.
+    knees = np.maximum(body.bend("L", "knee"), body.bend("R", "knee")) > 15
+    return held & ahead & stance & (knees | high) & (body.height("pelvis") > 0.6 * HIPS)
 
 
 @rule("fight-stance")
 def fight_stance(body: Body) -> bool:
     strikes = np.maximum(*(np.linalg.norm(body.own_velocity(f"{s}_wrist"), axis=-1) for s in SIDES))
-    stays = travel(body) < 0.6 and planted(body, 0.1)
-    return stays and _standing(body) and body.most(_guard(body)) and float(np.percentile(strikes, 95)) < 2.0
+    rests = np.maximum(body.speed("L_foot"), body.speed("R_foot")) < 0.3
+    stays = travel(body) < 1.5 and planted(body, 0.1) and body.share(rests) >= 0.4
+    return stays and _standing(body) and body.most(_guard(body)) and float(np.percentile(strikes, 85)) < 2.0
 
 
 def _strikes(body: Body, side: str) -> int:
@@ -188,15 +191,17 @@ def shoot(body: Body) -> bool:
 
 @rule("draw-bow")
 def draw_bow(body: Body) -> bool:
+    if passage(body) or not planted(body):
+        return False
     for side in SIDES:
         bow, string = body.own(f"{side}_wrist", f"{side}_shoulder"), f"{OTHER[side]}_wrist"
-        out = (_reach(body, side) > 0.4) & (np.abs(bow[:, 1]) < 0.25) & (body.bend(side, "elbow") < 55)
+        out = (_reach(body, side) > 0.4) & (np.abs(bow[:, 1] - 0.1) < 0.3) & (body.bend(side, "elbow") < 55)
         face = np.minimum(
             np.linalg.norm(body.own(string, "head"), axis=-1),
             np.linalg.norm(body.own(string, f"{OTHER[side]}_shoulder"), axis=-1),
         )
         elbow_up = body.height(f"{OTHER[side]}_elbow") > body.height(f"{OTHER[side]}_shoulder") - 0.25
-        if body.seconds(out & (face < 0.3) & elbow_up & (body.hand_apart() > 0.35)) >= 0.2:
+        if body.seconds(out & (face < 0.34) & elbow_up & (body.hand_apart() > 0.35)) >= 0.2:
             return True
     return False
 
@@ -260,7 +265,7 @@ def die(body: Body) -> bool:
     last = slice(-body.frames(0.2), None)
     down = max(float(body.height(joint)[last].max()) for joint in ("pelvis", "spine3", "head"))
     first = body.height("pelvis")[: body.frames(1.0)].max()
-    return down < 0.45 and first > 0.6 * HIPS
+    return down < 0.52 and first > 0.6 * HIPS
 
 
 @rule("karate")

@@ -300,7 +300,7 @@ def crouch(body: Body) -> bool:
     hands = np.minimum(body.height("L_wrist"), body.height("R_wrist")) > 0.08
     feet = (body.lift("L") < 0.12) & (body.lift("R") < 0.12)
     bent = np.minimum(body.bend("L", "knee"), body.bend("R", "knee")) > 45
-    knees = np.minimum(body.height("L_knee"), body.height("R_knee")) > 0.12
+    knees = np.maximum(body.height("L_knee"), body.height("R_knee")) > 0.12
     # Who sits has both feet ahead of the hips all the time.
     over = np.minimum(body.own("L_ankle")[:, 2], body.own("R_ankle")[:, 2]) < 0.12
     down = hands & feet & bent & knees & (body.height("pelvis") < 0.9 * HIPS)
@@ -329,7 +329,7 @@ def carry(body: Body) -> bool:
     for side in SIDES:
         hand = body.own(f"{side}_wrist")[part]
         held = np.linalg.norm(body.own_velocity(f"{side}_wrist")[part], axis=-1) < 0.35
-        before = (hand[:, 1] > -0.05) & (hand[:, 2] > 0.15)
+        before = (hand[:, 1] > -0.05) & (hand[:, 2] > 0.05)
         shoulder = hand[:, 1] > 0.4
         if walks and (held & (before | shoulder)).mean() >= 0.6:
             return True

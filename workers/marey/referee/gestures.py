@@ -348,7 +348,7 @@ def stand_up(body: Body) -> bool:
     # On a high seat one foot stands on the floor, and that thigh hangs.
     rests = _seated(body, hanging=True)[first].any() and begins < 0.93 * HIPS
     rise = float(np.median(hips[last])) - float(hips[first].min())
-    return bool(rests and rise >= SEAT_DROP and float(np.median(hips[last])) > 0.85 * HIPS)
+    return bool(rests and rise >= 0.085 and float(np.median(hips[last])) > 0.8 * HIPS)
 
 
 @rule("sit-floor")
@@ -447,10 +447,12 @@ def arm_circles(body: Body) -> bool:
         hand = body.own(f"{side}_wrist", f"{side}_shoulder")
         long = np.linalg.norm(hand, axis=-1) > 0.3
         for axis in (0, 2):
-            angle = np.unwrap(np.arctan2(hand[:, axis], hand[:, 1]))
-            clear = np.linalg.norm(hand[:, [axis, 1]], axis=-1) > 0.15
-            for begin, end in runs(long & clear):
-                if np.ptp(angle[begin:end]) >= np.deg2rad(330):
+            # Across the plane of its circle an arm passes the shoulder's line, where its angle means nothing.
+            clear = long & (np.linalg.norm(hand[:, [axis, 1]], axis=-1) > 0.15)
+            frames = np.flatnonzero(clear)
+            gaps = np.flatnonzero(np.diff(frames) > body.frames(0.15)) + 1
+            for part in np.split(frames, gaps):
+                if len(part) and np.ptp(np.unwrap(np.arctan2(hand[part, axis], hand[part, 1]))) >= np.deg2rad(330):
                     return True
     return False
 
