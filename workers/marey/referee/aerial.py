@@ -125,7 +125,7 @@ def jumping_jacks(body: Body) -> bool:
     apart = body.smooth(np.abs(body.own("L_ankle", "R_ankle")[:, 0]), 0.1)
     hands = [body.height(f"{side}_wrist") - body.height(f"{side}_shoulder") for side in SIDES]
     arms = [len([1 for a, b in swings(hand, 0.5) if hand[b] > 0.05 and hand[b] > hand[a]]) for hand in hands]
-    return len(swings(apart, 0.2)) >= 4 and min(arms) >= 2
+    return len(swings(apart, 0.3)) >= 2 and min(arms) >= 1
 
 
 def _stairs(body: Body) -> list[float]:

@@ -213,7 +213,7 @@ def sprint(body: Body) -> bool:
         return bool(_ahead(found) and fast.max() >= 4.0 and found.flight >= 0.05)
     knees = max(float(np.percentile(body.height(f"{side}_knee"), 95)) for side in SIDES)
     elbows = min(float(np.median(body.bend(side, "elbow"))) for side in SIDES)
-    return found.cadence >= 3.2 and knees > 0.6 and elbows > 45
+    return found.cadence >= 2.75 and knees > 0.6 and elbows > 45
 
 
 @rule("turn")
