@@ -30,6 +30,7 @@ from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
 from marey.data.splice import with_bones
 from marey.data.splits import Sourced, actions_of, splits_by_source
+from marey.data.spoken import spoken
 from marey.data.text_sequences import compose_texts, joined_texts
 from marey.motion.features import HUMANML3D_263
 
@@ -124,7 +125,7 @@ def _windows_of(
         for k, piece in enumerate(pieces):
             joints = LAYOUT.mirror_joints(whole[piece]) if mirrored else whole[piece]
             name = ("M" if mirrored else "") + clip.id + pace + (f"@{k}" if len(pieces) > 1 else "")
-            facts = _facts(clip, content, joints, mirrored=mirrored)
+            facts = _facts(clip, content, joints, name, mirrored=mirrored)
             if len(joints) <= MIN_FRAMES:
                 left_out[name] = "shorter than a second"
             elif is_broken(joints, FPS):
@@ -183,13 +184,16 @@ def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
     return replace(clip, facts=change(clip.facts) or "", captions=tuple(said for said in changed if said))
 
 
-def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
-    """Facts of a clip: captions of its index, or the caption grammar if it has the action."""
+def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], name: str, *, mirrored: bool) -> Facts | None:
+    """Facts of a clip: captions of its index, and for training the vocabulary's; or the caption grammar if it has the
+    action."""
     if clip.captions or content not in ACTIONS:
         seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
         authors = clip.captions or ((seen,),)
         if mirrored:
             authors = tuple(tuple(map(wording.mirrored, said)) for said in authors)
+        if clip.split == "train" and (words := spoken(content, name)):
+            authors += (words,)
         return describe_text(authors, joints, FPS)
     return describe(content, clip.style, joints, FPS)
 

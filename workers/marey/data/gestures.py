@@ -25,6 +25,7 @@ from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, direction,
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
+from marey.data.spoken import spoken
 
 Array = NDArray[np.floating]
 
@@ -104,7 +105,7 @@ def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
     feet = [7, 8, 10, 11]
     if is_broken(joints, FPS) or np.linalg.norm(joints[:, feet] - standing[:, feet], axis=-1).max() > _SLIPS:
         return None
-    told = _captions_of(gesture, rng)
+    told = (*_captions_of(gesture, rng), spoken(action, name))
     source = replace(base.source, content=action, side=gesture.side, captions=told, facts="")
     facts = describe_text(told, joints, FPS)
     return Part(name, source, action, base.mirrored, joints.astype(np.float32), facts, made=True)

@@ -1,0 +1,30 @@
+"""Captions by the words of the vocabulary."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.data.spoken import PHRASES, SUBJECTS, spoken
+from marey.items.prompts import check_prompt
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import ActionLists, match_scope
+
+ACTIONS = tuple(load_vocabulary().actions)
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_captions_are_words_that_are_read_as_the_action(action: str) -> None:
+    said = {text for number in range(20) for text in spoken(action, f"clip {number}")}
+    assert len(said) >= 10
+    assert any(text.startswith(tuple(f"{each} " for each in SUBJECTS)) for text in said)
+    for text in said:
+        assert check_prompt(text) == text
+        assert not {"left", "right"} & set(text.split())
+        assert action in {named.action for named in match_scope(text, ActionLists((action,))).actions}
+
+
+def test_a_clip_has_the_same_captions_each_time_and_others_than_its_neighbour() -> None:
+    first, again, other = spoken("wave", "a"), spoken("wave", "a"), spoken("wave", "b")
+    assert first == again != other
+    assert 1 < len(set(first)) == len(first) <= PHRASES
+    assert spoken("juggle", "a") == ()
