@@ -38,7 +38,7 @@ class Action:
         flight_s: longest time off its support in one stretch, seconds.
         in_place: may be done without travel though its words say travel (a walk cycle).
         implies: actions that every clip of this action shows as well.
-        kind_of: of these, the one that this action is a manner of; it is read as that where a bundle knows no better.
+        kind_of: the action that this one is a manner of; it is read as that where a bundle knows no better.
         sided: meaning of left and right.
     """
 
@@ -118,8 +118,8 @@ def parse_vocabulary(data: bytes, where: str) -> Vocabulary:
     for action in actions.values():
         if missing := [name for name in action.implies if name not in actions]:
             raise InvalidFile(f"implies names no action: {', '.join(missing)}", where=f"{where}: {action.id}")
-        if action.kind_of and action.kind_of not in action.implies:
-            raise InvalidFile(f"kind_of is not in implies: {action.kind_of}", where=f"{where}: {action.id}")
+        if action.kind_of and action.kind_of not in actions:
+            raise InvalidFile(f"kind_of names no action: {action.kind_of}", where=f"{where}: {action.id}")
     return Vocabulary(actions, hashlib.sha256(data).hexdigest())
 
 

@@ -53,6 +53,7 @@ def test_an_unknown_id_lists_the_known_ones() -> None:
         ('[walk]\ndefinition = "x"\nverbs = ["walk"]\nsupport = "wings"', "unknown support 'wings'; known: feet"),
         ('[walk]\ndefinition = "x"\nverbs = ["walk", "walk"]', "'walk' twice"),
         ('[walk]\ndefinition = "x"\nverbs = ["walk"]\nimplies = ["go"]', "implies names no action: go"),
+        ('[walk]\ndefinition = "x"\nverbs = ["walk"]\nkind_of = "go"', "kind_of names no action: go"),
         ('[walk]\ndefinition = "x"\nverbs = "walk"', "verbs is not a list"),
     ],
 )
