@@ -6,8 +6,7 @@ import tomllib
 
 import pytest
 
-from marey.evaluator.referee_rates import Verdicts, accepted_list, implied, page, rates
-from marey.vocabulary.entries import load_vocabulary
+from marey.evaluator.referee_rates import Verdicts, accepted_list, page, rates
 
 
 def _clip(action: str, *seen: str, source: str = "one") -> Verdicts:
@@ -19,10 +18,6 @@ def test_a_rule_passes_its_own_clips_and_falsely_those_of_others() -> None:
     rate = next(rate for rate in rates(clips) if rate.action == "walk")
     assert (rate.clips, rate.passed) == (2, 1)
     assert (rate.others, rate.falsely, rate.of) == (1, 1, (("idle", 1),))  # sneak implies walk
-
-
-def test_what_an_action_implies_is_followed_through() -> None:
-    assert implied(load_vocabulary(), "leap") == {"leap", "jump-forward", "jump", "run"}
 
 
 @pytest.mark.parametrize(("missed", "falsely", "accepted"), [(1, 0, True), (2, 0, False), (0, 1, True), (0, 2, False)])

@@ -32,9 +32,13 @@ def test_no_phrase_belongs_to_an_action_twice() -> None:
 
 
 def test_implication_reaches_through_others() -> None:
-    vocabulary = load_vocabulary()
-    assert vocabulary.implied("leap") == {"jump-forward", "jump", "run"}
-    assert vocabulary.implied("walk") == frozenset()
+    entry = '[{}]\ndefinition = "x"\nverbs = ["{}"]\nimplies = {}\n'
+    chain = [
+        entry.format(name, name, implies) for name, implies in (("a", ["b"]), ("b", ["c", "d"]), ("c", []), ("d", []))
+    ]
+    vocabulary = parse_vocabulary("".join(chain).replace("'", '"').encode(), "v.toml")
+    assert vocabulary.implied("a") == {"b", "c", "d"}
+    assert vocabulary.implied("c") == frozenset()
 
 
 def test_an_unknown_id_lists_the_known_ones() -> None:

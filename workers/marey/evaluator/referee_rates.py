@@ -22,7 +22,7 @@ from marey.data.part import FPS
 from marey.data.prepare import CaptureSet, pack_set
 from marey.motion.files import write_atomically
 from marey.referee import RULES, Body, shows
-from marey.vocabulary.entries import Vocabulary, load_vocabulary
+from marey.vocabulary.entries import load_vocabulary
 
 FOLDS = 5
 LEAST_PASSING = 0.95
@@ -80,20 +80,10 @@ def judge(captures: CaptureSet, *, processes: int) -> list[Verdicts]:
     return found
 
 
-def implied(vocabulary: Vocabulary, action: str) -> frozenset[str]:
-    """Return the actions that every clip of an action shows as well, itself included."""
-    known, open_names = {action}, [action]
-    while open_names:
-        new = set(vocabulary.actions[open_names.pop()].implies) - known
-        known |= new
-        open_names += new
-    return frozenset(known)
-
-
 def rates(clips: Sequence[Verdicts]) -> list[RuleRate]:
     """Return the rate of each rule."""
     vocabulary = load_vocabulary()
-    implications = {action: implied(vocabulary, action) for action in RULES}
+    implications = {action: vocabulary.implied(action) | {action} for action in RULES}
     found = []
     for action in sorted(RULES):
         own = [clip for clip in clips if clip.action == action]
