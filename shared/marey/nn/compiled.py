@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import torch
 
@@ -28,3 +28,21 @@ def compiled(module: Module) -> Module:
         warnings.simplefilter("ignore", DeprecationWarning)
         script: Any = torch.jit.script(module)  # pyright: ignore[reportUnknownMemberType]
     return script
+
+
+OFTEN = 16
+"""Uses after which a module pays for its compilation, which takes as long as reading a hundred sentences."""
+
+
+class CompiledLater(Generic[Module]):
+    """A module that is compiled once it is used often: a process that reads one prompt does not wait for it."""
+
+    def __init__(self, module: Module) -> None:
+        self._module, self._uses = module, 0
+
+    def get(self) -> Module:
+        """Return the module, for one use."""
+        if self._uses == OFTEN:
+            self._module = compiled(self._module)
+        self._uses += 1
+        return self._module

@@ -89,11 +89,12 @@ class LightLabeller:
             words: at most 60.
             predicates: where they are known; None = find them.
         """
-        hidden, found = self._network.find(self._states(words), surface_features(words), THRESHOLD)
+        network = self._network.get()
+        hidden, found = network.find(self._states(words), surface_features(words), THRESHOLD)
         at = [int(word) for word in found] if predicates is None else predicates
         if not at:
             return []
-        return self._decoder.frames(self._network.tag_scores(hidden, list(at)).numpy(), at)
+        return self._decoder.frames(network.tag_scores(hidden, list(at)).numpy(), at)
 
 
 class Decoder:

@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from marey.nn.compiled import compiled
+from marey.nn.compiled import CompiledLater
 from marey.text.minilm_bundle import WIDTH as STATE_WIDTH
 
 SUFFIX_BUCKETS = 1024
@@ -66,14 +66,14 @@ class LightNetwork(nn.Module):
         nn.init.normal_(self.distance.weight, std=0.1)
 
     @torch.inference_mode()  # so that its tensors carry nothing for gradients
-    def for_inference(self) -> LightNetwork:
-        """A copy for labelling that takes half the time: compiled, and its matrices stored by columns, which is quicker
-        to multiply few rows with. It has the methods `find` and `tag_scores`."""
+    def for_inference(self) -> CompiledLater[LightNetwork]:
+        """A copy for labelling that takes half the time: compiled once it is used often, and its matrices stored by
+        columns, which is quicker to multiply few rows with."""
         copied = deepcopy(self).eval().requires_grad_(False)
         for module in copied.modules():
             if isinstance(module, nn.Linear):
                 module.weight = nn.Parameter(module.weight.t().contiguous().t(), False)
-        return compiled(copied)
+        return CompiledLater(copied)
 
     def read(self, states: Tensor, surface: Tensor, mask: Tensor | None = None) -> Tensor:
         """The words of sentences, (B, T, width).

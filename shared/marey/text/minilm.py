@@ -19,7 +19,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from marey.nn.compiled import compiled
+from marey.nn.compiled import CompiledLater
 from marey.nn.packed import PackedLinear, can_pack
 from marey.text.minilm_bundle import LAYERS, WIDTH, load_tokenizer, load_weights
 
@@ -56,7 +56,8 @@ class MiniLM:
         )
         self._norm = (weights["embeddings.LayerNorm.weight"], weights["embeddings.LayerNorm.bias"])
         layers = _Layers([_Layer(weights, f"encoder.layer.{i}.", int8=int8) for i in range(LAYERS)])
-        self._layers = compiled(layers) if int8 else layers
+        self._layers = layers
+        self._often = CompiledLater(layers) if int8 else None
 
     @torch.inference_mode()
     def states(self, ids: list[int]) -> list[Tensor]:
@@ -65,7 +66,8 @@ class MiniLM:
         Args:
             ids: token ids with [CLS] and [SEP], at most 256.
         """
-        return self._layers(self._embed(torch.tensor(ids), self._positions[: len(ids)]), [(1, len(ids))])
+        layers = self._layers if self._often is None else self._often.get()
+        return layers(self._embed(torch.tensor(ids), self._positions[: len(ids)]), [(1, len(ids))])
 
     @torch.inference_mode()
     def last(self, texts: Sequence[list[int]]) -> list[Tensor]:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidBundle
+from marey.nn.compiled import OFTEN
 from marey.text.encoders import find_encoder
 from marey.text.light import LightLabeller, WordStates, segments
 from marey.text.light_network import LightConfig, LightNetwork, sentence_dropout
@@ -188,7 +189,7 @@ def test_the_copy_for_labelling_says_what_the_network_says(
     network: LightNetwork, length: int, script: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not script:
-        monkeypatch.setattr("marey.text.light_network.compiled", lambda module: module)
+        monkeypatch.setattr("marey.nn.compiled.compiled", lambda module: module)
     states, surface = torch.randn(length, 2, 384), torch.randint(0, 3, (length, 3))
     copy = network.eval().for_inference()
     mask = torch.ones(1, length, dtype=torch.bool)
@@ -197,12 +198,17 @@ def test_the_copy_for_labelling_says_what_the_network_says(
     threshold = float(probabilities.median()) - 1e-3
     at = (probabilities > threshold).nonzero()[:, 0]
     logits = network.tag_logits(hidden.expand(len(at), -1, -1), at, mask.expand(len(at), -1))
-    for _ in range(4):  # torch compiles a script again in its second call
-        read, found = copy.find(states, surface, threshold)
+    first = None
+    for _ in range(OFTEN + 4):  # then it is compiled; torch compiles a script again in its second call
+        used = copy.get()
+        read, found = used.find(states, surface, threshold)
         assert torch.allclose(read, hidden, atol=1e-5)
         assert found.tolist() == at.tolist()
-        scores = copy.tag_scores(read, found.tolist())
+        scores = used.tag_scores(read, found.tolist())
         assert torch.allclose(scores, torch.log_softmax(logits, -1).double(), atol=1e-5)
+        first = scores if first is None else first
+        assert torch.equal(scores, first)
+    assert isinstance(used, torch.jit.ScriptModule) == script
 
 
 def test_the_copy_for_labelling_leaves_the_network_to_be_trained(network: LightNetwork) -> None:
