@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from marey.data.spoken import PHRASES, SUBJECTS, spoken
+from marey.data.spoken import PHRASES, SUBJECTS, all_sayings, sayings, spoken
 from marey.items.prompts import check_prompt
+from marey.referee.prompts import action_prompts, studio_prompts
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope
 
@@ -28,3 +29,20 @@ def test_a_clip_has_the_same_captions_each_time_and_others_than_its_neighbour() 
     assert first == again != other
     assert 1 < len(set(first)) == len(first) <= PHRASES
     assert spoken("juggle", "a") == ()
+
+
+def test_every_action_has_sentences_that_are_no_held_out_prompts() -> None:
+    held_out = {prompt.text.casefold() for prompt in (*action_prompts(), *studio_prompts())}
+    assert set(all_sayings()) == set(ACTIONS)
+    for action, written in all_sayings().items():
+        assert len(set(written)) == len(written) >= 30, action
+        assert not held_out & {text.casefold() for text in written}
+        assert all(check_prompt(text) == text for text in written)
+
+
+def test_a_clip_has_some_of_the_sentences_of_its_action() -> None:
+    some = sayings("wave", "a")
+    assert len(set(some)) == PHRASES
+    assert set(some) <= set(all_sayings()["wave"])
+    assert some != sayings("wave", "b")
+    assert sayings("juggle", "a") == ()

@@ -30,7 +30,7 @@ from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
 from marey.data.splice import with_bones
 from marey.data.splits import Sourced, actions_of, splits_by_source
-from marey.data.spoken import spoken
+from marey.data.spoken import sayings, spoken
 from marey.data.text_sequences import compose_texts, joined_texts
 from marey.motion.features import HUMANML3D_263
 
@@ -252,6 +252,8 @@ class FolderWriter:
         self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
         walked = actions[0].gait
         told = _choose_texts(actions, name)
+        if told and len(actions) == 1 and part.source.split == "train":
+            told += tuple(filter(None, [sayings(part.content, name)]))  # of people, who do not share a sequence
         self.clips.append(
             Clip(
                 id=name,

@@ -1,13 +1,16 @@
-"""Captions of an action by the words of the vocabulary: what people call it, whatever a clip of it looks like.
+"""Captions of an action, whatever a clip of it looks like: by the words of the vocabulary, and as people ask for it.
 
 A network that reads three authors' captions of a clip knows these sentences: of hgm3-open 0.1, 60 % of the motions of
-training captions showed their action, and 36 % of those of other authors' prompts.
+training captions showed their action, and 36 % of those of other authors' prompts. The sentences of `sayings.toml` were
+written from the vocabulary's definitions alone, by authors who saw neither clips nor held-out prompts.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 from functools import cache
+from pathlib import Path
 
 from marey.core.errors import InvalidInput
 from marey.data.captions import seeded
@@ -43,6 +46,23 @@ def spoken(action: str, seed: str) -> tuple[str, ...]:
             verb = rng.choice(verbs)
             said[verb if rng.random() < _SHARE_OF_COMMANDS else f"{rng.choice(SUBJECTS)} {_told(verb)}"] = None
     return tuple(said)
+
+
+def sayings(action: str, seed: str) -> tuple[str, ...]:
+    """Return different sentences that ask for an action; none where none were written.
+
+    Args:
+        action: id of the vocabulary.
+        seed: the clip's name, so that a clip has the same captions on every machine.
+    """
+    written = all_sayings().get(action, ())
+    return tuple(seeded("sayings", seed).sample(written, min(PHRASES, len(written))))
+
+
+@cache
+def all_sayings() -> dict[str, list[str]]:
+    """Read the sentences of all actions."""
+    return tomllib.loads(Path(__file__).with_name("sayings.toml").read_text("utf-8"))
 
 
 @cache
