@@ -219,10 +219,10 @@ def sprint(body: Body) -> bool:
 @rule("turn")
 def turn(body: Body) -> bool:
     found = gait(body)
-    going = found.forward > 0.2 and found.distance >= 0.6 and found.steps >= 2
+    going = found.forward > 0.2 and found.distance >= 0.55 and found.steps >= 1
     if travel(body) < 0.5 and found.steps >= 3:
         going = travel(body) >= 0.3
-    return going and 45 - 5 <= abs(found.turn) <= 200 + 15
+    return going and 45 - 6 <= abs(found.turn) <= 200 + 15
 
 
 def _turned_in_place(body: Body) -> tuple[float, float]:
