@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 from marey.cli.main import app
 from marey.core.errors import InvalidInput
+from marey.generation.candidates import best_clips
 from marey.models.hgm3.bundle import random_bundle
 
 
@@ -64,6 +66,21 @@ def test_actions_are_measured_by_their_held_out_prompts(bundle: str, tmp_path: P
     assert (rate["action"], rate["authors"], rate["standing"]) == ("bow", 2, "unproven")
     assert len(found["trials"]) == rate["motions"] >= 10
     assert "| bow |" in (tmp_path / "report.md").read_text()
+
+
+def test_the_best_of_several_candidates_is_measured(bundle: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plans = list[int]()
+
+    def watched(*arguments: Any) -> Any:
+        plans.append(arguments[3].best_of)
+        return best_clips(*arguments)
+
+    monkeypatch.setattr("marey.generation.candidates.best_clips", watched)
+    options = ["--action", "bow", "--seeds", "1", "--set", "steps=2", "--set", "best_of=2", "--json"]
+    done = CliRunner().invoke(app, ["eval", "actions", bundle, *options])
+    assert done.exit_code == 0, done.output
+    assert set(plans) == {2}
+    assert json.loads(done.stdout)["settings"]["best_of"] == 2
 
 
 def test_an_action_without_prompts_is_told_with_those_that_have_some(bundle: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -189,9 +189,13 @@ class _Run:
         self.bundle: Bundle = generator.bundle
         self.reference: str = self.bundle.reference
         self._generator = generator
+        from marey.generation.candidates import split_settings
+
         self._options = options
-        self._settings = generator.settings(values)
-        self.settings: Mapping[str, object] = generator.describe_settings(self._settings)
+        own, self._plan = split_settings(values)
+        self._settings = generator.settings(own)
+        chosen = {name: value for name, value in values.items() if name not in own}
+        self.settings: Mapping[str, object] = {**generator.describe_settings(self._settings), **chosen}
 
     @classmethod
     def of(cls, bundle: str, options: MeasureOptions) -> _Run:
@@ -210,9 +214,9 @@ class _Run:
         from marey.bundles.limits import length_of
         from marey.generation.port import Request
         from marey.items.item import Item
-        from marey.training.adherence import finished, pipeline_of
+        from marey.training.adherence import pipeline_of
 
-        generator, settings = self._generator, self._settings
+        generator = self._generator
         texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
         lengths = (length_of(generator.bundle, Item(prompt.text)) for prompt in prompts)
         frames = [generator.limits.frames_of(seconds) for seconds in lengths]
@@ -223,10 +227,18 @@ class _Run:
         ]
         for start in range(0, len(jobs), generator.batch):
             part = jobs[start : start + generator.batch]
-            clips = finished(generator, [request for _, request in part], settings)
+            clips = self._clips([request for _, request in part])
             for (prompt, request), clip in zip(part, clips, strict=True):
                 yield prompt, request.seed, clip
             self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
+
+    def _clips(self, requests: Sequence[Any]) -> Iterable[MotionClip]:
+        from marey.generation.candidates import best_clips
+        from marey.training.adherence import finished
+
+        if self._plan.is_single:
+            return finished(self._generator, requests, self._settings)
+        return filter(None, best_clips(self._generator, requests, self._settings, self._plan))  # nothing was dropped
 
     def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:
         """Return the report; write it where a folder is given."""
