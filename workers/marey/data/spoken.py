@@ -19,8 +19,8 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import ActionLists, match_scope
 
-PHRASES = 6
-"""Largest number of captions of a clip."""
+PHRASES, SENTENCES = 6, 12
+"""Largest number of captions of a clip in the words of the vocabulary, and of sentences that ask for its action."""
 SUBJECTS = ("a person", "a man", "a woman", "someone", "the character", "he", "she", "the figure", "the actor")
 _SHARE_OF_NOUNS, _SHARE_OF_COMMANDS = 0.25, 0.33
 _SIDED = re.compile(r"\b(left|right)\b")  # true of some clips only
@@ -56,7 +56,7 @@ def sayings(action: str, seed: str) -> tuple[str, ...]:
         seed: the clip's name, so that a clip has the same captions on every machine.
     """
     written = all_sayings().get(action, ())
-    return tuple(seeded("sayings", seed).sample(written, min(PHRASES, len(written))))
+    return tuple(seeded("sayings", seed).sample(written, min(SENTENCES, len(written))))
 
 
 @cache
