@@ -86,7 +86,7 @@ def test_the_best_of_several_candidates_is_measured(bundle: str, monkeypatch: py
 def test_an_action_without_prompts_is_told_with_those_that_have_some(bundle: str) -> None:
     done = CliRunner().invoke(app, ["eval", "actions", bundle, "--action", "levitate"])
     assert done.exit_code == InvalidInput.exit_code
-    assert "no held-out prompts for 'levitate'" in done.stderr
+    assert "no prompts for 'levitate'" in done.stderr
     assert "walk-backward" in done.stderr
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from marey.referee import Body
 from marey.referee.adherence import ActionTrial, document, interval, judge_trial, markdown, rates
-from marey.referee.prompts import ActionPrompt, action_prompts, studio_prompts
+from marey.referee.prompts import ActionPrompt, action_prompts, development_prompts, studio_prompts
 from marey.referee.rules import accepted_rules
 from marey.referee.studio import StudioRates, judge_studio, studio_markdown, studio_rates
 from marey.vocabulary.entries import load_vocabulary
@@ -94,6 +94,14 @@ def test_every_action_has_prompts_of_two_authors_and_no_prompt_is_asked_twice() 
         assert min(asked[(action,), 1], asked[(action,), 2]) >= 5, action
     texts = [prompt.text.casefold() for prompt in prompts]
     assert len(set(texts)) == len(texts)
+
+
+def test_prompts_for_development_ask_for_every_action_and_are_no_held_out_prompts() -> None:
+    prompts = development_prompts()
+    assert {prompt.actions for prompt in prompts} == {(action,) for action in load_vocabulary().actions}
+    texts = {prompt.text.casefold() for prompt in prompts}
+    assert len(texts) == len(prompts) > 320
+    assert not texts & {prompt.text.casefold() for prompt in (*action_prompts(), *studio_prompts())}
 
 
 def test_motions_of_a_list_are_counted_with_what_a_user_is_told_of_them() -> None:

@@ -1,7 +1,8 @@
 """Held-out prompts by authors who saw the definitions of the vocabulary and nothing else.
 
 Two authors ask for single actions, by which the supported actions of a bundle are published; a third wrote a list of
-300 prompts as a games studio would send it. Nothing is trained on them or chosen by them.
+300 prompts as a games studio would send it. Nothing is trained on them or chosen by them. By the prompts of a fourth,
+`development`, settings are chosen.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 AUTHORS = (1, 2)
-STUDIO_AUTHOR = 3
+STUDIO_AUTHOR, DEVELOPMENT_AUTHOR = 3, 4
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,15 @@ def action_prompts() -> tuple[ActionPrompt, ...]:
         for author in AUTHORS
         for group in tomllib.loads(Path(__file__).with_name(f"prompts_{author}.toml").read_text("utf-8"))["group"]
         for text in group["prompts"]
+    )
+
+
+@lru_cache(maxsize=1)
+def development_prompts() -> tuple[ActionPrompt, ...]:
+    """Return five prompts of each action, by which settings may be chosen."""
+    tables = tomllib.loads(Path(__file__).with_name("prompts_development.toml").read_text("utf-8"))
+    return tuple(
+        ActionPrompt(text, (action,), "", DEVELOPMENT_AUTHOR) for action, texts in tables.items() for text in texts
     )
 
 

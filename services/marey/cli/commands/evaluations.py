@@ -285,6 +285,9 @@ def actions(
     ] = None,
     seeds: Seeds = 4,
     settings: evaluating.Settings = None,
+    development: Annotated[
+        bool, typer.Option("--development", help="By the prompts by which settings are chosen, not the held-out ones.")
+    ] = False,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -299,7 +302,12 @@ def actions(
     from marey.cli.roles.actions import measure_actions
 
     _measure(
-        lambda how: measure_actions(bundle, chosen or (), how, record=record), seeds, settings, threads, output, as_json
+        lambda how: measure_actions(bundle, chosen or (), how, development=development, record=record),
+        seeds,
+        settings,
+        threads,
+        output,
+        as_json,
     )
 
 

@@ -56,30 +56,39 @@ class MeasureOptions:
 
 
 def measure_actions(
-    bundle: str, actions: Sequence[str], options: MeasureOptions, *, record: Path | None = None
+    bundle: str,
+    actions: Sequence[str],
+    options: MeasureOptions,
+    *,
+    development: bool = False,
+    record: Path | None = None,
 ) -> RefereeReport:
-    """Generate the held-out prompts of actions with a bundle, and let the referee judge the exported joints.
+    """Generate the prompts of actions with a bundle, and let the referee judge the exported joints.
 
     Args:
         actions: ids of the vocabulary; none = all.
+        development: take the prompts by which settings are chosen, instead of the held-out ones.
         record: the prepared folder that the bundle was trained on; its manifest and card get the result.
 
     Raises:
         NotFound, InvalidBundle: of the bundle.
         NotFound, InvalidFile: of the prepared folder.
-        InvalidInput: no such action or setting; or a part of the actions or seeds is to be recorded.
+        InvalidInput: no such action or setting; or a part of the actions or seeds, or what was measured by the
+            prompts for development, is to be recorded.
     """
     run = _Run.of(bundle, options)
     from marey.referee.adherence import LEAST_SEEDS
 
-    if record is not None and (actions or options.seeds < LEAST_SEEDS):
-        raise InvalidInput(f"only all actions with {LEAST_SEEDS} seeds or more are recorded", where="--record")
+    if record is not None and (actions or options.seeds < LEAST_SEEDS or development):
+        raise InvalidInput(
+            f"only all actions by held-out prompts with {LEAST_SEEDS} seeds or more are recorded", where="--record"
+        )
     learning = None if record is None else _Learning(record)
     from marey.referee import Body
     from marey.referee.adherence import document, judge_trial, markdown, rates
-    from marey.referee.prompts import action_prompts
+    from marey.referee.prompts import action_prompts, development_prompts
 
-    asked = _of_actions(action_prompts(), actions)
+    asked = _of_actions(development_prompts() if development else action_prompts(), actions)
     trials = [
         judge_trial(prompt, seed, Body(clip.joints, clip.fps))
         for prompt, seed, clip in (run.motions(asked) if learning is None else learning.watched(run.motions(asked)))
@@ -175,7 +184,7 @@ def _of_actions(prompts: Sequence[ActionPrompt], actions: Sequence[str]) -> list
     known = {action for prompt in prompts for action in prompt.actions}
     if unknown := [action for action in actions if action not in known]:
         raise InvalidInput(
-            f"there are no held-out prompts for {unknown[0]!r}",
+            f"there are no prompts for {unknown[0]!r}",
             where="--action",
             hint=f"Known: {', '.join(sorted(known))}.",
         )
