@@ -179,7 +179,8 @@ def test_refuse_fails_what_the_encoder_finds_unknown_for_good(listed: str) -> No
 
 
 def test_prompts_that_are_not_examined_and_bundles_without_lists_get_no_verdict(listed: str, bundle: str) -> None:
-    for path, policy in ((listed, "ignore"), (bundle, "warn")):
+    cases: tuple[tuple[str, ScopePolicy], ...] = ((listed, "ignore"), (bundle, "warn"))
+    for path, policy in cases:
         (done,) = judge(path, policy, "a wave of nausea")
         assert isinstance(done, TextDone)
         assert done.scope is None

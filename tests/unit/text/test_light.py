@@ -208,7 +208,7 @@ def test_the_copy_for_labelling_says_what_the_network_says(
         assert torch.allclose(scores, torch.log_softmax(logits, -1).double(), atol=1e-5)
         first = scores if first is None else first
         assert torch.equal(scores, first)
-    assert isinstance(used, torch.jit.ScriptModule) == script
+    assert isinstance(copy.get(), torch.jit.ScriptModule) == script
 
 
 def test_the_copy_for_labelling_leaves_the_network_to_be_trained(network: LightNetwork) -> None:

@@ -44,7 +44,7 @@ def spoken(action: str, seed: str) -> tuple[str, ...]:
             said[rng.choice(nouns)] = None
         else:
             verb = rng.choice(verbs)
-            said[verb if rng.random() < _SHARE_OF_COMMANDS else f"{rng.choice(SUBJECTS)} {_told(verb)}"] = None
+            said[verb if rng.random() < _SHARE_OF_COMMANDS else f"{rng.choice(SUBJECTS)} {_inflect(verb)}"] = None
     return tuple(said)
 
 
@@ -69,11 +69,11 @@ def all_sayings() -> dict[str, list[str]]:
 def _words(action: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Verbs and nouns that are captions: those that people may send as prompts and that are read as this action."""
     entry = load_vocabulary().actions[action]
-    verbs = tuple(verb for verb in entry.verbs if _reads(verb, action) and _reads(f"he {_told(verb)}", action))
+    verbs = tuple(verb for verb in entry.verbs if _reads(verb, action) and _reads(f"he {_inflect(verb)}", action))
     return verbs, tuple(noun for noun in entry.nouns if _reads(noun, action))
 
 
-def _told(verb: str) -> str:
+def _inflect(verb: str) -> str:
     first, _, rest = verb.partition(" ")
     return f"{third_person(first)} {rest}".rstrip()
 
