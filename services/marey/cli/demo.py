@@ -1,4 +1,4 @@
-"""`make demo`: eight prompts through the whole platform, into `out/demo`."""
+"""`make demo`: twelve prompts through the whole platform, into `out/demo`."""
 
 from __future__ import annotations
 
@@ -27,17 +27,16 @@ JOB_SECONDS = 240.0
 PROMPTS = (
     {"prompt": "a person walks forward", "name": "walk", "seconds": 4, "seed": 1},
     {"prompt": "someone runs forward in a hurry", "name": "run", "seconds": 3, "seed": 2},
-    {"prompt": "a person walks forward and then turns left", "name": "turn-left", "seconds": 5, "seed": 3},
-    {"prompt": "a person walks backward", "name": "backward", "seconds": 4, "seed": 4},
+    {"prompt": "a person walks backward", "name": "backward", "seconds": 4, "seed": 3},
+    {"prompt": "a man turns around", "name": "turn-around", "seconds": 3, "seed": 4},
     {"prompt": "someone waves with the right hand", "name": "wave-right", "seconds": 4, "seed": 5},
     {"prompt": "a man raises both hands", "name": "raise-both", "seconds": 4, "seed": 6},
     {"prompt": "a person bows deeply", "name": "bow", "seconds": 4, "seed": 7},
-    {
-        "prompt": "a woman walks forward, then waves with the left hand",
-        "name": "walk-and-wave",
-        "seconds": 6,
-        "seed": 8,
-    },
+    {"prompt": "a woman sits down on a chair", "name": "sit-down", "seconds": 4, "seed": 8},
+    {"prompt": "a fighter kicks", "name": "kick", "seconds": 3, "seed": 10},
+    {"prompt": "a man climbs a ladder", "name": "ladder", "seconds": 4, "seed": 12},
+    {"prompt": "she drinks from a cup", "name": "drink", "seconds": 3, "seed": 15},
+    {"prompt": "someone does a cartwheel", "name": "cartwheel", "seconds": 3, "seed": 16},
 )
 
 

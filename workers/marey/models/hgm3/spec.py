@@ -48,7 +48,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         choices=(Choice("mask", ("hard", "random"), "hard or random; default: as the configuration says."),),
     ),
     tokenizer="marey.models.hgm3.tokenizer:build_tokenizer",
-    bundles={"hgm3-starter": "marey-bundles-starter", "hgm3-open": "marey-bundles-open"},
+    bundles={"hgm3-open": "marey-bundles-open", "hgm3-starter": "marey-bundles-starter"},
     random_bundle="marey.models.hgm3.bundle:random_bundle",
     self_train="marey.models.hgm3.self_train:self_train_into",
     ablations=(
