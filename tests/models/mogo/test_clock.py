@@ -34,9 +34,10 @@ def test_nothing_is_added_where_nobody_knows_and_all_that_is_far_is_alike() -> N
 def test_time_begins_anew_at_a_seam_and_counts_what_was_cut_off() -> None:
     made = clock()
     found = made.of_actions(2, 5, torch.tensor([0, 4]), torch.tensor([3, 6]))
-    assert torch.equal(found[0], made(torch.tensor([1, 2, 0, 1, 2])))
-    assert torch.equal(found[1], made(torch.tensor([5, 6, 7, 8, 9])))
-    assert torch.equal(made.of_actions(1, 3, None, None)[0], made(torch.tensor([1, 2, 3])))
+    # products of other sizes may round differently
+    torch.testing.assert_close(found[0], made(torch.tensor([1, 2, 0, 1, 2])))
+    torch.testing.assert_close(found[1], made(torch.tensor([5, 6, 7, 8, 9])))
+    torch.testing.assert_close(made.of_actions(1, 3, None, None)[0], made(torch.tensor([1, 2, 3])))
 
 
 def test_training_keeps_the_time_of_some_acts_to_itself_each_whole() -> None:

@@ -14,6 +14,7 @@ from marey.data.gestures import COUNTS, made_gestures
 from marey.data.pack import PackClip
 from marey.data.part import MAX_FRAMES, Part
 from marey.data.sampling import sampling_weights
+from marey.data.spoken import spoken
 from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import FPS, Body, steady
 from tests.unit.data.test_sampling import clip
@@ -119,9 +120,11 @@ def test_hands_meet_in_a_clap_and_a_nod_moves_the_head_alone(made: list[Part]) -
 
 def test_captions_are_in_three_voices_and_name_the_side_that_acts(made: list[Part]) -> None:
     for part in made:
-        assert len(part.source.captions) == 3
+        *voices, words = part.source.captions
+        assert len(voices) == 3
+        assert words == spoken(part.content, part.id)
         assert part.facts.text == part.source.captions
-        for text in (text for author in part.source.captions for text in author):
+        for text in (text for author in voices for text in author):
             assert "{" not in text
             if part.content in ("wave", "raise-arm", "guide") and part.source.side != "both":
                 assert part.source.side in text.lower(), text

@@ -220,7 +220,7 @@ def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
     assert values["obeyed"].n == 26
     assert "no prompt has an expectation" in values["obeyed_compositional"].note
     assert found.row("ground_truth").values["clip_score_compositional"].mean == pytest.approx(
-        values["clip_score_compositional"].mean, abs=0.01
+        values["clip_score_compositional"].mean, abs=0.03
     )
     assert found.metric("kid_compositional").measured_on == "the compositional split"
     assert b"on the compositional split" in to_markdown(found)
