@@ -29,7 +29,7 @@ $(STAMP): requirements/dev.lock pyproject.toml
 	$(BIN)/pip install -q --no-deps --no-build-isolation -e .
 	touch $@
 
-demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
+demo: $(STAMP) ## Twelve prompts through the whole platform, into out/demo
 	$(BIN)/python -m marey.cli.demo
 
 # Many tests wait for servers and timeouts: lint runs beside them.
