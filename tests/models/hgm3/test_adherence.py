@@ -71,9 +71,9 @@ def test_actions_are_measured_by_their_held_out_prompts(bundle: str, tmp_path: P
 def test_the_best_of_several_candidates_is_measured(bundle: str, monkeypatch: pytest.MonkeyPatch) -> None:
     plans = list[int]()
 
-    def watched(*arguments: Any) -> Any:
+    def watched(*arguments: Any, **more: Any) -> Any:
         plans.append(arguments[3].best_of)
-        return best_clips(*arguments)
+        return best_clips(*arguments, **more)
 
     monkeypatch.setattr("marey.generation.candidates.best_clips", watched)
     options = ["--action", "bow", "--seeds", "1", "--set", "steps=2", "--set", "best_of=2", "--json"]

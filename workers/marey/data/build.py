@@ -252,8 +252,9 @@ class FolderWriter:
         self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
         walked = actions[0].gait
         told = _choose_texts(actions, name)
-        if told and len(actions) == 1 and part.source.split == "train":
-            told += tuple(filter(None, [sayings(part.content, name)]))  # of people, who do not share a sequence
+        train_alone = len(actions) == 1 and part.source.split == "train"  # the people of two sentences differ
+        if told and train_alone and (asked := sayings(part.content, name)):
+            told += (asked,)
         self.clips.append(
             Clip(
                 id=name,

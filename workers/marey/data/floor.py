@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.filters import smooth
-from marey.motion.support import RADII
+from marey.motion.support import RADII, clearance
 
 Array = NDArray[np.floating]
 _FEET = [7, 8, 10, 11]
@@ -77,8 +77,7 @@ def follow_floor(joints: Array, fps: float = 20.0) -> Array:
     For files whose hips stay at one height, though the body crouches, lies or sits: what rises in them are the feet.
     """
     out = np.array(joints, np.float64)
-    lowest = (out[..., 1] - RADII).min(axis=1, keepdims=True)
-    out[..., 1] -= smooth(lowest, _FOLLOW * fps)
+    out[..., 1] -= smooth(clearance(out)[:, None], _FOLLOW * fps)
     return out
 
 

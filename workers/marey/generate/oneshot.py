@@ -17,8 +17,7 @@ from marey.vocabulary.scope import ActionLists, Scope, match_scope
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.core.settings import Settings
-    from marey.generation.candidates import DrawPlan
-    from marey.generation.port import Generator, Request
+    from marey.generation.port import Generator
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
 
@@ -75,7 +74,7 @@ class OneShot:
         Raises:
             InvalidInput: a length out of the bundle's range; raised before anything is generated.
         """
-        from marey.generation.candidates import split_settings
+        from marey.generation.candidates import draw_clips, split_settings
         from marey.generation.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
@@ -93,24 +92,8 @@ class OneShot:
             for low in range(0, len(rows), size):
                 batch = requests[start + low : start + min(low + size, len(rows))]
                 began = time.monotonic()
-                clips = self._clips(batch, settings, plan)
+                clips = draw_clips(self._generator, batch, settings, plan, body=self._body)
                 elapsed = (time.monotonic() - began) / len(batch)
                 for row, clip in zip(rows[low:], clips, strict=False):
                     yield row, clip, elapsed
             start += len(rows)
-
-    def _clips(self, requests: Sequence[Request], settings: Any, plan: DrawPlan) -> Iterator[MotionClip]:
-        """Generate, and return the motion of each request."""
-        from marey.generation.candidates import best_clips
-        from marey.generation.export import finish
-
-        if not plan.is_single:
-            return filter(
-                None, best_clips(self._generator, requests, settings, plan, body=self._body)
-            )  # nothing was dropped
-        made = self._generator.generate(requests, settings)
-        return (
-            finish(self._generator, request, generated, settings, body=self._body, fps=plan.fps)
-            for request, generated in zip(requests, made, strict=True)
-            if generated is not None
-        )

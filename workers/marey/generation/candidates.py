@@ -7,7 +7,7 @@ candidate depends on the seed of its request and its own number alone: results d
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -93,6 +93,30 @@ def best_clips(
         round_ended = number % plan.best_of == 0
         open_rows = [row for row in kept if not (round_ended and draws[row].good)]
     return [draw.result() for draw in draws]
+
+
+def draw_clips(
+    generator: Generator[S],
+    requests: Sequence[Request],
+    settings: S,
+    plan: DrawPlan,
+    *,
+    body: NamedBody | None = None,
+) -> Iterator[MotionClip]:
+    """Generate, and return the motion of each request in order: its only one, finished when it is taken, or the best of
+    its candidates.
+
+    Raises:
+        InvalidInput: as `Generator.generate`.
+    """
+    if not plan.is_single:
+        return filter(None, best_clips(generator, requests, settings, plan, body=body))  # nothing was dropped
+    made = generator.generate(requests, settings)
+    return (
+        finish(generator, request, generated, settings, body=body, fps=plan.fps)
+        for request, generated in zip(requests, made, strict=True)
+        if generated is not None
+    )
 
 
 class _Draw:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -195,11 +195,11 @@ class _Run:
     """A loaded generator with its settings."""
 
     def __init__(self, generator: Any, options: MeasureOptions, values: Mapping[str, Any]) -> None:
+        from marey.generation.candidates import split_settings
+
         self.bundle: Bundle = generator.bundle
         self.reference: str = self.bundle.reference
         self._generator = generator
-        from marey.generation.candidates import split_settings
-
         self._options = options
         own, self._plan = split_settings(values)
         self._settings = generator.settings(own)
@@ -221,6 +221,7 @@ class _Run:
     def motions(self, prompts: Sequence[P]) -> Iterator[tuple[P, int, MotionClip]]:
         """Generate each prompt with each seed."""
         from marey.bundles.limits import length_of
+        from marey.generation.candidates import draw_clips
         from marey.generation.port import Request
         from marey.items.item import Item
         from marey.training.adherence import pipeline_of
@@ -236,18 +237,10 @@ class _Run:
         ]
         for start in range(0, len(jobs), generator.batch):
             part = jobs[start : start + generator.batch]
-            clips = self._clips([request for _, request in part])
+            clips = draw_clips(generator, [request for _, request in part], self._settings, self._plan)
             for (prompt, request), clip in zip(part, clips, strict=True):
                 yield prompt, request.seed, clip
             self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
-
-    def _clips(self, requests: Sequence[Any]) -> Iterable[MotionClip]:
-        from marey.generation.candidates import best_clips
-        from marey.training.adherence import finished
-
-        if self._plan.is_single:
-            return finished(self._generator, requests, self._settings)
-        return filter(None, best_clips(self._generator, requests, self._settings, self._plan))  # nothing was dropped
 
     def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:
         """Return the report; write it where a folder is given."""
