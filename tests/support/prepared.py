@@ -76,7 +76,7 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
             joints_start=int(starts[i]) + i,
             split=("train", "train", "train", "train", "val", "test")[i % 6],
             dataset="synthetic",
-            content="walk" if i % 3 else "run",
+            content=acts[i % len(acts)] if acts else "walk" if i % 3 else "run",
             style="normal",
             mirrored=False,
             spliced=(),

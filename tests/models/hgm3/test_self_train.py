@@ -3,7 +3,7 @@ prompt."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,6 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.checks.judge import CheckVerdict, Expectation
 from marey.core.errors import InvalidFile
 from marey.data.prepared import PreparedData
 from marey.models.hgm3 import self_train as module
@@ -24,8 +23,11 @@ from marey.models.hgm3.self_train import self_train
 from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
+from marey.motion.clip import MotionClip
+from marey.quality.record import MotionQuality, PromptMatch
+from marey.selector.matching import Step, WantedAction
 from marey.training.budget import Budget
-from marey.training.drawn import FILE, Drawn, load_drawn
+from marey.training.drawn import FILE, Drawn, DrawnMotion, load_drawn
 from marey.training.motions import MotionData, TokenData
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
@@ -55,7 +57,7 @@ def another_tokenizer() -> Tokenizer:
 @pytest.fixture(scope="module")
 def joined_data(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
     folder = tmp_path_factory.mktemp("several") / "prepared"
-    return PreparedData.open(write_prepared(folder, 40, ("walk", "bow", "idle", "run")))
+    return PreparedData.open(write_prepared(folder, 40, ("walk", "bow", "wash", "run")))
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +67,14 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 @pytest.fixture
 def obeying(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Lets the checker find that one action is obeyed, and no other."""
+    """Lets the selector find that one action is shown, and no other, in motions without flags."""
 
     def only(act: str) -> None:
-        def verdict(_joints: object, _fps: float, expected: Sequence[Expectation]) -> CheckVerdict:
-            return CheckVerdict([each.act for each in expected] == [act])
+        def matched(_clip: MotionClip, steps: Sequence[Step]) -> PromptMatch:
+            return PromptMatch(value=float([wanted.action for step in steps for wanted in step] == [act]))
 
-        monkeypatch.setattr(module, "judge", verdict)
+        monkeypatch.setattr(module, "match_steps", matched)
+        monkeypatch.setattr(module, "read_quality", lambda _manifest: None)
 
     return only
 
@@ -85,28 +88,29 @@ def test_what_obeys_is_kept_and_what_does_not_is_tried_three_times(
     acts = [joined_data.clips[clip].acts for clip in drawn.clips]
     assert acts
     assert set(acts) == {("walk",)}
-    assert not [prompt for prompt in reader.asked if "idle" in prompt]  # no check exists for it
+    assert not [prompt for prompt in reader.asked if "wash" in prompt]  # no rule exists for it
     assert len(reader.asked) == len(acts) + 3 * (24 - len(acts))
     assert len(drawn.tokens) == int(drawn.lengths.sum())
     assert drawn.tokens.shape[1] == TINY.tokenizer.levels
     assert all(joined_data.clips[clip].split == "train" for clip in drawn.clips)
 
 
-def test_what_was_drawn_is_further_clips_with_the_captions_of_those_it_was_drawn_for(joined_data: PreparedData) -> None:
+def test_what_was_drawn_is_further_clips_with_the_caption_that_it_was_drawn_for(joined_data: PreparedData) -> None:
     levels = TINY.tokenizer.levels
-    drawn = Drawn.of([(7, torch.full((9, levels), 1)), (2, torch.full((7, levels), 2))])
+    of_first, of_second = DrawnMotion(7, 1, torch.full((9, levels), 1)), DrawnMotion(2, 0, torch.full((7, levels), 2))
+    drawn = Drawn.of([of_first, of_second])
     data = MotionData.load(joined_data.path, CPU)
     tokenizer = another_tokenizer()
     tokens = TokenData.encode(tokenizer, data)
     captions = CaptionData.of(CaptionTexts.load(joined_data), joined_data.caption_counts, TINY.condition, CPU)
     clips, more, said = drawn.extend(joined_data.clips, tokens, captions)
     assert clips[-2:] == [joined_data.clips[7], joined_data.clips[2]]
-    for row, (clip, code, length) in enumerate([(7, 1, 9), (2, 2, 7)], start=len(joined_data.clips)):
+    for row, (motion, code, length) in enumerate([(of_first, 1, 9), (of_second, 2, 7)], start=len(joined_data.clips)):
         for phase in range(tokens.phases):
             found, lengths = more.batch(torch.tensor([row]), torch.tensor([phase]), 12)
             assert lengths.tolist() == [length]
             assert (found[0, :length] == code).all()
-        assert (said.first[row], said.count[row]) == (captions.first[clip], captions.count[clip])
+        assert (said.first[row], said.count[row]) == (captions.first[motion.clip] + motion.caption, 1)
     before, after = (t.batch(torch.tensor([3]), torch.tensor([0]), 12)[0] for t in (tokens, more))
     assert torch.equal(before, after)
     stage = MaskedStage(TINY, clips, more, said)
@@ -128,6 +132,7 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
     read = load_drawn(tmp_path, generator.networks.tokenizer, joined_data)
     assert read is not None
     assert np.array_equal(read.clips, drawn.clips)
+    assert np.array_equal(read.captions, drawn.captions)
     assert torch.equal(read.tokens, drawn.tokens)
     assert torch.equal(read.lengths, drawn.lengths)
 
@@ -150,3 +155,35 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
     (tmp_path / FILE).unlink()
     train_stage("masked", options)
     assert seen[-1] == len(joined_data.clips)
+
+
+def test_flagged_motions_are_not_kept(
+    joined_data: PreparedData, bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "match_steps", lambda _clip, _steps: PromptMatch(value=1.0))
+    drawn: list[bool] = []
+
+    def every_second(manifest: Mapping[str, object]) -> MotionQuality:
+        drawn.append(len(drawn) % 2 == 0)
+        record = MotionQuality.model_validate(manifest["quality"])
+        return record.model_copy(update={"ok": drawn[-1]})
+
+    monkeypatch.setattr(module, "read_quality", every_second)
+    found = self_train(Generator.load(bundle, device="cpu"), Reader(), joined_data, 6)
+    assert len(found.clips) == drawn.count(True) < len(drawn)
+
+
+def test_the_actions_of_a_sequence_are_those_of_its_parts(joined_data: PreparedData) -> None:
+    walk, bow = joined_data.clips[0], joined_data.clips[1]
+    joined = walk.model_copy(update={"id": "both", "acts": ("walk", "bow"), "spliced": (walk.id, bow.id)})
+    by_id = {clip.id: clip for clip in (walk, bow)}
+    assert module._steps(joined, by_id) == ((WantedAction("walk"),), (WantedAction("bow"),))
+    assert module._steps(joined, {walk.id: walk}) is None
+    dash = walk.model_copy(update={"content": "dash", "acts": ("dash",)})
+    assert module._steps(dash, by_id) == ((WantedAction("run"),),)
+
+
+def test_the_caption_of_a_single_action_says_its_side() -> None:
+    kick = ((WantedAction("kick"),),)
+    assert module._sided(kick, "kicks with the left foot") == ((WantedAction("kick", "left"),),)
+    assert module._sided(((WantedAction("walk"),),), "walks to the left") == ((WantedAction("walk"),),)

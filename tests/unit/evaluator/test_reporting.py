@@ -219,6 +219,7 @@ def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
     assert values["r_precision_3_of_32_compositional"].n < 14  # those of them that came into pools of all 40
     assert values["obeyed"].n == 26
     assert "no prompt has an expectation" in values["obeyed_compositional"].note
+    # the same clips, but solved onto the standard body and with locked feet
     assert found.row("ground_truth").values["clip_score_compositional"].mean == pytest.approx(
         values["clip_score_compositional"].mean, abs=0.03
     )

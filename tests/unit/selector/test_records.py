@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import MotionQuality, PromptMatch
 from marey.selector import RULES
 from marey.selector.records import PERCENT, match_of, percentile, real_values
+from marey.vocabulary.scope import NamedAction, Scope
 from tests.support.bodies import FPS, Array, bower, walker
 
 
@@ -35,6 +38,22 @@ def test_several_actions_have_no_percentile_and_unknown_ones_no_value() -> None:
     assert several.percentile is None
     assert match_of(clip, ["the dog barks"]) == PromptMatch()
     assert match_of(clip_of(walker()[:6]), ["a person walks"]) == PromptMatch()
+
+
+def test_the_action_that_the_encoder_reads_is_matched_where_words_name_none() -> None:
+    clip, prompt = clip_of(walker()), ["moseys along"]
+    scope = Scope((NamedAction("moseys along", "tried", "walk"),), by="encoder")
+    assert match_of(clip, prompt) == PromptMatch()
+    assert match_of(clip, prompt, scope.as_json()) == match_of(clip, ["a person walks"])
+    assert match_of(clip, ["he bows"], scope.as_json()) == match_of(clip, ["he bows"])  # words decide
+    for unread in (
+        replace(scope, by="words"),
+        replace(scope, flags=("negation",)),
+        replace(scope, actions=(NamedAction("moseys along", "unknown"),)),
+        replace(scope, actions=(NamedAction("does laundry", "tried", "wash"),)),
+        replace(scope, actions=scope.actions * 2),
+    ):
+        assert match_of(clip, prompt, unread.as_json()) == PromptMatch()
 
 
 def test_the_shipped_table_is_of_rules_and_rises() -> None:

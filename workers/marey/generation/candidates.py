@@ -128,7 +128,7 @@ class _Draw:
         self.good = False
         self._plan = plan
         self._frames = asked.frames
-        self._rank = (False, -1.0)
+        self._rank = (False, False, -1.0)
         self._chosen = 0
         self._candidates: list[Candidate] = []
 
@@ -141,14 +141,16 @@ class _Draw:
         self._frames = self._frames or frames
 
     def consider(self, number: int, clip: MotionClip) -> None:
-        """Keep a candidate if it is better than those before it: without flags, then by match."""
+        """Keep a candidate if it is better than those before it: one that shows the prompt, then one without flags,
+        then by match."""
         quality = read_quality(clip.manifest)
         flags = [] if quality is None else quality.flags
         match = None if quality is None or quality.match is None else quality.match.value
         seed = candidate_seed(self.asked.seed, number)
         self._candidates.append(Candidate(index=number, seed=seed, flags=flags, ok=not flags, match=match))
-        self.good = self.good or (not flags and (match is None or match >= PASS))
-        rank = (not flags, 0.0 if match is None else match)
+        shows = match is None or match >= PASS
+        self.good = self.good or (shows and not flags)
+        rank = (shows, not flags, 0.0 if match is None else match)
         if rank > self._rank:
             self.best, self._rank, self._chosen = clip, rank, number
 

@@ -90,10 +90,11 @@ def finish(
 
 
 def _match(clip: MotionClip, request: Request) -> PromptMatch:
-    """Match a clip with its prompt; recordings of streams, which hold several, have no match."""
+    """Match a clip with its prompt, by its words or else by its meaning; recordings of streams, which hold several
+    prompts, have no match."""
     if request.recording is not None:
         return PromptMatch()
-    return match_of(clip, request.text.actions or (request.text.rewritten,))
+    return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:

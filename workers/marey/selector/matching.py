@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import RULES
@@ -56,6 +57,21 @@ def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
     return found if found and len(found) == len(steps) else None
 
 
+def wanted_by_meaning(scope: Mapping[str, Any] | None) -> tuple[Step, ...] | None:
+    """Return the action that the sentence encoder reads in a prompt whose words name none.
+
+    Args:
+        scope: the prompt's record (`Scope.as_json`), by the text stage.
+
+    Returns:
+        One step; None if words decided the scope, the prompt negates, or the action has no rule.
+    """
+    if scope is None or scope["by"] != "encoder" or "negation" in scope["flags"] or len(scope["actions"]) != 1:
+        return None
+    name = scope["actions"][0].get("action")
+    return ((WantedAction(name),),) if name in RULES else None
+
+
 def _step(sentence: str) -> Step | None:
     scope = match_scope(sentence, _every())
     if "negation" in scope.flags:
@@ -63,10 +79,15 @@ def _step(sentence: str) -> Step | None:
     found = [named.action for named in scope.actions if named.verdict == "known" and named.action in RULES]
     if len(found) < len(scope.actions):
         return None
-    sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
-    side = sides.pop() if len(sides) == 1 else ""
+    side = side_of(sentence)
     actions = load_vocabulary().actions
     return tuple(WantedAction(name, side if actions[name].sided else "") for name in found if name is not None)
+
+
+def side_of(sentence: str) -> str:
+    """Return the side that a sentence names (`left`, `right`, `both`); empty if it names none, or several."""
+    sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
+    return sides.pop() if len(sides) == 1 else ""
 
 
 @lru_cache(maxsize=1)

@@ -7,11 +7,12 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from marey.motion.clip import MotionClip
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import PromptMatch
-from marey.selector.matching import Step, match, wanted_of
+from marey.selector.matching import Step, match, wanted_by_meaning, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 
 FILE = Path(__file__).with_name("real_values.toml")
@@ -19,14 +20,15 @@ PERCENT = 5
 """Percent between two quantiles of the table."""
 
 
-def match_of(clip: MotionClip, sentences: Iterable[str]) -> PromptMatch:
-    """Match a clip with its prompt.
+def match_of(clip: MotionClip, sentences: Iterable[str], scope: Mapping[str, Any] | None = None) -> PromptMatch:
+    """Match a clip with its prompt, by its words or else by its meaning.
 
     Args:
         clip: the motion.
         sentences: as of `wanted_of`.
+        scope: as of `wanted_by_meaning`.
     """
-    return match_steps(clip, wanted_of(sentences))
+    return match_steps(clip, wanted_of(sentences) or wanted_by_meaning(scope))
 
 
 def match_steps(clip: MotionClip, steps: Sequence[Step] | None) -> PromptMatch:

@@ -24,6 +24,16 @@ from marey.training.sentences import SentenceData
 C = TypeVar("C", bound=SentenceData)
 
 FILE = "practice.safetensors"
+FORMAT = 2
+
+
+@dataclass(frozen=True)
+class DrawnMotion:
+    """A motion generated for a caption."""
+
+    clip: int
+    caption: int  # index among the captions of the whole clip
+    tokens: Tensor  # (n, V) int64
 
 
 @dataclass(frozen=True)
@@ -31,19 +41,28 @@ class Drawn:
     """M motions; their tokens are concatenated."""
 
     clips: NDArray[np.int64]  # (M,) clip of each motion's caption
+    captions: NDArray[np.int64]  # (M,) index of the caption among those of the clip
     lengths: Tensor  # (M,) int64 tokens
     tokens: Tensor  # (N, V) int64
 
     @classmethod
-    def of(cls, motions: Sequence[tuple[int, Tensor]]) -> Drawn:
-        """Collect clips and the tokens (n, V) generated for each."""
-        clips = np.array([clip for clip, _ in motions], np.int64)
-        return cls(clips, torch.tensor([len(tokens) for _, tokens in motions]), torch.cat([t for _, t in motions]))
+    def of(cls, motions: Sequence[DrawnMotion]) -> Drawn:
+        """Collect motions."""
+        clips, captions = (
+            np.array(values, np.int64) for values in ([m.clip for m in motions], [m.caption for m in motions])
+        )
+        lengths = torch.tensor([len(m.tokens) for m in motions])
+        return cls(clips, captions, lengths, torch.cat([m.tokens for m in motions]))
 
     def write(self, run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> None:
         """Write the motions into a run folder."""
         run.mkdir(parents=True, exist_ok=True)
-        tensors = {"clips": torch.from_numpy(self.clips), "lengths": self.lengths, "tokens": self.tokens.short()}
+        tensors = {
+            "clips": torch.from_numpy(self.clips),
+            "captions": torch.from_numpy(self.captions),
+            "lengths": self.lengths,
+            "tokens": self.tokens.short(),
+        }
         temporary = (run / FILE).with_suffix(".part")
         save_file(tensors, temporary, metadata={"key": _key(tokenizer, prepared)})
         temporary.replace(run / FILE)
@@ -59,7 +78,7 @@ class Drawn:
             starts=torch.cat([tokens.starts, starts[:, None].expand(-1, tokens.phases)]),
             lengths=torch.cat([tokens.lengths, lengths[:, None].expand(-1, tokens.phases)]),
         )
-        return [*clips, *(clips[clip] for clip in self.clips)], more, captions.repeated(self.clips)
+        return [*clips, *(clips[clip] for clip in self.clips)], more, captions.with_single(self.clips, self.captions)
 
 
 def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> Drawn | None:
@@ -80,8 +99,9 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
         hint = "Remove it, or generate again (`marey train self-train`)."
         raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)
     values = load_file(file)
-    return Drawn(values["clips"].numpy(), values["lengths"], values["tokens"].long())
+    clips, captions = values["clips"].numpy(), values["captions"].numpy()
+    return Drawn(clips, captions, values["lengths"], values["tokens"].long())
 
 
 def _key(tokenizer: MotionTokenizer, prepared: PreparedData) -> str:
-    return f"{prepared.sha256}:{float(tokenizer.codebooks.double().abs().sum()):.6f}"
+    return f"{FORMAT}:{prepared.sha256}:{float(tokenizer.codebooks.double().abs().sum()):.6f}"

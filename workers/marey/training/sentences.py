@@ -36,10 +36,12 @@ class SentenceData:
         """
         return SentenceData(**sentence_fields(texts, counts, width, device))
 
-    def repeated(self, clips: NDArray[np.int64]) -> Self:
-        """Return the same data with further clips that have the captions of clips (M,)."""
-        first, authors = (np.concatenate([own, own[clips]]) for own in (self.first, self.authors))
-        return replace(self, first=first, authors=authors)
+    def with_single(self, clips: NDArray[np.int64], captions: NDArray[np.int64]) -> Self:
+        """Return the same data with further clips of one caption each: `captions` (M,) of those of `clips` (M,)."""
+        first = np.concatenate([self.first, self.first[clips] + captions])
+        one = np.zeros((len(clips), self.authors.shape[1]), np.int64)
+        one[:, :1] = 1
+        return replace(self, first=first, authors=np.concatenate([self.authors, one]))
 
     @property
     def count(self) -> NDArray[np.int64]:

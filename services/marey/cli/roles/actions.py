@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
     from marey.referee.adherence import ActionRate
     from marey.referee.prompts import ActionPrompt
+    from marey.text.pipeline import TextPipeline
 
     Motion = tuple[ActionPrompt, int, MotionClip]
 
@@ -227,13 +228,15 @@ class _Run:
         from marey.training.adherence import pipeline_of
 
         generator = self._generator
-        texts = pipeline_of(generator).features([prompt.text for prompt in prompts])
+        pipeline = pipeline_of(generator)
+        texts = pipeline.features([prompt.text for prompt in prompts])
         lengths = (length_of(generator.bundle, Item(prompt.text)) for prompt in prompts)
         frames = [generator.limits.frames_of(seconds) for seconds in lengths]
+        scopes = self._scopes(pipeline, prompts)
         jobs = [
-            (prompt, Request(text, seed, wanted))
+            (prompt, Request(text, seed, wanted, scope=scope))
             for seed in range(self._options.seeds)
-            for prompt, text, wanted in zip(prompts, texts, frames, strict=True)
+            for prompt, text, wanted, scope in zip(prompts, texts, frames, scopes, strict=True)
         ]
         for start in range(0, len(jobs), generator.batch):
             part = jobs[start : start + generator.batch]
@@ -241,6 +244,18 @@ class _Run:
             for (prompt, request), clip in zip(part, clips, strict=True):
                 yield prompt, request.seed, clip
             self._options.progress(min(start + generator.batch, len(jobs)), len(jobs))
+
+    def _scopes(self, pipeline: TextPipeline, prompts: Sequence[P]) -> list[dict[str, Any] | None]:
+        """Return the scope of each prompt, as the text stage of a job reads it; by it candidates are matched."""
+        from marey.bundles.scope import judges_meaning
+        from marey.text.meaning import MeaningJudge
+        from marey.vocabulary.scope import match_scope
+
+        lists = self.bundle.manifest.actions
+        if lists is None:
+            return [None] * len(prompts)
+        judge = MeaningJudge(pipeline.pooled).judge if judges_meaning(self.bundle.manifest.text) else match_scope
+        return [judge(prompt.text, lists).as_json() for prompt in prompts]
 
     def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:
         """Return the report; write it where a folder is given."""
