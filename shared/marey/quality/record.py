@@ -15,6 +15,10 @@ KEY = "quality"
 """Key of the record in a motion's manifest."""
 
 
+SHOWN = 0.5
+"""Value of a match from which on a motion shows the actions of its prompt."""
+
+
 class Flag(StrEnum):
     """A fault of a motion; see the measure of each in `MotionQuality`."""
 
@@ -24,6 +28,7 @@ class Flag(StrEnum):
     POPPING = "popping"
     JOINT_RANGE = "joint-range"
     SELF_CONTACT = "self-contact"
+    OFF_PROMPT = "off-prompt"
 
 
 class PromptMatch(BaseModel):
@@ -58,9 +63,16 @@ class MotionQuality(BaseModel):
     pops: int = Field(description="Number of jumps of a joint within a twentieth of a second.")
     range_deg: float = Field(description="Farthest that a joint bends beyond the human range, degrees.")
     self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
-    flags: list[Flag] = Field(description="Measures beyond their limits.")
+    flags: list[Flag] = Field(description="Measures beyond their limits; `off-prompt`: a match under 0.5.")
     ok: bool = Field(description="True without flags.")
     match: PromptMatch | None = Field(default=None, description="Null for motions of earlier releases.")
+
+    def with_match(self, match: PromptMatch) -> MotionQuality:
+        """Return the record with the match, and the flag of one that is too low."""
+        flags = [flag for flag in self.flags if flag is not Flag.OFF_PROMPT]
+        if match.value is not None and match.value < SHOWN:
+            flags.append(Flag.OFF_PROMPT)
+        return self.model_copy(update={"match": match, "flags": flags, "ok": not flags})
 
 
 def read_quality(manifest: Mapping[str, Any]) -> MotionQuality | None:

@@ -26,7 +26,8 @@ class Candidate(BaseModel):
 
 
 class Selection(BaseModel):
-    """Choice of a motion among candidates: without flags first, then by match, then the earlier one."""
+    """Choice of a motion among candidates: one that shows the prompt first, then one without other flags, then by
+    match, then the earlier one."""
 
     model_config = ConfigDict(frozen=True)
 

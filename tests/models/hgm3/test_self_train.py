@@ -24,7 +24,7 @@ from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
 from marey.motion.clip import MotionClip
-from marey.quality.record import MotionQuality, PromptMatch
+from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.selector.matching import Step, WantedAction
 from marey.training.budget import Budget
 from marey.training.drawn import FILE, Drawn, DrawnMotion, load_drawn
@@ -166,7 +166,7 @@ def test_flagged_motions_are_not_kept(
     def every_second(manifest: Mapping[str, object]) -> MotionQuality:
         drawn.append(len(drawn) % 2 == 0)
         record = MotionQuality.model_validate(manifest["quality"])
-        return record.model_copy(update={"ok": drawn[-1]})
+        return record.model_copy(update={"flags": [] if drawn[-1] else [Flag.SKATING]})
 
     monkeypatch.setattr(module, "read_quality", every_second)
     found = self_train(Generator.load(bundle, device="cpu"), Reader(), joined_data, 6)

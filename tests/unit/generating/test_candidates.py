@@ -114,7 +114,7 @@ def choose(
         ([(True, 0.6), (True, 0.9), (True, 0.7)], 1),
         ([(False, 0.6), (True, 0.2), (False, 0.9)], 2),  # one that shows the prompt first
         ([(False, 1.0), (True, 0.5), (True, 0.7)], 2),  # of these one without flags
-        ([(False, 0.4), (True, 0.2), (False, 0.3)], 1),
+        ([(False, 0.4), (True, 0.2), (False, 0.3)], 1),  # where none shows it, one without other flags
         ([(True, 0.8), (True, 0.8), (True, 0.8)], 0),  # then the earlier one
         ([(True, None), (True, None), (False, None)], 0),
         ([(False, 0.1), (False, 0.3), (False, 0.2)], 1),

@@ -147,7 +147,7 @@ def test_the_files_hold_the_motion_and_where_it_comes_from(handler: GeneratorHan
     quality = assess(clip.joints, clip.fps, expected_by_prompts(["a person waves"]))
     matched = match_of(clip, ["a person waves"])
     assert matched.value is not None
-    assert read_quality(manifest) == quality.model_copy(update={"match": matched})
+    assert read_quality(manifest) == quality.with_match(matched)
 
 
 def test_the_frame_rate_of_the_files_is_the_items(handler: GeneratorHandler[Any]) -> None:

@@ -111,6 +111,8 @@ def test_motions_of_a_list_are_counted_with_what_a_user_is_told_of_them() -> Non
     known = {"scope": {"verdict": "known", "flags": []}, "quality": {"flags": []}}
     skates = {**known, "quality": {"flags": ["skating"]}}
     doubtful = {**known, "scope": {"verdict": "unknown", "flags": ["no-action"]}}
+    tried = {**known, "scope": {"verdict": "tried", "flags": []}}
+    matched = {**tried, "quality": {"flags": [], "match": {"value": 0.9}}}
     trials = [
         judge_studio(walks, 0, way, known),
         judge_studio(walks, 1, way, skates),
@@ -120,6 +122,8 @@ def test_motions_of_a_list_are_counted_with_what_a_user_is_told_of_them() -> Non
     ]
     assert [trial.passed for trial in trials] == [True, True, False, False, None]
     assert [trial.reasons for trial in trials[1:3]] == [("skating",), ("unknown", "no-action")]
+    assert judge_studio(walks, 0, way, tried).reasons == ("tried",)
+    assert not judge_studio(walks, 0, way, matched).flagged  # the match settles it
     found = studio_rates(trials)
     assert found == StudioRates(2, 1, 2, 1, 1, 1)
     assert "| do not | 2 | 50% |" in studio_markdown("toy@1", found)

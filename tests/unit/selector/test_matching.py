@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
 from marey.motion.resample import frame_times, interpolate
+from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion, WantedAction, match, wanted_of
-from marey.selector.matching import PASS
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.bodies import FPS, Array, Body, bower, raiser, runner, steady, walker, waver
 
@@ -64,7 +64,7 @@ def matched(joints: Array, prompt: str, fps: float = FPS) -> float:
 
 @pytest.mark.parametrize("prompt", SINGLE)
 def test_a_motion_matches_its_own_prompt(prompt: str) -> None:
-    assert matched(SINGLE[prompt](), prompt) >= PASS
+    assert matched(SINGLE[prompt](), prompt) >= SHOWN
 
 
 @pytest.mark.parametrize(
@@ -83,14 +83,14 @@ def test_a_motion_matches_its_own_prompt(prompt: str) -> None:
     ],
 )
 def test_another_motion_does_not_match(prompt: str, other: str) -> None:
-    assert matched(SINGLE[other](), prompt) < PASS
+    assert matched(SINGLE[other](), prompt) < SHOWN
 
 
 def test_a_side_counts_where_the_prompt_names_one() -> None:
     left = waver("left")
-    assert matched(left, "a person waves") >= PASS
-    assert matched(left, "a person waves with the right hand") < PASS
-    assert matched(walker(turn=90.0), "someone turns right") < PASS
+    assert matched(left, "a person waves") >= SHOWN
+    assert matched(left, "a person waves with the right hand") < SHOWN
+    assert matched(walker(turn=90.0), "someone turns right") < SHOWN
 
 
 def in_order(first: Array, then: Array) -> Array:
@@ -104,16 +104,16 @@ def test_actions_count_in_their_order() -> None:
     forward, backward = wanted_of(["a person walks", "he waves"]), wanted_of(["a person waves", "he walks"])
     assert forward is not None
     assert backward is not None
-    assert match(Motion(both, FPS), forward) >= PASS
-    assert match(Motion(both, FPS), backward) < PASS
-    assert match(Motion(walker(), FPS), forward) < PASS
+    assert match(Motion(both, FPS), forward) >= SHOWN
+    assert match(Motion(both, FPS), backward) < SHOWN
+    assert match(Motion(walker(), FPS), forward) < SHOWN
 
 
 def test_a_step_of_two_actions_is_met_at_once_or_in_order() -> None:
     both = wanted_of(["a person walks and waves"])
     assert both is not None
     assert len(both) == 1
-    assert match(Motion(in_order(walker(), waver("left")), FPS), both) >= PASS
+    assert match(Motion(in_order(walker(), waver("left")), FPS), both) >= SHOWN
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_place_heading_size_and_rate_hardly_change_a_match(
     moved = size * (joints @ rotation.T + [metres, 0, -metres])
     moved = np.asarray(interpolate(moved, frame_times(len(moved), FPS, fps)))
     assert matched(moved, prompt, fps) == pytest.approx(matched(joints, prompt), abs=0.35)
-    assert matched(moved, prompt, fps) >= PASS
+    assert matched(moved, prompt, fps) >= SHOWN
 
 
 @settings(max_examples=20, deadline=None)

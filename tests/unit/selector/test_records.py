@@ -11,7 +11,7 @@ from marey.data.selector_values import document
 from marey.motion.clip import MotionClip
 from marey.motion.pose import solve_pose
 from marey.motion.skeleton import HUMANML3D
-from marey.quality.record import MotionQuality, PromptMatch
+from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.selector import RULES
 from marey.selector.records import PERCENT, match_of, percentile, real_values
 from marey.vocabulary.scope import NamedAction, Scope
@@ -72,6 +72,20 @@ def test_records_of_earlier_releases_have_no_match() -> None:
     ).model_dump(mode="json")
     del record["match"]
     assert MotionQuality.model_validate(record).match is None
+
+
+def test_a_low_match_is_a_flag_until_a_better_one_replaces_it() -> None:
+    record = MotionQuality(
+        support=["feet"], float_s=0, skate=1, penetration_mm=0, pops=0, range_deg=0, self_contact=0,
+        flags=[Flag.SKATING], ok=False,
+    )  # fmt: skip
+    low = record.with_match(PromptMatch(value=0.49))
+    assert low.flags == [Flag.SKATING, Flag.OFF_PROMPT]
+    assert low.with_match(PromptMatch(value=0.5)).flags == [Flag.SKATING]
+    assert low.with_match(PromptMatch()).flags == [Flag.SKATING]
+    sound = record.model_copy(update={"flags": [], "ok": True})
+    assert not sound.with_match(PromptMatch(value=0.1)).ok
+    assert sound.with_match(PromptMatch(value=0.9)).ok
 
 
 def test_the_table_leaves_out_actions_that_real_clips_do_not_match() -> None:

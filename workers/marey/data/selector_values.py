@@ -14,8 +14,8 @@ import numpy as np
 
 from marey.data.measured_files import write_measured
 from marey.data.prepared import PreparedData
+from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion, WantedAction, match
-from marey.selector.matching import PASS
 from marey.selector.motion import SHORTEST
 from marey.selector.records import FILE, PERCENT
 
@@ -59,7 +59,7 @@ def document(data: PreparedData, values: Mapping[str, Sequence[float]]) -> str:
 
 
 def _is_enough(values: Sequence[float]) -> bool:
-    return len(values) >= ENOUGH and sum(value >= PASS for value in values) >= PASSING * len(values)
+    return len(values) >= ENOUGH and sum(value >= SHOWN for value in values) >= PASSING * len(values)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -16,9 +16,8 @@ from marey.generation.port import GenerationControl, Generator, NoControl, Reque
 from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
-from marey.quality.record import read_quality
+from marey.quality.record import SHOWN, Flag, read_quality
 from marey.quality.selection import KEY, Candidate, Selection
-from marey.selector.matching import PASS
 
 
 @dataclass(frozen=True)
@@ -148,9 +147,9 @@ class _Draw:
         match = None if quality is None or quality.match is None else quality.match.value
         seed = candidate_seed(self.asked.seed, number)
         self._candidates.append(Candidate(index=number, seed=seed, flags=flags, ok=not flags, match=match))
-        shows = match is None or match >= PASS
-        self.good = self.good or (shows and not flags)
-        rank = (shows, not flags, 0.0 if match is None else match)
+        shows, sound = match is None or match >= SHOWN, set(flags) <= {Flag.OFF_PROMPT}
+        self.good = self.good or (shows and sound)
+        rank = (shows, sound, 0.0 if match is None else match)
         if rank > self._rank:
             self.best, self._rank, self._chosen = clip, rank, number
 

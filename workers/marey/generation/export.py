@@ -85,7 +85,7 @@ def finish(
     quality = quality_of(clip, expected_by_prompts(prompts))
     if quality is None:
         return clip
-    quality = quality.model_copy(update={"match": _match(clip, request)})
+    quality = quality.with_match(_match(clip, request))
     return replace(clip, manifest={**manifest, KEY: quality.model_dump(mode="json")})
 
 

@@ -1,7 +1,8 @@
 """A studio's list: how many motions do what was asked, and how many of the others are said to be doubtful.
 
-A motion is *flagged* if a user is told that it may not be what was asked for: its prompt is not in the scope of the
-bundle, or its quality record has flags.
+A motion is *flagged* if a user is told that it may not be what was asked for: its quality record has flags, or its
+prompt is not in the scope of the bundle. That the bundle tries an action is a forecast, and no doubt is left once a
+motion has a match: a low one is a flag of the record.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from marey.referee.body import Body
 from marey.referee.prompts import ActionPrompt
 from marey.referee.sequences import shows_in_order
 
-KNOWN = "known"
+SETTLED = ("close", "tried")
+"""Verdicts of the scope that a match settles."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class StudioTrial:
     Attributes:
         passed: it shows the actions of the prompt in order; None where the vocabulary does not cover the prompt.
         flagged: the user is told of a doubt.
-        reasons: what is told: the verdict of the scope where it is not `known`, flags of scope and quality.
+        reasons: what is told: a verdict of the scope that is not settled, flags of scope and quality.
     """
 
     prompt: ActionPrompt
@@ -53,8 +55,10 @@ def judge_studio(prompt: ActionPrompt, seed: int, body: Body, manifest: Mapping[
         manifest: of the motion, with its `scope` and `quality`.
     """
     scope, quality = manifest.get("scope") or {}, manifest.get("quality") or {}
-    verdict = scope.get("verdict", KNOWN)
-    reasons = (*([] if verdict == KNOWN else [verdict]), *scope.get("flags", ()), *quality.get("flags", ()))
+    has_match = (quality.get("match") or {}).get("value") is not None
+    settled = ("known", *SETTLED) if has_match else ("known",)
+    told = [verdict] if (verdict := scope.get("verdict", "known")) not in settled else []
+    reasons = (*told, *scope.get("flags", ()), *quality.get("flags", ()))
     passed = shows_in_order(prompt.actions, body) if prompt.actions else None
     return StudioTrial(prompt, seed, passed, bool(reasons), reasons)
 

@@ -13,8 +13,6 @@ from marey.selector.rules import RULES
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope
 
-PASS = 0.5
-"""Value from which a motion shows its actions, as their definitions have it."""
 LEAST_PART = 0.5
 """Seconds that each action of several needs."""
 CUTS = {2: 14, 3: 9}
@@ -96,7 +94,8 @@ def _every() -> ActionLists:
 
 
 def match(motion: Motion, steps: Sequence[Step]) -> float:
-    """Return how well a motion shows actions in their order, 0 to 1; from `PASS` on it shows them.
+    """Return how well a motion shows actions in their order, 0 to 1; from `SHOWN` (`marey.quality.record`) on it shows
+    them.
 
     Args:
         motion: the joints.

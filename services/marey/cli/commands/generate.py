@@ -17,8 +17,8 @@ from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.core.extras import needs_extra
 from marey.items.item import MAX_SEED, Item, Problem
 
-SHOWN = 0.5
-"""Match with its prompt from which a motion shows it; see docs/reference/quality.md."""
+OFF_PROMPT = "off-prompt"
+"""The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -131,11 +131,10 @@ def _report_quality(line: dict[str, Any]) -> None:
     if quality is None:
         return
     about = f"{line['prompt']!r}, seed {line['seed']}"
-    if not quality["ok"]:
-        console.say(f"{about}: the motion is {', '.join(quality['flags'])}.")
-    value = quality["match"]["value"]
-    if value is not None and value < SHOWN:
-        console.say(f"{about}: the motion does not show the prompt (match {value:g}).")
+    if faults := [flag for flag in quality["flags"] if flag != OFF_PROMPT]:
+        console.say(f"{about}: the motion is {', '.join(faults)}.")
+    if OFF_PROMPT in quality["flags"]:
+        console.say(f"{about}: the motion does not show the prompt (match {quality['match']['value']:g}).")
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:

@@ -54,7 +54,8 @@ class MotionQuality(Result):
     self_contact: float = 0.0
     """Deepest that limbs, trunk and head pass into each other, millimetres."""
     flags: tuple[str, ...] = ()
-    """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact."""
+    """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact; off-prompt: a
+    match under 0.5."""
     ok: bool = False
     """True without flags."""
     match: PromptMatch | None = None
@@ -79,7 +80,8 @@ class Candidate(Result):
 
 @dataclass(frozen=True, kw_only=True)
 class Selection(Result):
-    """The choice of a motion among candidates: without flags first, then by match, then the earlier one."""
+    """The choice of a motion among candidates: one that shows the prompt first, then one without other flags, then by
+    match, then the earlier one."""
 
     version: int = 0
     best_of: int = 0
