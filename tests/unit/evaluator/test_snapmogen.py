@@ -16,6 +16,7 @@ from marey.core.errors import Conflict, InvalidFile, MareyError, NotFound
 from marey.core.settings import settings
 from marey.evaluator.config import NetworkConfig
 from marey.evaluator.loading import load_evaluator
+from marey.evaluator.snapmogen import SnapMoGenEvaluator
 from marey.evaluator.snapmogen_import import import_snapmogen
 from marey.evaluator.snapmogen_model import (
     PUBLIC,
@@ -120,6 +121,7 @@ def test_the_imported_evaluator_reads_motions_and_sentences(download: Path, mode
     assert bundle.manifest.text is not None
     assert bundle.manifest.text.encoder_sha256 == weights_sha256(t5)
     evaluator = load_evaluator("snap-eval", device="cpu")
+    assert isinstance(evaluator, SnapMoGenEvaluator)
     assert (evaluator.layout, evaluator.fps, evaluator.distance) == ("snapmogen-296", 30, "cosine")
     motion = np.random.default_rng(1).normal(size=(40, 296)).astype(np.float32)
     mean, std = (np.load(download / "meta_data" / f"{name}.npy").astype(np.float32) for name in ("mean", "std"))
@@ -129,10 +131,11 @@ def test_the_imported_evaluator_reads_motions_and_sentences(download: Path, mode
     network.load_state_dict({name: state[published_name(name)] for name in own}, strict=False)
     expected = network.embed(torch.from_numpy((motion - mean) / std)[None], torch.tensor([40]))
     np.testing.assert_allclose(evaluator.embed_motion([motion]), expected.detach().numpy(), atol=1e-5)
-    long = " ".join(["a person walks forward"] * 60)
+    long = " ".join(["a person walks forward"] * 45)
     embedded = evaluator.embed_text(["a person waves", long])
     assert embedded.shape == (2, 16)
     assert np.isfinite(embedded).all()
+    assert evaluator._states([long])[0].shape == (120, 768)
     card = (models / "snap-eval" / "README.md").read_text(encoding="utf-8")
     assert "snapmogen/evaluator/eval_klde-5_late-5_nlayer6_norm/model/net_best_top1.tar" in card
 

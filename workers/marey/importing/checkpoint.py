@@ -154,7 +154,7 @@ class Section:
         if value is None:
             return f"lacks the tensor {name}"
         if shape is not None and not _fits(value.shape, shape):
-            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+            wanted = tuple("any" if n is None else n for n in shape)
             return f"{name} has shape {tuple(value.shape)}, not {wanted}"
         if not value.is_floating_point() or value.layout is not torch.strided or value.is_quantized:
             return f"{name} holds {value.dtype}, not floating numbers"
