@@ -63,6 +63,8 @@ def decode_base(model: MaskedTransformer, items: Items, config: InferenceConfig,
         ~frame_mask(items.lengths, size), math.inf
     )  # (B, n)
     for step in range(config.steps):
+        if not len(base):
+            break
         base, confidence = _base_pass(model, items, base, confidence, counts[step], step, config)
         stay = keep()
         if stay is not None:
@@ -111,6 +113,8 @@ def decode_residual(model: ResidualTransformer, items: Items, config: InferenceC
     """Fill `tokens[..., 1:]` level by level. A drawn padding token adds nothing: NO_TOKEN."""
     total: Tensor | None = None
     for level in range(1, model.levels):
+        if not len(items.lengths):
+            break
         valid = frame_mask(items.lengths, items.tokens.shape[1])
         below = items.tokens[..., level - 1]
         embedded = model.embed(below.masked_fill(below == NO_TOKEN, model.pad_token), level - 1)
