@@ -9,6 +9,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from marey.importing import Section
 from marey.models.momask import names
 from marey.models.momask.config import InferenceConfig, MoMaskConfig
 from marey.models.momask.decoding import Items, decode_base, decode_residual
@@ -34,9 +35,10 @@ ARGMAX = InferenceConfig(temperature=0.0, residual_temperature=0.0)
 
 def filled(network: nn.Module, parts: names.PartNames, shapes: Shapes) -> Any:
     """The network with the weights of the golden numbers."""
-    missing = network.load_state_dict(parts.convert(weights(shapes)), strict=False).missing_keys
-    assert set(missing) <= {"mean", "std", "quantizer.counts", "quantizer.sums", "quantizer.initialized"}
-    return network.eval().requires_grad_(False)
+    section = Section("golden", "", weights(shapes))
+    parts.fill(network, section)
+    assert section.unknown == ()
+    return network
 
 
 def residual(shared: bool) -> ResidualTransformer:

@@ -42,17 +42,13 @@ class Networks:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def text_spec(config: MoMaskConfig, encoder_sha256: str | None = None) -> TextSpec:
-    """Return the text pipeline: one vector of the sentence, so no labeller."""
-    encoder = "minilm" if config.text_width == 384 else "clip-vit-b32"
-    return TextSpec(encoder=encoder, encoder_sha256=encoder_sha256, width=config.text_width, labeller=NO_LABELLER)
-
-
 def write_bundle(
     path: Path,
     config: MoMaskConfig,
     parts: Mapping[str, Mapping[str, Tensor]],
     statistics: tuple[NDArray[np.float32], NDArray[np.float32]],
+    *,
+    text: TextSpec,
     **manifest: Any,
 ) -> Bundle:
     """Write a bundle in float32, as the checkpoints are: logits stay equal to theirs.
@@ -62,10 +58,10 @@ def write_bundle(
         config: of the networks.
         parts: state dict of each network.
         statistics: mean and std (D,) of the tokenizer.
-        manifest: as for `write_generator`; `text` = None for `text_spec`.
+        text: encoder of the sentence; prompts are read as one vector, without a labeller.
+        manifest: as for `write_generator`.
     """
-    manifest.setdefault("text", text_spec(config))
-    return write_generator(path, MODEL, config, parts, statistics, dtype=np.float32, **manifest)
+    return write_generator(path, MODEL, config, parts, statistics, text=text, dtype=np.float32, **manifest)
 
 
 def load_networks(bundle: Bundle) -> tuple[MoMaskConfig, Networks]:
@@ -91,5 +87,9 @@ def random_bundle(path: Path | str, config: str | MoMaskConfig = "tiny", seed: i
     Statistics are those of a person standing still, so that joints stay within a sane range.
     """
     config = named_config(config) if isinstance(config, str) else config
+    encoder = "minilm" if config.text_width == 384 else "clip-vit-b32"
+    text = TextSpec(encoder=encoder, width=config.text_width, labeller=NO_LABELLER)
     parts = random_parts(lambda: Networks.build(config).parts(), ("masked", "residual"), seed)
-    return write_bundle(Path(path), config, parts, standing(config.layout), random=True, licence="MIT", overwrite=True)
+    return write_bundle(
+        Path(path), config, parts, standing(config.layout), text=text, random=True, licence="MIT", overwrite=True
+    )

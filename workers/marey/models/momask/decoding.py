@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from marey.models.momask.config import InferenceConfig
-from marey.models.momask.model import Condition, MaskedTransformer, ResidualTransformer
+from marey.models.momask.model import MaskedTransformer, ResidualTransformer, SentenceProjection
 from marey.nn.convolution import frame_mask
 from marey.nn.masking import cosine_schedule
 from marey.nn.quantizer import NO_TOKEN
@@ -143,6 +143,6 @@ def _residual_logits(
     return model(total.repeat(2, 1, 1), valid.repeat(2, 1), level, both, guidance)
 
 
-def _with_null(condition: Condition, sentence: Tensor) -> Tensor:
+def _with_null(condition: SentenceProjection, sentence: Tensor) -> Tensor:
     """Return conditions (2 B, w): those of the items, then none for each."""
     return torch.cat([sentence, condition.null().expand_as(sentence)])

@@ -48,7 +48,7 @@ class TokenSequence(nn.Module):
         return self.transformer(x, readable)[:, condition.shape[1] :]
 
 
-class Condition(nn.Module):
+class SentenceProjection(nn.Module):
     """Projection of sentence features to condition tokens."""
 
     nothing: Tensor  # (1, W)
@@ -103,7 +103,7 @@ class MaskedTransformer(nn.Module):
         self.mask_token, self.pad_token = t.codes, t.codes + 1
         self.embedding = nn.Embedding(t.codes + 2, t.code_width)
         self.project = nn.Linear(t.code_width, width)
-        self.condition = Condition(config.text_width, width)
+        self.condition = SentenceProjection(config.text_width, width)
         self.sequence = TokenSequence(config.masked, config.max_tokens)
         self.head = Head(width, t.codes)
         initialize(self)
@@ -143,7 +143,7 @@ class ResidualTransformer(nn.Module):
         self.output = nn.Parameter(torch.empty(own, t.codes + 1, t.code_width))
         self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes + 1))  # zero where shared
         self.project = nn.Linear(t.code_width, width)
-        self.condition = Condition(config.text_width, width)
+        self.condition = SentenceProjection(config.text_width, width)
         self.level = nn.Linear(t.levels, width)  # of the level as a one-hot vector
         self.sequence = TokenSequence(config.residual, config.max_tokens)
         self.head = Head(width, t.code_width)

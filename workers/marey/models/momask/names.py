@@ -1,38 +1,25 @@
 """Tensor names of MoMask's public checkpoints, and the networks' own names for them.
 
 Names and shapes: EricGuo5513/momask-codes (MIT). Most tensors have another name here and are otherwise the same; tables
-of codes are stacked or cut (`Tables`).
+of codes are stacked, joined or cut.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from marey.importing import Section
 from marey.models.momask.config import MoMaskConfig, TransformerConfig
 
-State = Mapping[str, Tensor]
-Shape = tuple[int, ...]
-
-CLIP = "clip_model."
-"""Prefix of the text encoder's weights, which a few files carry: the encoder is loaded apart."""
-POSITIONS = frozenset({"position_enc.pe"})
+State = dict[str, Tensor]
 
 
-@dataclass(frozen=True)
-class Tables:
-    """Public tensors that are not taken over one by one.
-
-    Attributes:
-        shapes: by public name.
-        convert: public tensors to those of the network, by its names.
-    """
-
-    shapes: Mapping[str, Shape] = field(default_factory=dict[str, Shape])
-    convert: Callable[[State], dict[str, Tensor]] = lambda _: {}
+def _no_tables(_section: Section) -> State:
+    return {}
 
 
 @dataclass(frozen=True)
@@ -40,30 +27,34 @@ class PartNames:
     """Names of one network.
 
     Attributes:
-        renamed: public name to the network's own.
-        tables: the other public tensors that are needed.
-        recomputed: public tensors that are not needed.
+        renamed: the network's own names to public ones, of tensors that are otherwise the same.
+        tables: makes the network's other tensors of the public ones.
     """
 
     renamed: Mapping[str, str]
-    tables: Tables = Tables()
-    recomputed: frozenset[str] = frozenset()
+    tables: Callable[[Section], State] = _no_tables
 
-    def convert(self, public: State) -> dict[str, Tensor]:
-        """Return the network's tensors, made of the public ones."""
-        return {ours: public[theirs] for theirs, ours in self.renamed.items()} | self.tables.convert(public)
+    def fill(self, network: nn.Module, section: Section) -> None:
+        """Load the public tensors into a network.
+
+        Raises:
+            InvalidFile: see `Section.fill`.
+        """
+        section.ignore(r"position_enc\.pe", "positions, computed anew")
+        section.ignore(r"clip_model\..*", "the text encoder, installed apart")
+        section.fill(network, lambda name: self.renamed.get(name, name), made=self.tables(section))
 
 
 def tokenizer_names(config: MoMaskConfig) -> PartNames:
     """Return the names of the RVQ-VAE."""
     t = config.tokenizer
     last = 2 + t.stages
-    layers = {
-        "encoder.model.0": "encoder.in_proj",
-        f"encoder.model.{last}": "encoder.out_proj",
-        "decoder.model.0": "decoder.in_proj",
+    layers = {  # `enter` and `leave`: see `marey.nn.stored_names`
+        "encoder.model.0": "encoder.enter",
+        f"encoder.model.{last}": "encoder.leave",
+        "decoder.model.0": "decoder.enter",
         f"decoder.model.{last}": "decoder.smooth",
-        f"decoder.model.{last + 2}": "decoder.out_proj",
+        f"decoder.model.{last + 2}": "decoder.leave",
     }
     for stage in range(t.stages):
         layers[f"encoder.model.{stage + 2}.0"] = f"encoder.down.{stage}"
@@ -73,20 +64,25 @@ def tokenizer_names(config: MoMaskConfig) -> PartNames:
                 place = f"residuals.{stage}.blocks.{block}.{ours}"
                 layers[f"encoder.model.{stage + 2}.1.model.{block}.{theirs}"] = f"encoder.{place}"
                 layers[f"decoder.model.{stage + 2}.0.model.{block}.{theirs}"] = f"decoder.{place}"
-    books = [f"quantizer.layers.{level}.codebook" for level in range(t.levels)]
-    tables = Tables(
-        dict.fromkeys(books, (t.codes, t.code_width)),
-        lambda public: {"quantizer.codebooks": torch.stack([public[name] for name in books])},
-    )
+
+    def tables(section: Section) -> State:
+        books = [
+            section.take(f"quantizer.layers.{level}.codebook", (t.codes, t.code_width)) for level in range(t.levels)
+        ]
+        return {
+            "quantizer.codebooks": torch.stack(books),
+            "quantizer.counts": torch.ones(t.levels, t.codes),  # only training reads them
+            "quantizer.initialized": torch.tensor(True),
+        }
+
     return PartNames(dict(_parameters(layers)), tables)
 
 
 def masked_names(config: MoMaskConfig) -> PartNames:
     """Return the names of the masked transformer."""
     layers = {**_transformer_layers(config.masked), "output_process.poseFinal": "head.final"}
-    tokens = {"token_emb.weight": "embedding.weight"}
-    renamed = dict(_parameters(layers)) | _attention_names(config.masked) | tokens
-    return PartNames(renamed, recomputed=POSITIONS)
+    tokens = {"embedding.weight": "token_emb.weight"}
+    return PartNames(dict(_parameters(layers)) | _attention_names(config.masked) | tokens)
 
 
 def residual_names(config: MoMaskConfig) -> PartNames:
@@ -97,8 +93,7 @@ def residual_names(config: MoMaskConfig) -> PartNames:
         "quant_emb": "level",
     }
     renamed = dict(_parameters(layers)) | _attention_names(config.residual)
-    tables = _shared_tables(config) if config.shared else _separate_tables(config)
-    return PartNames(renamed, tables, POSITIONS)
+    return PartNames(renamed, _shared_tables(config) if config.shared else _separate_tables(config))
 
 
 def length_names(config: MoMaskConfig) -> PartNames:
@@ -112,32 +107,36 @@ def length_names(config: MoMaskConfig) -> PartNames:
     return PartNames(dict(_parameters(layers)))
 
 
-def _shared_tables(config: MoMaskConfig) -> Tables:
+def _shared_tables(config: MoMaskConfig) -> Callable[[Section], State]:
     t = config.tokenizer
-    one = (1, t.codes + 1, t.code_width)
-    first, between, last = "token_embed_weight_", "embed_proj_shared_weight", "output_proj_weight_"
+    table = (t.codes + 1, t.code_width)
 
-    def convert(public: State) -> dict[str, Tensor]:
+    def tables(section: Section) -> State:
+        first = section.take("token_embed_weight_", (1, *table))
+        between = section.take("embed_proj_shared_weight", (t.levels - 2, *table))
         return {
-            "embedding": torch.cat([public[first], public[between]]),
-            "output": public[last],
+            "embedding": torch.cat([first, between]),
+            "output": section.take("output_proj_weight_", (1, *table)),
             "bias": torch.zeros(t.levels - 1, t.codes + 1),
         }
 
-    return Tables({first: one, between: (t.levels - 2, *one[1:]), last: one}, convert)
+    return tables
 
 
-def _separate_tables(config: MoMaskConfig) -> Tables:
+def _separate_tables(config: MoMaskConfig) -> Callable[[Section], State]:
     """The public code adds the product to itself before the bias (`output += output + bias`): doubled tables give the
     same bits. Its bias has a row more than levels that are predicted, the last."""
     t = config.tokenizer
     table = (t.levels - 1, t.codes + 1, t.code_width)
-    embedding, output, bias = "token_embed_weight", "output_proj_weight", "output_proj_bias"
 
-    def convert(public: State) -> dict[str, Tensor]:
-        return {"embedding": public[embedding], "output": 2 * public[output], "bias": public[bias][: t.levels - 1]}
+    def tables(section: Section) -> State:
+        return {
+            "embedding": section.take("token_embed_weight", table),
+            "output": 2 * section.take("output_proj_weight", table),
+            "bias": section.take("output_proj_bias", (t.levels, t.codes + 1))[: t.levels - 1],
+        }
 
-    return Tables({embedding: table, output: table, bias: (t.levels, t.codes + 1)}, convert)
+    return tables
 
 
 def _transformer_layers(config: TransformerConfig) -> dict[str, str]:
@@ -163,13 +162,14 @@ def _transformer_layers(config: TransformerConfig) -> dict[str, str]:
 
 def _attention_names(config: TransformerConfig) -> dict[str, str]:
     return {
-        f"seqTransEncoder.layers.{k}.self_attn.in_proj_{kind}": f"sequence.transformer.blocks.{k}.attention.qkv.{kind}"
+        f"sequence.transformer.blocks.{k}.attention.qkv.{kind}": f"seqTransEncoder.layers.{k}.self_attn.in_proj_{kind}"
         for k in range(config.layers)
         for kind in ("weight", "bias")
     }
 
 
 def _parameters(layers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield own and public names of weights and biases of layers, given by public names."""
     for theirs, ours in layers.items():
         for kind in ("weight", "bias"):
-            yield f"{theirs}.{kind}", f"{ours}.{kind}"
+            yield f"{ours}.{kind}", f"{theirs}.{kind}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import LengthLimits, ModelSpec, Setting, Variety
+from marey.registry import ImportKind, LengthLimits, ModelSpec, Setting, Variety
 
 SPEC = ModelSpec(
     name="momask",
@@ -34,4 +34,13 @@ The same prompt, seed, settings and bundle give the same motion.""",
     limits=LengthLimits(0.8, 15.68),  # 16 frames at HumanML3D's 20 a second; 196 at KIT-ML's 12.5
     tokenizer="marey.models.momask.tokenizer:build_tokenizer",
     random_bundle="marey.models.momask.bundle:random_bundle",
+    imports=(
+        ImportKind(
+            name="momask",
+            help="MoMask's public checkpoints: the folder checkpoints/t2m or checkpoints/kit.",
+            run="marey.models.momask.importing:import_momask",
+            licence="LicenseRef-MoMask-NC",
+            text_encoder=True,
+        ),
+    ),
 )
