@@ -55,7 +55,7 @@ def test_a_tensor_that_is_neither_read_nor_ignored_is_refused(tmp_path: Path) ->
     section = checkpoint.section("model")
     section.take("a")
     with pytest.raises(
-        InvalidFile, match=r"2 tensors that this import does not know: model\.extra\.b, other"
+        InvalidFile, match=r"holds tensors that this import does not know: model\.extra\.b, other"
     ) as caught:
         checkpoint.finish()
     assert caught.value.where == str(file)

@@ -247,7 +247,7 @@ class Checkpoint:
                 ignored[key] = reason
         if unknown:
             raise InvalidFile(
-                f"holds {len(unknown)} tensors that this import does not know: {_listed(unknown)}",
+                f"holds tensors that this import does not know: {_listed(unknown)}",
                 where=str(self.file),
                 hint="These are weights of another version or configuration, which would not be read whole.",
             )

@@ -42,35 +42,37 @@ class Download:
         self._accounts: dict[Path, Account] = {}
         self._checkpoints: dict[Path, Checkpoint] = {}
 
-    def find(self, *patterns: str, what: str) -> Path:
+    def find(self, *patterns: str, what: str, within: Path | None = None) -> Path:
         """Return the only file or folder of the first pattern that has one.
 
         Args:
             patterns: relative to the published folder, with `*` for names that depend on a configuration; `..` reaches
                 folders beside it.
             what: the part, for errors.
+            within: a folder that was found before, which patterns are relative to; None = the published folder.
 
         Raises:
             NotFound: no pattern has one; lists where it was looked for.
             InvalidInput: a pattern has several.
         """
+        base = within or self.root
         for pattern in patterns:
-            found = sorted(self._matches(pattern))
+            found = sorted(_matches(base, pattern))
             if len(found) > 1:
                 names = ", ".join(path.name for path in found[:5])
                 raise InvalidInput(
                     f"has several of {what}: {names}",
-                    where=str(self.root / pattern),
+                    where=str(base / pattern),
                     hint="Move those aside that are not to be imported.",
                 )
             if found:
                 return found[0]
         looked = " or ".join(patterns)
-        raise NotFound(f"{what} is missing: there is no {looked}", where=str(self.root), hint=AGAIN)
+        raise NotFound(f"{what} is missing: there is no {looked}", where=str(base), hint=AGAIN)
 
     def has(self, *patterns: str) -> bool:
         """Return True if a pattern has a file or folder."""
-        return any(True for pattern in patterns for _ in self._matches(pattern))
+        return any(True for pattern in patterns for _ in _matches(self.root, pattern))
 
     def checkpoint(self, file: Path) -> Checkpoint:
         """Open a checkpoint; `finish` refuses tensors of it that are neither taken nor ignored. See `Checkpoint`."""
@@ -126,14 +128,15 @@ class Download:
         checkpoints = (checkpoint.finish() for checkpoint in self._checkpoints.values())
         return (*checkpoints, *self._accounts.values())
 
-    def _matches(self, pattern: str) -> list[Path]:
-        if "*" in pattern:
-            return [*self.root.glob(pattern)]
-        path = self.root / pattern
-        return [path] if path.exists() else []
-
     def _shown(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix() if file.is_relative_to(self.folder) else file.name
+
+
+def _matches(base: Path, pattern: str) -> list[Path]:
+    if "*" in pattern:
+        return [*base.glob(pattern)]
+    path = base / pattern
+    return [path] if path.exists() else []
 
 
 def _tails(inside: Sequence[str]) -> list[str]:

@@ -13,6 +13,8 @@ from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile
 
 MAX_BYTES = 2**20
+MAX_SECTIONS = 10_000
+"""Sections that a search reads: anchors of YAML repeat sections without end."""
 HINT = "Is it the file that came with the weights? Download it again."
 INTEGER, DECIMAL = re.compile(r"[-+]?\d+"), re.compile(r"[-+]?\d+\.\d+")
 
@@ -97,6 +99,22 @@ class Fields:
         """
         if name in self.values and self.values[name] not in wanted:
             raise self._not(name, self.values[name], " or ".join(map(repr, wanted)))
+
+    def search(self, pattern: str) -> dict[str, Any]:
+        """Return the values at any depth whose name matches a regular expression as a whole, by path, such as
+        `model.n_heads`."""
+        found: dict[str, Any] = {}
+        left: list[tuple[str, Mapping[str, Any]]] = [("", self.values)]
+        for _ in range(MAX_SECTIONS):
+            if not left:
+                break
+            path, values = left.pop()
+            for name, value in values.items():
+                if isinstance(value, Mapping):
+                    left.append((f"{path}{name}.", value))
+                elif re.fullmatch(pattern, str(name)):
+                    found[f"{path}{name}"] = value
+        return found
 
     def _found(self, name: str, default: Any = None) -> Any:
         found = self.values.get(name, default)

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from marey.registry import ImportKind
 
+ALLENNLP_SRL = ImportKind(
+    name="allennlp-srl",
+    help="Role labeller of AllenNLP (Shi & Lin 2019): structured-prediction-srl-bert, packed or unpacked.",
+    run="marey.importing.allennlp:import_allennlp",
+    licence="Apache-2.0",
+    text_encoder=True,  # the folder of BERT, which the archive only names
+)
 CLIP = ImportKind(
     name="clip-vit-b32",
     help="Text encoder CLIP ViT-B/32: the folder of openai/clip-vit-base-patch32.",
