@@ -1,0 +1,61 @@
+"""Options of an export: its root, its rest pose and its place. Standard library only: the small client imports it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from marey.core.errors import InvalidInput
+
+BvhRoot = Literal["zero", "offset"]
+InPlace = Literal["travel", "heading"]
+Placement = Literal["origin", "keep"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootOptions:
+    """Root, rest pose and place of the motion in a file.
+
+    Attributes:
+        bvh_root: OFFSET of the root of a BVH file: `zero` is right for programs that add position channels to it
+            (three.js) and for those that replace it (Blender); `offset` writes the height of the pelvis in the T-pose,
+            for programs that replace it.
+        root_bone: add a joint `root` above the pelvis, which stands on the floor and has X, Z and the heading of the
+            motion.
+        in_place: remove the travel (X and Z), or travel and heading.
+        tpose_frame: put the T-pose before the motion, which then begins in frame 1.
+        placement: put the motion where its manifest says it was taken from (`keep`), or leave it at the origin.
+
+    Raises:
+        InvalidInput: two options contradict each other.
+    """
+
+    bvh_root: BvhRoot = "zero"
+    root_bone: bool = False
+    in_place: InPlace | None = None
+    tpose_frame: bool = False
+    placement: Placement = "origin"
+
+    def __post_init__(self) -> None:
+        if self.root_bone and self.bvh_root == "offset":
+            raise InvalidInput(
+                "a root bone stands on the floor, and the pelvis under it has position channels: both have OFFSET 0",
+                where="bvh_root and root_bone",
+                hint="Leave one of the two out.",
+            )
+        if self.in_place and self.placement == "keep":
+            raise InvalidInput(
+                "a motion in place has no travel that could begin elsewhere",
+                where="in_place and placement",
+                hint="Leave one of the two out.",
+            )
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Names of the options that differ from the defaults."""
+        known = fields(RootOptions)
+        return tuple(each.name for each in known if getattr(self, each.name) != each.default)
+
+
+PLAIN = RootOptions()
+"""The options of stored files."""
