@@ -19,7 +19,7 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.bvh_write import format_bvh
 
-    return format_bvh(clip, unit=coordinates.unit, up=coordinates.up).encode()
+    return format_bvh(clip, unit=coordinates.unit, up=coordinates.up, options=coordinates).encode()
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> BvhClip:
@@ -41,4 +41,5 @@ EXPORTER = Exporter(
     holds_prompt=False,
     encode=encode,
     decode=decode,
+    options=frozenset({"bvh_root", "root_bone", "in_place", "tpose_frame", "placement"}),
 )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from marey.motion.root_options import RootOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -16,15 +18,21 @@ Decoded = TypeVar("Decoded")
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
 _EXTENSION = re.compile(r"[a-z0-9]{1,9}")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
+_DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(RootOptions)}
 
 
 @dataclass(frozen=True)
-class Coordinates:
-    """Unit of length and upward axis of a file whose format does not state them, such as BVH; other formats ignore
-    them."""
+class Coordinates(RootOptions):
+    """Coordinates of a file: unit of length and upward axis where the format does not state them, such as BVH (others
+    ignore them), and the options of root, rest pose and place, which a format has by its `Exporter.options`."""
 
     unit: Unit = "cm"
     up: Up = "y"
+
+    @classmethod
+    def of(cls, root: RootOptions, unit: Unit = "cm", up: Up = "y") -> Coordinates:
+        """Return coordinates with these options of root, rest pose and place."""
+        return cls(unit, up, **{name: getattr(root, name) for name in root.chosen})
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,7 @@ class Exporter(Generic[Decoded]):
             `MotionClip` with the manifest.
         encode: write a clip, or a result of `decode`. Equal clips give equal bytes: files are stored under their
             sha256.
+        options: names of the `RootOptions` that `encode` heeds; the others of its coordinates have their defaults.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
     """
@@ -50,15 +59,24 @@ class Exporter(Generic[Decoded]):
     holds_prompt: bool
     encode: Callable[[MotionClip | Decoded, Coordinates], bytes]
     decode: Callable[[bytes, str, Coordinates], Decoded] | None = None
+    options: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Check the names.
 
         Raises:
-            ValueError: a name does not fit into routes and file names, or erasure could not rewrite the files.
+            ValueError: a name does not fit into routes and file names, erasure could not rewrite the files, or an
+                option is unknown.
         """
         for value, pattern in ((self.format, _FORMAT), (self.extension, _EXTENSION)):
             if not pattern.fullmatch(value):
                 raise ValueError(f"{value!r} does not match {pattern.pattern}")
         if self.holds_prompt and self.decode is None:
             raise ValueError(f"{self.format} holds prompts, so it needs `decode`: erasure rewrites its files")
+        if unknown := self.options - _DEFAULTS.keys():
+            raise ValueError(f"{self.format} has unknown options: {', '.join(sorted(unknown))}")
+
+    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates) -> bytes:
+        """Encode a clip with those of the coordinates that the format has."""
+        others = {name: value for name, value in _DEFAULTS.items() if name not in self.options}
+        return self.encode(clip, replace(coordinates, **others))

@@ -18,7 +18,7 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.glb_write import format_glb
 
-    return format_glb(clip)
+    return format_glb(clip, coordinates)
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> MotionClip:
@@ -39,4 +39,5 @@ EXPORTER = Exporter(
     holds_prompt=True,
     encode=encode,
     decode=decode,
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement"}),
 )

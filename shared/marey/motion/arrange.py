@@ -68,14 +68,14 @@ def arrange(clip: Posed, options: RootOptions = PLAIN) -> Arranged:
     if getattr(clip, "positions", None) is not None:
         raise InvalidInput("bones of this clip change their length, and files have one offset per joint")
     rotations, root = np.array(clip.rotations, np.float64), np.array(clip.root, np.float64)
-    heading = headings(rotations[:, 0])
+    heading = headings(rotations[:, 0]) if options.in_place or options.root_bone else IDENTITY[None]
     removed: dict[str, Any] = {}
     if options.in_place:
         removed = _travel(root, heading, clip.fps)
         root[:, [0, 2]] = root[:1, [0, 2]]
     if options.in_place == "heading":
         rotations[:, 0] = multiply(conjugate(heading), rotations[:, 0])
-        heading = np.broadcast_to(IDENTITY, heading.shape)
+        heading = np.tile(IDENTITY, (len(heading), 1))
     if options.placement == "keep":
         turn, shift = placement_of(clip)
         rotations[:, 0], heading = multiply(turn, rotations[:, 0]), multiply(turn, heading)

@@ -39,15 +39,17 @@ class RootOptions:
     def __post_init__(self) -> None:
         if self.root_bone and self.bvh_root == "offset":
             raise InvalidInput(
-                "a root bone stands on the floor, and the pelvis under it has position channels: both have OFFSET 0",
-                where="bvh_root and root_bone",
-                hint="Leave one of the two out.",
+                "with a root bone, root and pelvis have position channels and OFFSET 0: neither has the height",
+                where="bvh_root",
+                hint="Leave out bvh_root, or the root bone.",
+                argument="bvh_root",
             )
         if self.in_place and self.placement == "keep":
             raise InvalidInput(
-                "a motion in place has no travel that could begin elsewhere",
-                where="in_place and placement",
-                hint="Leave one of the two out.",
+                "a motion in place stays at the origin, so it cannot keep its placement",
+                where="placement",
+                hint="Leave out placement, or in-place.",
+                argument="placement",
             )
 
     @property

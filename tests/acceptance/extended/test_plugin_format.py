@@ -19,7 +19,7 @@ PROMPT = f"a person walks to {SECRET}"
 def test_it_is_written_fetched_converted_and_erased(served: Marey, tmp_path: Path) -> None:
     marey, folder = served, tmp_path / "clips"
     (line,) = marey("submit", PROMPT, "--bundle", TINY, "--seconds", 2, "--fetch", folder, "--json").ok().lines
-    assert sorted(line["files"]) == ["bvh", "npz", "poses"]
+    assert sorted(line["files"]) == ["bvh", "glb", "npz", "poses"]
     file = Path(line["files"]["poses"])
     assert file.suffix == ".pose"
     poses, npz = json.loads(file.read_bytes()), load_npz(line["files"]["npz"])

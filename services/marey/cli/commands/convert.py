@@ -43,11 +43,16 @@ def convert(
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
+    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
+    root_bone: options.RootBone = False,
+    in_place: options.InPlace = None,
+    tpose_frame: options.TPoseFrame = False,
+    placement: options.Placement = options.PlacementOption.ORIGIN,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Convert a motion between BVH, npz and installed formats, with another rate, unit or axis if wanted."""
+    """Convert a motion between BVH, glb, npz and installed formats, with another rate, unit, axis or root if wanted."""
     from marey.core.extras import needs_extra
 
     try:
@@ -60,6 +65,7 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
+        root=options.root_options(bvh_root, root_bone, in_place, tpose_frame, placement),
         source_unit=from_unit.value,
         source_up=from_up.value,
         overwrite=overwrite,
