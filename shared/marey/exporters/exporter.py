@@ -48,6 +48,8 @@ class Exporter(Generic[Decoded]):
             `MotionClip` with the manifest.
         encode: write a clip, or a result of `decode`. Equal clips give equal bytes: files are stored under their
             sha256.
+        stored: workers write it for every motion, and `marey generate` where no format is named; False = it is made on
+            request alone, by `generate`, `convert` and `fetch`, because it takes long or can be made at any time.
         options: names of the `RootOptions` that `encode` heeds; the others of its coordinates have their defaults.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
@@ -60,6 +62,7 @@ class Exporter(Generic[Decoded]):
     encode: Callable[[MotionClip | Decoded, Coordinates], bytes]
     decode: Callable[[bytes, str, Coordinates], Decoded] | None = None
     options: frozenset[str] = frozenset()
+    stored: bool = True
 
     def __post_init__(self) -> None:
         """Check the names.

@@ -248,7 +248,7 @@ def _one_model(items: Iterable[Item], default: str) -> str:
 
 
 def _exporters(formats: list[str] | None, root: RootOptions) -> list[Exporter[Any]]:
-    """Return the exporters of the formats, each once; by default all installed ones.
+    """Return the exporters of the formats, each once; by default all installed ones that are stored.
 
     Raises:
         InvalidInput: there is none for a format, or none of them has an option of the root.
@@ -261,7 +261,8 @@ def _exporters(formats: list[str] | None, root: RootOptions) -> list[Exporter[An
             raise InvalidInput(
                 f"{name!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
             )
-    kinds = [known[name] for name in dict.fromkeys(formats or known)]
+    stored = [name for name, exporter in known.items() if exporter.stored]
+    kinds = [known[name] for name in dict.fromkeys(formats or stored)]
     check_options(kinds, root)
     return kinds
 
