@@ -118,7 +118,9 @@ Extra = Annotated[
 Formats = Annotated[
     list[str] | None,
     typer.Option(
-        "--format", metavar="FORMAT", help="File format, such as bvh or npz; may be repeated. None given = all."
+        "--format",
+        metavar="FORMAT",
+        help="File format, such as bvh, glb or mp4; may be repeated. None given = all but films.",
     ),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; created if missing.")]

@@ -69,7 +69,7 @@ class Film:
     @cached_property
     def _colours(self) -> NDArray[np.float32]:
         parts = [self.theme.parts[limb.part] for limb in self._strip.body.limbs]
-        return np.array(parts, np.float32) / 255
+        return np.asarray(np.array(parts) / 255, np.float32)
 
     def picture(self, column: int) -> Image.Image:
         """Return a picture by its number."""

@@ -39,7 +39,9 @@ FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that
 
 def convert(
     source: Source,
-    target: Annotated[Path, typer.Argument(metavar="TARGET", help="A motion file, such as .bvh or .npz.")],
+    target: Annotated[
+        Path, typer.Argument(metavar="TARGET", help="A motion file or a film, such as .bvh, .glb or .mp4.")
+    ],
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
