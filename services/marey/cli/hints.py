@@ -10,18 +10,24 @@ from marey.core.errors import MareyError, TimedOut
 
 OPTIONS = {
     "bundle": "--bundle",
+    "bvh_root": "--bvh-root",
     "extra_columns": "--extra-columns",
     "file_format": "--input-format",
     "fps": "--fps",
+    "in_place": "--in-place",
     "licence": "--licence",
     "model": "--model",
     "name_template": "--name-template",
     "overwrite": "--overwrite",
+    "placement": "--placement",
+    "rest_pose": "--rest-pose",
+    "root_bone": "--root-bone",
     "seconds": "--seconds",
     "seed": "--seed",
     "settings": "--set",
     "tags": "--tag",
     "text_encoder": "--text-encoder",
+    "tpose_frame": "--tpose-frame",
     "variants": "--variants",
 }
 """The option of each argument that an error may name."""

@@ -12,6 +12,7 @@ import typer
 from marey.client.names import DEFAULT_TEMPLATE
 from marey.core.errors import InvalidInput
 from marey.items.item import MAX_BEST_OF, MAX_REDRAWS, read_setting
+from marey.motion.root_options import RootOptions
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:
@@ -58,6 +59,57 @@ class VarietyOption(StrEnum):
     HIGH = "high"
 
 
+class BvhRootOption(StrEnum):
+    """The OFFSET of a BVH file's root."""
+
+    ZERO = "zero"
+    OFFSET = "offset"
+
+
+class InPlaceOption(StrEnum):
+    """Parts of a motion's way that are removed."""
+
+    TRAVEL = "travel"
+    HEADING = "heading"
+
+
+class RestPoseOption(StrEnum):
+    """Rest poses of a rig."""
+
+    T = "t"
+    A = "a"
+
+
+class PlacementOption(StrEnum):
+    """Places of a motion in a file."""
+
+    ORIGIN = "origin"
+    KEEP = "keep"
+
+
+def root_options(
+    bvh_root: BvhRootOption,
+    root_bone: bool,
+    in_place: InPlaceOption | None,
+    tpose_frame: bool,
+    rest_pose: RestPoseOption,
+    placement: PlacementOption,
+) -> RootOptions:
+    """Return the options of root, rest pose and place of the files.
+
+    Raises:
+        InvalidInput: two contradict each other.
+    """
+    return RootOptions(
+        bvh_root=bvh_root.value,
+        root_bone=root_bone,
+        in_place=None if in_place is None else in_place.value,
+        tpose_frame=tpose_frame,
+        rest_pose=rest_pose.value,
+        placement=placement.value,
+    )
+
+
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
 PromptFile = Annotated[
     str | None,
@@ -75,7 +127,9 @@ Extra = Annotated[
 Formats = Annotated[
     list[str] | None,
     typer.Option(
-        "--format", metavar="FORMAT", help="File format, such as bvh or npz; may be repeated. None given = all."
+        "--format",
+        metavar="FORMAT",
+        help="File format, such as bvh, glb or mp4; may be repeated. None given = all but films.",
     ),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; created if missing.")]
@@ -136,4 +190,33 @@ Scope = Annotated[
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]
 BundleOrFolder = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]
+BvhRoot = Annotated[
+    BvhRootOption,
+    typer.Option(
+        "--bvh-root",
+        help="OFFSET of the root in BVH files: zero, or offset = the pelvis height, for programs in which position "
+        "channels replace it.",
+    ),
+]
+RootBone = Annotated[
+    bool,
+    typer.Option("--root-bone", help="Add a bone `root` on the floor with X, Z and heading; the pelvis has the rest."),
+]
+InPlace = Annotated[
+    InPlaceOption | None,
+    typer.Option(
+        "--in-place", help="Remove the travel (X and Z), or with `heading` the turning too; default: neither."
+    ),
+]
+TPoseFrame = Annotated[
+    bool, typer.Option("--tpose-frame", help="Put the T-pose in frame 0; the motion begins in frame 1.")
+]
+RestPose = Annotated[
+    RestPoseOption,
+    typer.Option("--rest-pose", help="Rest pose of BVH files: T-pose, or the A-pose of a rig whose A-pose is known."),
+]
+Placement = Annotated[
+    PlacementOption,
+    typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
+]
 TEMPLATE = DEFAULT_TEMPLATE

@@ -12,12 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from marey.client.making import SOURCE, Making, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
-from marey.exporters import extension_of
+from marey.exporters import check_options, exporters, extension_of
+from marey.motion.files import write_atomically
+from marey.motion.root_options import PLAIN, RootOptions
 
 PARALLEL = 8
 ATTEMPTS = 4
@@ -36,11 +39,13 @@ class Download:
     sha256: str
     size: int
     path: Path
+    making: Making | None = None
+    """How the file is made of what the server sends; None = it is that."""
 
     @property
     def format(self) -> str:
         """The format of the file, such as `npz`."""
-        return self.url.rpartition("/")[2]
+        return self.url.rpartition("/")[2] if self.making is None else self.making.exporter.format
 
 
 Planned = list[tuple[dict[str, Any], list[Download]]]
@@ -77,6 +82,7 @@ def fetch_job(
     review: str | None = None,
     prune: bool = False,
     overwrite: bool = False,
+    root: RootOptions = PLAIN,
     observer: FetchObserver | None = None,
 ) -> Planned:
     """Fetch the files that a job has so far, and write the manifest.
@@ -86,16 +92,22 @@ def fetch_job(
         review: fetch only motions with this verdict.
         prune: remove files that earlier manifests named for the job and this one does not.
         overwrite: replace files with other content.
+        root: root, rest pose and place of the motions: files of formats that have these options are made here of the
+            npz, as are formats that the server does not have and this process has.
 
     Returns:
         The items with their files.
 
     Raises:
-        Conflict: a file exists with other content, or a format was not made; nothing is fetched then.
+        Conflict: a file exists with other content, or a format can neither be fetched nor made; nothing is fetched
+            then, unless the file is one that was to be made.
         InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
     """
     observer = observer or FetchObserver()
-    planned = plan(transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000), folder, formats, template)
+    known = exporters()
+    check_options((known[name] for name in formats or known if name in known), root)
+    pages = transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000)
+    planned = plan(pages, folder, formats, template, root=root)
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
     make_folders(folder, (file.path for _, files in planned for file in files))
@@ -109,10 +121,9 @@ def fetch_job(
     observer.planned(len(wanted))
     try:
         download_all(transport, wanted, overwrite=overwrite, done=note)
-    except Conflict:
-        raise  # nothing was fetched
-    except BaseException:
-        _write_part(folder, job, planned, done, observer, overwrite=overwrite)
+    except BaseException as error:
+        if not isinstance(error, Conflict) or any(file.making for file in wanted):  # else nothing was fetched
+            _write_part(folder, job, planned, done, observer, overwrite=overwrite)
         raise
     left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
     if prune:
@@ -174,30 +185,37 @@ def make_folders(folder: Path, paths: Iterable[Path]) -> None:
 
 
 def plan(
-    items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
+    items: Iterable[dict[str, Any]],
+    folder: Path,
+    formats: Sequence[str] | None,
+    template: str = DEFAULT_TEMPLATE,
+    *,
+    root: RootOptions = PLAIN,
 ) -> Planned:
     """Plan the files of each item and their paths.
 
     Args:
         items: items of the API, in input order.
         formats: of files; None = all there are.
+        root: options of the files.
 
     Raises:
         InvalidInput: two motions would have one name, or a name is not a plain file name.
         InvalidFile: the server names a format that is not a plain word.
-        Conflict: a wanted format was not made.
+        Conflict: a wanted format was not made, and cannot be made here.
     """
     planned: Planned = []
     names = FileNames(template)
     for item in items:
         downloads: list[Download] = []
         motion = item["motion"]
-        for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
+        for file, making in _wanted(motion["files"], formats, root, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
-            name = names.of(item["id"], naming(item), extension_of(file["format"]))
+            wanted = file["format"] if making is None else making.exporter.format
+            name = names.of(item["id"], naming(item), extension_of(wanted))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
-            downloads.append(Download(url, file["sha256"], file["size"], folder / name))
+            downloads.append(Download(url, file["sha256"], file["size"], folder / name, making))
         planned.append((item, downloads))
     return planned
 
@@ -238,7 +256,7 @@ def download_all(
             missing.append(download)
 
     def fetch(download: Download) -> None:
-        done(_download(client, download))
+        done(_download(client, download, overwrite=overwrite))
 
     with ThreadPoolExecutor(PARALLEL) as pool:
         try:
@@ -249,34 +267,58 @@ def download_all(
             raise
 
 
-def _wanted(files: list[dict[str, Any]], formats: Sequence[str] | None, item: str) -> Iterator[dict[str, Any]]:
-    if formats is None:
-        yield from files
-        return
+def _wanted(
+    files: list[dict[str, Any]], formats: Sequence[str] | None, root: RootOptions, item: str
+) -> Iterator[tuple[dict[str, Any], Making | None]]:
+    """Yield the file to fetch for each format, with how the wanted one is made of it."""
     by_format = {file["format"]: file for file in files}
-    for name in formats:
-        if name not in by_format:
+    for name in by_format if formats is None else formats:
+        making = making_of(name, by_format, root)
+        if making is None and name not in by_format:
             raise Conflict(f"was not made as {name}", where=f"item {item}", hint=f"It has {', '.join(by_format)}.")
-        yield by_format[name]
+        yield by_format[name if making is None else SOURCE], making
 
 
 def _is_there(download: Download, overwrite: bool) -> bool:
+    if download.making is not None:  # only making it again tells
+        return False
     try:
         if download.path.stat().st_size == download.size and sha256_of(download.path) == download.sha256:
             return True
     except FileNotFoundError:
         return False
     if not overwrite:
-        raise Conflict(
-            "already exists and holds something else",
-            where=str(download.path),
-            hint="Choose another folder, or pass overwrite=True.",
-            argument="overwrite",
-        )
+        raise _conflict(download.path)
     return False
 
 
-def _download(client: Transport, download: Download) -> Download:
+def _conflict(path: Path) -> Conflict:
+    return Conflict(
+        "already exists and holds something else",
+        where=str(path),
+        hint="Choose another folder, or pass overwrite=True.",
+        argument="overwrite",
+    )
+
+
+def _finish(download: Download, part: Path, overwrite: bool) -> Download:
+    """Put a file that has arrived in its place, or what is made of it."""
+    path = download.path
+    if download.making is None:
+        part.replace(path)
+        return download
+    try:
+        content = download.making.make(part.read_bytes(), str(path))
+    finally:
+        part.unlink()
+    if not path.exists() or path.read_bytes() != content:
+        if path.exists() and not overwrite:
+            raise _conflict(path)
+        write_atomically(path, content)
+    return download
+
+
+def _download(client: Transport, download: Download, *, overwrite: bool) -> Download:
     part = download.path.with_name(download.path.name + ".part")
     for attempt in range(1, ATTEMPTS + 1):
         try:
@@ -288,8 +330,7 @@ def _download(client: Transport, download: Download) -> Download:
         except OSError as error:
             raise InvalidFile(f"cannot be written: {error.strerror}", where=str(part)) from error
         if sha256_of(part) == download.sha256:
-            part.replace(download.path)
-            return download
+            return _finish(download, part, overwrite)
         part.unlink()  # a remainder of another file, or damaged in transit: start again
     raise InvalidFile(
         "the data that arrived has another sha256 than the server says",

@@ -28,6 +28,7 @@ from marey.client.types.jobs import (
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
+from marey.motion.root_options import BvhRoot, InPlace, Placement, RootOptions
 from marey.vocabulary.scope import ScopePolicy
 
 Row = Item | Mapping[str, object] | str
@@ -381,6 +382,11 @@ class Jobs(Resource):
         review: Literal["kept", "rejected", "rerolled"] | None = None,
         prune: bool = False,
         overwrite: bool = False,
+        bvh_root: BvhRoot = "zero",
+        root_bone: bool = False,
+        in_place: InPlace | None = None,
+        tpose_frame: bool = False,
+        placement: Placement = "origin",
         on_progress: OnFetched | FetchObserver | None = None,
     ) -> Sequence[FetchedItem]:
         """Fetch the motions that a job has so far, eight files at a time, with a `manifest.csv`.
@@ -389,11 +395,14 @@ class Jobs(Resource):
 
         Args:
             folder: created if missing.
-            formats: such as bvh and npz; None = all.
+            formats: such as bvh and npz; None = all that the server has. Others that this process can write, and files
+                with the options of the root, are made of the npz (extra `motion`), at every fetch anew.
             name_template: of the paths, from `{index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}`.
             review: only motions with this review.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
+            bvh_root, root_bone, in_place, tpose_frame, placement: of the files whose formats have these options; see
+                `docs/reference/formats.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
 
@@ -401,9 +410,11 @@ class Jobs(Resource):
             The items in input order, also those without a motion.
 
         Raises:
-            Conflict: a file exists with other content, or a format was not made; nothing is fetched then.
+            Conflict: a file exists with other content, or a format was not made and cannot be made here; nothing is
+                fetched then, unless it is the content of a made file.
             InvalidFile: the data that arrived has another sha256, or cannot be written.
-            InvalidInput: the folder cannot be written, or two motions would have one name.
+            InvalidInput: the folder cannot be written, two motions would have one name, an option is of no format, or
+                two contradict each other.
             Unreachable: the connection breaks repeatedly; another fetch continues.
         """
         planned = fetch_job(
@@ -415,10 +426,13 @@ class Jobs(Resource):
             review=review,
             prune=prune,
             overwrite=overwrite,
+            root=RootOptions(
+                bvh_root=bvh_root, root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement
+            ),
             observer=_Counting(on_progress) if callable(on_progress) else on_progress,
         )
         return [
-            FetchedItem(item=JobItem.of(item), files={file.url.rpartition("/")[2]: file.path for file in files})
+            FetchedItem(item=JobItem.of(item), files={file.format: file.path for file in files})
             for item, files in planned
         ]
 

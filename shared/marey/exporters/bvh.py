@@ -23,7 +23,7 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
         from marey.motion.rest_pose import change_rest_pose
 
         clip = change_rest_pose(clip, coordinates.rest_pose)
-    return format_bvh(clip, unit=coordinates.unit, up=coordinates.up).encode()
+    return format_bvh(clip, unit=coordinates.unit, up=coordinates.up, options=coordinates).encode()
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> BvhClip:
@@ -52,4 +52,5 @@ EXPORTER = Exporter(
     holds_prompt=False,
     encode=encode,
     decode=decode,
+    options=frozenset({"bvh_root", "root_bone", "in_place", "tpose_frame", "rest_pose", "placement"}),
 )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from marey.motion.root_options import RootOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
-    from marey.motion.rest_pose import RestPose
     from marey.motion.units import Unit, Up
 
 Decoded = TypeVar("Decoded")
@@ -17,16 +18,21 @@ Decoded = TypeVar("Decoded")
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
 _EXTENSION = re.compile(r"[a-z0-9]{1,9}")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
+_DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(RootOptions)}
 
 
 @dataclass(frozen=True)
-class Coordinates:
-    """Unit of length, upward axis and rest pose of a file whose format leaves them open, such as BVH; other formats
-    ignore them."""
+class Coordinates(RootOptions):
+    """Coordinates of a file: unit of length and upward axis where the format does not state them, such as BVH (others
+    ignore them), and the options of root, rest pose and place, which a format has by its `Exporter.options`."""
 
     unit: Unit = "cm"
     up: Up = "y"
-    rest_pose: RestPose = "t"
+
+    @classmethod
+    def of(cls, root: RootOptions, unit: Unit = "cm", up: Up = "y") -> Coordinates:
+        """Return coordinates with these options of root, rest pose and place."""
+        return cls(unit, up, **{name: getattr(root, name) for name in root.chosen})
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,9 @@ class Exporter(Generic[Decoded]):
             `MotionClip` with the manifest.
         encode: write a clip, or a result of `decode`. Equal clips give equal bytes: files are stored under their
             sha256.
+        stored: workers write it for every motion, and `marey generate` where no format is named; False = it is made on
+            request alone, by `generate`, `convert` and `fetch`, because it takes long or can be made at any time.
+        options: names of the `RootOptions` that `encode` heeds; the others of its coordinates have their defaults.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
     """
@@ -52,15 +61,25 @@ class Exporter(Generic[Decoded]):
     holds_prompt: bool
     encode: Callable[[MotionClip | Decoded, Coordinates], bytes]
     decode: Callable[[bytes, str, Coordinates], Decoded] | None = None
+    options: frozenset[str] = frozenset()
+    stored: bool = True
 
     def __post_init__(self) -> None:
         """Check the names.
 
         Raises:
-            ValueError: a name does not fit into routes and file names, or erasure could not rewrite the files.
+            ValueError: a name does not fit into routes and file names, erasure could not rewrite the files, or an
+                option is unknown.
         """
         for value, pattern in ((self.format, _FORMAT), (self.extension, _EXTENSION)):
             if not pattern.fullmatch(value):
                 raise ValueError(f"{value!r} does not match {pattern.pattern}")
         if self.holds_prompt and self.decode is None:
             raise ValueError(f"{self.format} holds prompts, so it needs `decode`: erasure rewrites its files")
+        if unknown := self.options - _DEFAULTS.keys():
+            raise ValueError(f"{self.format} has unknown options: {', '.join(sorted(unknown))}")
+
+    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates) -> bytes:
+        """Encode a clip with those of the coordinates that the format has."""
+        others = {name: value for name, value in _DEFAULTS.items() if name not in self.options}
+        return self.encode(clip, replace(coordinates, **others))

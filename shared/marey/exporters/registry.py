@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from marey.core.errors import PluginError
+from marey.core.errors import InvalidInput, PluginError
 from marey.exporters.exporter import Exporter
+from marey.motion.root_options import RootOptions
 from marey.registry import PlugIns
 
 GROUP = "marey.exporters"
@@ -64,3 +65,21 @@ def extension_of(format: str) -> str:
     """Return the ending of a format's file names: the format itself where its exporter is not installed."""
     found = exporters().get(format)
     return format if found is None else found.extension
+
+
+def check_options(writers: Iterable[Exporter[Any]], options: RootOptions) -> None:
+    """Validate that each chosen option acts on the files of a format.
+
+    Raises:
+        InvalidInput: none of the formats has it.
+    """
+    writers = list(writers)
+    for name in options.chosen:
+        if not any(name in each.options for each in writers):
+            having = [each.format for each in exporters().values() if name in each.options]
+            raise InvalidInput(
+                f"{', '.join(each.format for each in writers)} files have no such option",
+                where=name,
+                hint=f"Formats that have {name}: {', '.join(having)}.",
+                argument=name,
+            )

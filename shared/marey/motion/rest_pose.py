@@ -7,7 +7,7 @@ way between its two directions.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,10 +15,10 @@ from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import forward_kinematics, global_rotations, local_rotations
+from marey.motion.root_options import RestPose
 from marey.motion.rotations import Array, between, length, multiply
 from marey.motion.skeleton import SNAPMOGEN, Skeleton, known_order
 
-RestPose = Literal["t", "a"]
 Clip = TypeVar("Clip", bound=MotionClip | BvhClip)
 
 

@@ -103,7 +103,7 @@ def shade(ends: Floats, radii: Floats, colours: Floats, size: tuple[int, int]) -
             np.copyto(owner[inner], number, where=hit)
     rows, columns = np.nonzero(depth > -np.inf)
     shown = owner[rows, columns]
-    points = np.stack([x[columns], y[rows, 0], depth[rows, columns]], axis=-1)
+    points = np.stack([x[columns], y[rows, 0], depth[rows, columns]]).T
     lit = _light(_normals(surfaces, shown, points), colours[np.array(limbs)[shown]])
     return Shown(rows + top, columns + left, lit)
 
@@ -199,11 +199,13 @@ def _window(ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[i
 
 def _normals(surfaces: list[_Ball | _Flank], shown: NDArray[np.int32], points: Floats) -> Floats:
     """Return unit normals at points (N, 3) on the surfaces `shown` (N)."""
-    slopes = np.array([surface.slope() for surface in surfaces], np.float32)[shown]
-    away, along = points - slopes[:, :3], slopes[:, 3:6]
-    place = np.einsum("nk,nk->n", away, along) - slopes[:, 7]
-    normals = away * slopes[:, 6:7] - along * place[:, None]
-    return normals / np.maximum(np.sqrt(np.einsum("nk,nk->n", normals, normals)), 1e-6)[:, None]
+    # Components in the first axis: contiguous, half the time.
+    slopes = np.array([surface.slope() for surface in surfaces], np.float32).T.take(shown, axis=1)  # (8, N)
+    away, along = points.T - slopes[:3], slopes[3:6]
+    place = away[0] * along[0] + away[1] * along[1] + away[2] * along[2] - slopes[7]
+    normals = away * slopes[6] - along * place
+    squared = normals[0] ** 2 + normals[1] ** 2 + normals[2] ** 2
+    return (normals / np.maximum(np.sqrt(squared), 1e-6)).T
 
 
 def _light(normals: Floats, colours: Floats) -> NDArray[np.uint8]:

@@ -24,10 +24,12 @@ from marey.viz.raster import Camera, shade
 
 SMOOTH = 2  # figures are drawn this much larger and shrunk
 GRID = 0.5  # metres
+BLUR, SPREAD = 2.5, 10
+"""Softness of a shadow, and how far it spreads by that: pixels."""
 LIGHT = np.array([-0.22, 1.0, 0.34])  # direction to the light, world axes
 SOFTENED = [int(v * 0.34) for v in range(256)]  # opacity of a shadow, from its mask
 
-Projection = Callable[[NDArray[np.floating]], NDArray[np.float32]]
+Projection = Callable[[NDArray[np.floating]], NDArray[np.floating]]
 Size = tuple[int, int]
 
 
@@ -37,8 +39,9 @@ class Strip:
 
     Attributes:
         cell: width and height of one pose, pixels.
-        limbs: (F, L, 2, 3) ends, metres; X and Z from the root of the same pose.
+        limbs: (F, L, 2, 3) ends, metres; X and Z from the centre of the same pose.
         root: (T, 3) the whole trail.
+        centre: (T, 3) the middle of each pose's patch of floor; Y is not used.
         scale: pixels a metre.
         below: pixels from the cell's bottom up to the floor point under the root.
     """
@@ -49,6 +52,7 @@ class Strip:
     body: BodyShape
     limbs: NDArray[np.float32]
     root: NDArray[np.float32]
+    centre: NDArray[np.float32]
     scale: float
     below: float
     camera: Camera
@@ -69,14 +73,22 @@ def chosen_frames(clip: MotionClip, columns: int, frames: Sequence[int] | None =
     return np.array(frames, np.intp)
 
 
-def make_strip(clip: MotionClip, frames: NDArray[np.intp], cell: Size) -> Strip:
-    """Choose a scale at which every pose of the clip fits its cell."""
+def make_strip(
+    clip: MotionClip, frames: NDArray[np.intp], cell: Size, centre: NDArray[np.float32] | None = None
+) -> Strip:
+    """Choose a scale at which every pose of the clip fits its cell.
+
+    Args:
+        centre: (T, 3) the middle of each pose's patch of floor; None = under the root.
+    """
     body, camera = dress_clip(clip), Camera()
+    root = np.asarray(clip.joints[:, 0], np.float32)
+    centre = root if centre is None else centre
     joints = np.asarray(clip.joints[frames], np.float64)
     axes = to_matrix(global_rotations(clip.skeleton, np.asarray(clip.rotations[frames], np.float64)))
     limbs = body.points(joints, axes)
-    limbs[..., 0] -= joints[:, :1, None, 0]
-    limbs[..., 2] -= joints[:, :1, None, 2]
+    limbs[..., 0] -= centre[frames, None, None, 0]
+    limbs[..., 2] -= centre[frames, None, None, 2]
     limbs[..., 1] += body.sole
     seen, reach = camera.project(limbs), body.radii()
     width, height = cell
@@ -87,7 +99,7 @@ def make_strip(clip: MotionClip, frames: NDArray[np.intp], cell: Size) -> Strip:
     lowest = max(float((seen[..., 1] + reach).max()), 0.02)
     highest = max(float((reach - seen[..., 1]).max()), 0.6 * body.height)
     scale = min((height - below - 8) / highest, (width / 2 - 3) / widest, below / lowest)
-    return Strip(clip, frames, cell, body, limbs, np.asarray(clip.joints[:, 0], np.float32), scale, below, camera)
+    return Strip(clip, frames, cell, body, limbs, root, centre, scale, below, camera)
 
 
 def draw_pose(strip: Strip, column: int, theme: Theme) -> Image.Image:
@@ -100,9 +112,7 @@ def draw_pose(strip: Strip, column: int, theme: Theme) -> Image.Image:
         return strip.camera.project(points) * scale + origin
 
     image = Image.new("RGB", size, theme.paper)
-    radius = (strip.cell[0] / 2 - 4) / strip.scale
-    rim = view_points(pixels(_circle(radius)))
-    _patch(image, strip, int(strip.frames[column]), radius, pixels, theme)
+    rim = draw_patch(image, strip, int(strip.frames[column]), pixels, theme)
     image.paste(theme.shadow, mask=_shadow(strip, column, size, rim, pixels))
     colours = np.array([theme.parts[limb.part] for limb in strip.body.limbs]) / 255
     figure = shade(pixels(strip.limbs[column]), strip.body.radii() * scale, colours.astype(np.float32), size)
@@ -111,24 +121,28 @@ def draw_pose(strip: Strip, column: int, theme: Theme) -> Image.Image:
     return Image.fromarray(canvas).reduce(SMOOTH)
 
 
-def _patch(image: Image.Image, strip: Strip, frame: int, radius: float, pixels: Projection, theme: Theme) -> None:
-    """Draw a round piece of floor under one pose: grid, trail, highlighted contacts."""
+def draw_patch(
+    image: Image.Image, strip: Strip, frame: int, pixels: Projection, theme: Theme
+) -> list[tuple[float, float]]:
+    """Draw a round piece of floor under one pose, with grid, trail and highlighted contacts; return its rim."""
     draw = ImageDraw.Draw(image)
-    root = strip.root[frame]
-    draw.polygon(view_points(pixels(_circle(radius))), fill=theme.floor)
+    radius = (strip.cell[0] / 2 - 4) / strip.scale
+    centre, rim = strip.centre[frame], view_points(pixels(_circle(radius)))
+    draw.polygon(rim, fill=theme.floor)
     for axis in (0, 2):
-        first = np.ceil((root[axis] - radius) / GRID) * GRID
-        for at in np.arange(first, root[axis] + radius, GRID) - root[axis]:
+        first = np.ceil((centre[axis] - radius) / GRID) * GRID
+        for at in np.arange(first, centre[axis] + radius, GRID) - centre[axis]:
             half = np.sqrt(max(radius**2 - at**2, 0))
             line = np.zeros((2, 3))
             line[:, axis], line[:, 2 - axis] = at, (-half, half)
             draw.line(view_points(pixels(line)), fill=theme.line, width=SMOOTH)
-    trail = (strip.root - root) * np.array([1, 0, 1])
+    trail = (strip.root - centre) * np.array([1, 0, 1])
     near = np.linalg.norm(trail, axis=-1) < radius
     points, later = view_points(pixels(trail)), blend(theme.floor, theme.muted, 0.35)
     for t in np.flatnonzero(near[:-1] & near[1:]):
         draw.line(points[t : t + 2], fill=theme.muted if t < frame else later, width=SMOOTH)
     _light_contacts(image, strip, frame, pixels, theme)
+    return rim
 
 
 def _light_contacts(image: Image.Image, strip: Strip, frame: int, pixels: Projection, theme: Theme) -> None:
@@ -136,7 +150,7 @@ def _light_contacts(image: Image.Image, strip: Strip, frame: int, pixels: Projec
     for foot, joint in enumerate(strip.clip.skeleton.feet):
         if not strip.clip.contacts[frame, foot]:
             continue
-        centre = (strip.clip.joints[frame, joint] - strip.root[frame]) * np.array([1, 0, 1])
+        centre = (strip.clip.joints[frame, joint] - strip.centre[frame]) * np.array([1, 0, 1])
         colour = theme.parts["left" if foot < 2 else "right"]
         draw.polygon(view_points(pixels(centre + _circle(0.085))), fill=blend(theme.floor, colour, 0.55))
 
@@ -144,21 +158,28 @@ def _light_contacts(image: Image.Image, strip: Strip, frame: int, pixels: Projec
 def _shadow(
     strip: Strip, column: int, size: tuple[int, int], rim: list[tuple[float, float]], pixels: Projection
 ) -> Image.Image:
-    """Draw the figure's soft shadow on the patch of floor."""
+    """Return the mask of the figure's soft shadow on the patch of floor."""
+    soft = soft_shadow(strip, column, lambda points: pixels(points) / SMOOTH)
+    patch = Image.new("L", size)
+    ImageDraw.Draw(patch).polygon(rim, fill=255)
+    return ImageChops.multiply(soft.resize(size, Image.Resampling.BILINEAR), patch)
+
+
+def soft_shadow(strip: Strip, column: int, pixels: Projection) -> Image.Image:
+    """Return the mask of the figure's soft shadow, of the cell's size."""
     limbs = strip.limbs[column]
-    fallen = limbs - LIGHT / LIGHT[1] * np.maximum(limbs[..., 1:2], 0)
-    ends = pixels(fallen) / SMOOTH
+    ends = pixels(limbs - LIGHT / LIGHT[1] * np.maximum(limbs[..., 1:2], 0))
     radii = strip.body.radii() * strip.scale
-    mask = Image.new("L", (size[0] // SMOOTH, size[1] // SMOOTH))
+    mask = Image.new("L", strip.cell)
     draw = ImageDraw.Draw(mask)
     for (a, b), reach in zip(ends[..., :2], radii, strict=True):
         draw.line([tuple(a), tuple(b)], fill=255, width=max(1, round(1.2 * float(reach.mean()))))
         for end, r in zip((a, b), reach, strict=True):
             draw.ellipse([end[0] - r, end[1] - 0.45 * r, end[0] + r, end[1] + 0.45 * r], fill=255)
-    soft = mask.filter(ImageFilter.GaussianBlur(2.5)).point(SOFTENED)
-    patch = Image.new("L", size)
-    ImageDraw.Draw(patch).polygon(rim, fill=255)
-    return ImageChops.multiply(soft.resize(size, Image.Resampling.BILINEAR), patch)
+    left, top, right, bottom = mask.getbbox() or (0, 0, 1, 1)
+    box = (max(left - SPREAD, 0), max(top - SPREAD, 0), right + SPREAD, bottom + SPREAD)
+    mask.paste(mask.crop(box).filter(ImageFilter.GaussianBlur(BLUR)).point(SOFTENED), box[:2])
+    return mask
 
 
 def draw_lanes(paper: Paper, strip: Strip, at: tuple[int, int], tall: int) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from marey.motion.clip import load_npz
+from tests.support.glb import Glb
 from tests.support.marey import TINY, Marey
 
 SECRET = "zanzibar"
@@ -19,7 +20,7 @@ PROMPT = f"a person walks to {SECRET}"
 def test_it_is_written_fetched_converted_and_erased(served: Marey, tmp_path: Path) -> None:
     marey, folder = served, tmp_path / "clips"
     (line,) = marey("submit", PROMPT, "--bundle", TINY, "--seconds", 2, "--fetch", folder, "--json").ok().lines
-    assert sorted(line["files"]) == ["bvh", "npz", "poses"]
+    assert sorted(line["files"]) == ["bvh", "glb", "npz", "poses"]
     file = Path(line["files"]["poses"])
     assert file.suffix == ".pose"
     poses, npz = json.loads(file.read_bytes()), load_npz(line["files"]["npz"])
@@ -47,7 +48,7 @@ def test_it_is_written_fetched_converted_and_erased(served: Marey, tmp_path: Pat
     after = tmp_path / "after"
     deadline = time.monotonic() + 60
     while (
-        len((fetched := marey("fetch", line["job"], "-o", after, "--json", "--overwrite").ok().lines[0])["files"]) < 3
+        len((fetched := marey("fetch", line["job"], "-o", after, "--json", "--overwrite").ok().lines[0])["files"]) < 4
     ):
         assert time.monotonic() < deadline, fetched
         time.sleep(0.5)
@@ -55,8 +56,11 @@ def test_it_is_written_fetched_converted_and_erased(served: Marey, tmp_path: Pat
     assert SECRET.encode() not in erased
     assert json.loads(erased)["manifest"]["erased"] is True
     assert json.loads(erased)["rotations"] == poses["rotations"]
+    of_glb = Glb.read(Path(fetched["files"]["glb"]).read_bytes())
+    assert of_glb.extras["manifest"]["erased"] is True
+    np.testing.assert_allclose(of_glb.joints(), npz.joints, atol=1e-3)
     stored_files = [path for path in (marey.home / "assets").rglob("*") if path.is_file()]
-    assert len(stored_files) >= 3
+    assert len(stored_files) >= 4
     for path in stored_files:
         data = path.read_bytes()
         assert not any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-32-le")), path
@@ -72,8 +76,10 @@ def test_it_is_generated_without_a_server(installed: Marey, tmp_path: Path) -> N
 
 def test_the_product_alone_does_not_know_it(installed: Marey, offline: Marey, tmp_path: Path) -> None:
     offline("generate", PROMPT, "--bundle", TINY, "--format", "poses", "-o", tmp_path).refused(
-        2, "'poses' is not a known motion format", "bvh, npz"
+        2, "'poses' is not a known motion format", "bvh, gif, glb, mp4, npz, webp"
     )
     (tmp_path / "a.pose").write_text("{}")
-    offline("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "Known: .bvh, .npz.")
+    offline("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(
+        2, "Known: .bvh, .gif, .glb, .mp4, .npz, .webp."
+    )
     installed("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "not a file of poses")

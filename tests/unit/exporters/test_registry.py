@@ -16,6 +16,7 @@ from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
+OWN = ["bvh", "gif", "glb", "mp4", "npz", "webp"]
 NAMES = count()
 
 
@@ -28,10 +29,21 @@ def plugin(folder: Path, exporter: str, entry: str = "toy") -> Path:
     return write_distribution(folder, module, {module: source}, f"[marey.exporters]\n{entry} = {module}:EXPORTER\n")
 
 
-def test_npz_and_bvh_are_installed() -> None:
+def test_formats_of_marey_are_installed() -> None:
     found = {each.format: (each.extension, each.media_type) for each in exporters().values()}
-    assert found == {"bvh": ("bvh", "text/plain; charset=utf-8"), "npz": ("npz", "application/x-npz")}
-    assert list(exporters()) == ["bvh", "npz"]
+    assert found == {
+        "bvh": ("bvh", "text/plain; charset=utf-8"),
+        "gif": ("gif", "image/gif"),
+        "glb": ("glb", "model/gltf-binary"),
+        "mp4": ("mp4", "video/mp4"),
+        "npz": ("npz", "application/x-npz"),
+        "webp": ("webp", "image/webp"),
+    }
+    assert list(exporters()) == OWN
+
+
+def test_films_are_made_on_request_alone() -> None:
+    assert [name for name, exporter in exporters().items() if exporter.stored] == ["bvh", "glb", "npz"]
 
 
 def test_the_registry_needs_the_standard_library_only() -> None:
@@ -40,27 +52,28 @@ def test_the_registry_needs_the_standard_library_only() -> None:
     assert done.stdout == "False\n"
 
 
-@pytest.mark.parametrize("name", ["bvh", "npz"])
+@pytest.mark.parametrize("name", ["bvh", "gif", "glb", "npz", "webp"])
 def test_a_format_says_whether_its_files_hold_the_prompt(name: str) -> None:
-    data = exporter_of(name).encode(walker(prompt=SECRET), Coordinates())
+    data = exporter_of(name).encode(walker(seconds=0.1, prompt=SECRET), Coordinates())
     found = any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-16-le", "utf-32-le"))
     assert found == exporter_of(name).holds_prompt
 
 
-def test_what_a_format_writes_it_writes_again_to_the_byte() -> None:
-    npz = exporter_of("npz")
-    data = npz.encode(walker(), Coordinates())
-    assert npz.decode is not None
-    assert npz.encode(npz.decode(data, "npz", Coordinates()), Coordinates()) == data
+@pytest.mark.parametrize("name", ["glb", "npz"])
+def test_what_a_format_writes_it_writes_again_to_the_byte(name: str) -> None:
+    exporter = exporter_of(name)
+    data = exporter.encode(walker(), Coordinates())
+    assert exporter.decode is not None
+    assert exporter.encode(exporter.decode(data, name, Coordinates()), Coordinates()) == data
 
 
 def test_a_plugin_is_one_module_and_one_line(tmp_path: Path) -> None:
     exporter = 'EXPORTER = Exporter("toy", "text/x-toy", "ty", False, encode)'
     with installed(plugin(tmp_path, exporter)):
-        assert list(exporters()) == ["bvh", "npz", "toy"]
+        assert list(exporters()) == sorted([*OWN, "toy"])
         assert exporter_of("toy").encode(walker(), Coordinates()) == b"toy"
         assert extension_of("toy") == "ty"
-    assert list(exporters()) == ["bvh", "npz"]
+    assert list(exporters()) == OWN
     assert extension_of("toy") == "toy"
     with pytest.raises(PluginError, match="'toy' is installed"):
         exporter_of("toy")

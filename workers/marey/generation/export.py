@@ -98,11 +98,12 @@ def _match(clip: MotionClip, request: Request) -> PromptMatch:
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:
-    """Encode a clip in every installed format, in memory."""
+    """Encode a clip in every installed format that is stored, in memory."""
     return Export(
         files=tuple(
             ExportedFile(each.format, each.encode(clip, Coordinates()), each.media_type)
             for each in exporters().values()
+            if each.stored
         ),
         frames=clip.frames,
         fps=clip.fps,

@@ -32,13 +32,6 @@ class Up(StrEnum):
     Z = "z"
 
 
-class RestPose(StrEnum):
-    """Rest poses of files that do not name theirs."""
-
-    T = "t"
-    A = "a"
-
-
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="A motion file, such as .bvh or .npz.")]
 FromUnit = Annotated[Unit, typer.Option("--from-unit", help="Unit of a BVH source.")]
 FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that points up.")]
@@ -46,21 +39,27 @@ FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that
 
 def convert(
     source: Source,
-    target: Annotated[Path, typer.Argument(metavar="TARGET", help="A motion file, such as .bvh or .npz.")],
+    target: Annotated[
+        Path, typer.Argument(metavar="TARGET", help="A motion file or a film, such as .bvh, .glb or .mp4.")
+    ],
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
-    rest_pose: Annotated[
-        RestPose, typer.Option("--rest-pose", help="Rest pose of a BVH result: T-pose, or A-pose where it is known.")
-    ] = RestPose.T,
+    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
+    root_bone: options.RootBone = False,
+    in_place: options.InPlace = None,
+    tpose_frame: options.TPoseFrame = False,
+    rest_pose: options.RestPose = options.RestPoseOption.T,
+    placement: options.Placement = options.PlacementOption.ORIGIN,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     from_rest_pose: Annotated[
-        RestPose, typer.Option("--from-rest-pose", help="Rest pose of a BVH source whose A-pose is known.")
-    ] = RestPose.T,
+        options.RestPoseOption,
+        typer.Option("--from-rest-pose", help="Rest pose of a BVH source whose A-pose is known."),
+    ] = options.RestPoseOption.T,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Convert a motion between BVH, npz and installed formats, with another rate, unit, axis or rest pose."""
+    """Convert a motion between BVH, glb, npz and installed formats, with another rate, unit, axis, root or pose."""
     from marey.core.extras import needs_extra
 
     try:
@@ -73,7 +72,7 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
-        rest_pose=rest_pose.value,
+        root=options.root_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement),
         source_unit=from_unit.value,
         source_up=from_up.value,
         source_rest_pose=from_rest_pose.value,

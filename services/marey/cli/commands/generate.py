@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
+    from marey.motion.root_options import RootOptions
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,12 @@ def generate(
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
     formats: options.Formats = None,
+    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
+    root_bone: options.RootBone = False,
+    in_place: options.InPlace = None,
+    tpose_frame: options.TPoseFrame = False,
+    rest_pose: options.RestPose = options.RestPoseOption.T,
+    placement: options.Placement = options.PlacementOption.ORIGIN,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
     overwrite: options.Overwrite = False,
@@ -69,7 +76,8 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
-    kinds = _exporters(formats)
+    root = options.root_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement)
+    kinds = _exporters(formats, root)
     defaults = row_defaults(
         sampling,
         model=model,
@@ -99,7 +107,7 @@ def generate(
         task = bar.add_task("generating", total=len(planned))
         made = studio.make([p.wanted for p in planned])
         for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
-            line = _write(plan, clip, elapsed, chosen, overwrite=overwrite)
+            line = _write(plan, clip, elapsed, chosen, root, overwrite=overwrite)
             bar.advance(task)
             _report_rewrite(clip)
             _report_quality(line)
@@ -239,13 +247,13 @@ def _one_model(items: Iterable[Item], default: str) -> str:
     return models[0]
 
 
-def _exporters(formats: list[str] | None) -> list[Exporter[Any]]:
-    """Return the exporters of the formats, each once; by default all installed ones.
+def _exporters(formats: list[str] | None, root: RootOptions) -> list[Exporter[Any]]:
+    """Return the exporters of the formats, each once; by default all installed ones that are stored.
 
     Raises:
-        InvalidInput: there is none for a format.
+        InvalidInput: there is none for a format, or none of them has an option of the root.
     """
-    from marey.exporters import exporters
+    from marey.exporters import check_options, exporters
 
     known = exporters()
     for name in formats or ():
@@ -253,7 +261,10 @@ def _exporters(formats: list[str] | None) -> list[Exporter[Any]]:
             raise InvalidInput(
                 f"{name!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
             )
-    return [known[name] for name in dict.fromkeys(formats or known)]
+    stored = [name for name, exporter in known.items() if exporter.stored]
+    kinds = [known[name] for name in dict.fromkeys(formats or stored)]
+    check_options(kinds, root)
+    return kinds
 
 
 def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[Exporter[Any]]) -> list[Planned]:
@@ -290,12 +301,14 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
     return [plan for index, item in enumerate(items) for plan in of(index, item)]
 
 
-def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, overwrite: bool) -> dict[str, Any]:
+def _write(
+    plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, root: RootOptions, *, overwrite: bool
+) -> dict[str, Any]:
     from marey.exporters import Coordinates, exporters
     from marey.motion.files import write_atomically
 
     paths = plan.paths
-    contents = {kind: exporters()[kind].encode(clip, Coordinates()) for kind in paths}
+    contents = {kind: exporters()[kind].write(clip, Coordinates.of(root)) for kind in paths}
     changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
     for kind in changed:
         if paths[kind].exists() and not overwrite:

@@ -115,7 +115,7 @@ class LiveBVH:
         else:
             angles = continuous_euler(np.concatenate([self._last[2][None], angles]))[1:]
         places = before[1] + steps[:, None] * (place - before[1])
-        self._write(self._layout.rows(places, angles))
+        self._write(self._layout.rows(places[:, None], angles))
         self._last = turns, place, angles[-1]
         self.frames += missing + 1
         self.filled += missing

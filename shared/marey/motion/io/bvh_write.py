@@ -4,50 +4,63 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.motion.arrange import Posed, arrange
 from marey.motion.files import write_atomically
+from marey.motion.root_options import PLAIN, BvhRoot, InPlace, Placement, RootOptions
 from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
 from marey.motion.skeleton import Skeleton
 from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 
 
-class Posed(Protocol):
-    """Input of `write_bvh`: a BvhClip or a MotionClip."""
-
-    @property
-    def skeleton(self) -> Skeleton: ...
-    @property
-    def rotations(self) -> NDArray[np.floating[Any]]: ...
-    @property
-    def root(self) -> NDArray[np.floating[Any]]: ...
-    @property
-    def fps(self) -> float: ...
-
-
-def write_bvh(path: Path | str, clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> None:
+def write_bvh(
+    path: Path | str,
+    clip: Posed,
+    *,
+    unit: Unit = "cm",
+    up: Up = "y",
+    bvh_root: BvhRoot = "zero",
+    root_bone: bool = False,
+    in_place: InPlace | None = None,
+    tpose_frame: bool = False,
+    placement: Placement = "origin",
+) -> None:
     """Write a clip atomically: OFFSETs are the T-pose, joint names the skeleton's, no comments.
 
     The root's OFFSET is zero, because programs differ in whether position channels replace it or are added to it; for
-    the same reason only the root has position channels, and bones that change length are refused.
+    the same reason only the root has position channels, with the pelvis under a root bone, and bones that change length
+    are refused.
+
+    Args:
+        path: the file.
+        clip: a MotionClip or a BvhClip.
+        unit, up: of the file's numbers.
+        bvh_root, root_bone, in_place, tpose_frame, placement: see `RootOptions`.
 
     Raises:
-        InvalidInput: joints of the clip change their distance, or it holds numbers that are not finite.
+        InvalidInput: joints of the clip change their distance, it holds numbers that are not finite, or two options
+            contradict each other.
     """
-    write_atomically(Path(path), format_bvh(clip, unit=unit, up=up).encode())
+    options = RootOptions(
+        bvh_root=bvh_root, root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement
+    )
+    write_atomically(Path(path), format_bvh(clip, unit=unit, up=up, options=options).encode())
 
 
-def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
+def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y", options: RootOptions = PLAIN) -> str:
     """Return the text of the BVH file; see `write_bvh`."""
-    if getattr(clip, "positions", None) is not None:
-        raise InvalidInput("bones of this clip change their length, and BVH has one OFFSET per joint")
-    layout = Layout(clip.skeleton, ends=getattr(clip, "ends", None), unit=unit, up=up)
-    rows = layout.rows(clip.root, continuous_euler(layout.angles(clip.rotations)))
-    return "\n".join([layout.header(str(len(rows)), clip.fps), *rows]) + "\n"
+    posed = arrange(clip, options)
+    moving = posed.positions.shape[1]
+    layout = Layout(
+        posed.skeleton, ends=posed.ends, unit=unit, up=up, moving=moving, root_offset=options.bvh_root == "offset"
+    )
+    rows = layout.rows(posed.positions, continuous_euler(layout.angles(posed.rotations)))
+    return "\n".join([layout.header(str(len(rows)), posed.fps), *rows]) + "\n"
 
 
 class Layout:
@@ -60,13 +73,27 @@ class Layout:
         ends: (J, 3) End Site offsets in metres; NaN or None = a short bone in the direction of the last one.
         unit: unit of the file's lengths.
         up: the axis of the file that points up.
+        moving: number of joints, from the root on, that have position channels: 2 with a root bone.
+        root_offset: the root's OFFSET is its place in the rest pose; otherwise the OFFSETs of `moving` joints are zero.
     """
 
-    def __init__(self, skeleton: Skeleton, *, ends: Array | None = None, unit: Unit = "cm", up: Up = "y") -> None:
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        *,
+        ends: Array | None = None,
+        unit: Unit = "cm",
+        up: Up = "y",
+        moving: int = 1,
+        root_offset: bool = False,
+    ) -> None:
         self.skeleton = skeleton
         self.up = up
+        self._moving = moving
         self._scale = 1 / METRES[unit]
         self._offsets = self._turned(skeleton.offsets * self._scale)
+        if not root_offset:
+            self._offsets[:moving] = 0
         self._tips = self._turned(_tips(skeleton, ends) * self._scale)
         self._order: list[int] = []
         self._hierarchy = ["HIERARCHY"]
@@ -84,18 +111,20 @@ class Layout:
             turns = multiply(multiply(conjugate(Z_TO_Y), turns), Z_TO_Y)
         return to_euler(turns, "ZYX")
 
-    def rows(self, root: NDArray[np.floating[Any]], angles: Array) -> list[str]:
+    def rows(self, positions: NDArray[np.floating[Any]], angles: Array) -> list[str]:
         """Format the lines of numbers, without their ends.
 
         Args:
-            root: (T, 3) metres, Y up.
+            positions: (T, moving, 3) metres, Y up, in the axes of the parents.
             angles: (T, J, 3) degrees, in the skeleton's order.
 
         Raises:
             InvalidInput: numbers that are not finite.
         """
-        place = self._turned(np.asarray(root, np.float64) * self._scale)
-        values = np.concatenate([place, angles[:, self._order].reshape(len(place), -1)], axis=1)
+        places = self._turned(np.asarray(positions, np.float64) * self._scale)
+        turns = angles[:, self._order]
+        columns = [column for joint in range(self._moving) for column in (places[:, joint], turns[:, joint])]
+        values = np.concatenate([*columns, turns[:, self._moving :].reshape(len(places), -1)], axis=1)
         if not np.isfinite(values).all():
             raise InvalidInput("the clip holds NaN or infinite numbers", where=self.skeleton.name)
         values = np.round(values, 6) + 0.0  # no -0
@@ -109,12 +138,12 @@ class Layout:
         self._order.append(j)
         children, pad = self.skeleton.children[j], "\t" * depth
         channels = "3 Zrotation Yrotation Xrotation"
-        if not j:
+        if j < self._moving:
             channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
         self._hierarchy += [
             f"{pad}{'JOINT' if j else 'ROOT'} {_word(self.skeleton.joint_names[j])}",
             f"{pad}{{",
-            f"{pad}\tOFFSET {_vector(self._offsets[j] if j else np.zeros(3))}",
+            f"{pad}\tOFFSET {_vector(self._offsets[j])}",
             f"{pad}\tCHANNELS {channels}",
         ]
         for child in children:

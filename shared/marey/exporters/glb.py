@@ -1,0 +1,43 @@
+"""glb (glTF 2.0, binary): skeleton, skin, motion and manifest, prompt included."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from marey.exporters.exporter import Coordinates, Exporter
+
+if TYPE_CHECKING:
+    from marey.motion.clip import MotionClip
+
+
+def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
+    """Write a glb: always in metres, Y up.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.glb_write.write_glb`.
+    """
+    from marey.motion.io.glb_write import format_glb
+
+    return format_glb(clip, coordinates)
+
+
+def decode(data: bytes, where: str, coordinates: Coordinates) -> MotionClip:
+    """Read a glb that Marey wrote; its features are not in it.
+
+    Raises:
+        InvalidFile: see `marey.motion.io.glb_read.read_glb`.
+    """
+    from marey.motion.io.glb_read import parse_glb
+
+    return parse_glb(data, where)
+
+
+EXPORTER = Exporter(
+    format="glb",
+    media_type="model/gltf-binary",
+    extension="glb",
+    holds_prompt=True,
+    encode=encode,
+    decode=decode,
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement"}),
+)

@@ -1,0 +1,73 @@
+"""Options of an export: its root, its rest pose and its place. Standard library only: the small client imports it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from marey.core.errors import InvalidInput
+
+BvhRoot = Literal["zero", "offset"]
+InPlace = Literal["travel", "heading"]
+Placement = Literal["origin", "keep"]
+RestPose = Literal["t", "a"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootOptions:
+    """Root, rest pose and place of the motion in a file.
+
+    Attributes:
+        bvh_root: OFFSET of the root of a BVH file: `zero` is right for programs that add position channels to it
+            (three.js) and for those that replace it (Blender); `offset` writes the height of the pelvis in the T-pose,
+            for programs that replace it.
+        root_bone: add a joint `root` above the pelvis, which stands on the floor and has X, Z and the heading of the
+            motion.
+        in_place: remove the travel (X and Z), or travel and heading.
+        tpose_frame: put the T-pose before the motion, which then begins in frame 1.
+        rest_pose: T-pose, or the A-pose of a rig whose A-pose is known.
+        placement: put the motion where its manifest says it was taken from (`keep`), or leave it at the origin.
+
+    Raises:
+        InvalidInput: two options contradict each other.
+    """
+
+    bvh_root: BvhRoot = "zero"
+    root_bone: bool = False
+    in_place: InPlace | None = None
+    tpose_frame: bool = False
+    rest_pose: RestPose = "t"
+    placement: Placement = "origin"
+
+    def __post_init__(self) -> None:
+        if self.root_bone and self.bvh_root == "offset":
+            raise InvalidInput(
+                "with a root bone, root and pelvis have position channels and OFFSET 0: neither has the height",
+                where="bvh_root",
+                hint="Leave out bvh_root, or the root bone.",
+                argument="bvh_root",
+            )
+        if self.tpose_frame and self.rest_pose == "a":
+            raise InvalidInput(
+                "frame 0 cannot be a T-pose in a file whose rest pose is an A-pose",
+                where="tpose_frame",
+                hint="Leave out tpose_frame, or rest_pose.",
+                argument="tpose_frame",
+            )
+        if self.in_place and self.placement == "keep":
+            raise InvalidInput(
+                "a motion in place stays at the origin, so it cannot keep its placement",
+                where="placement",
+                hint="Leave out placement, or in-place.",
+                argument="placement",
+            )
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Names of the options that differ from the defaults."""
+        known = fields(RootOptions)
+        return tuple(each.name for each in known if getattr(self, each.name) != each.default)
+
+
+PLAIN = RootOptions()
+"""The options of stored files."""
