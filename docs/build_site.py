@@ -1,7 +1,8 @@
 """Build the documentation site: `python docs/build_site.py [OUT]` (default: out). The pages are in OUT/site.
 
-The pages of docs/, the model cards and the project files are copied to OUT/pages, the reference of commands and of
-HTTP routes is generated there, and Zensical builds the site strictly, without a network (docs/decisions/0016).
+The pages of docs/, the model cards and the project files are copied to OUT/pages, the reference of commands, of
+configurations and of HTTP routes is generated there, and Zensical builds the site strictly, without a network
+(docs/decisions/0016).
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ def main(arguments: list[str]) -> int:
             shutil.copyfile(source, target)
     reference = json.loads((DOCS / "openapi.json").read_text(encoding="utf-8"))
     (pages / "reference" / "cli.md").write_text(command_page(), encoding="utf-8")
+    (pages / "reference" / "configurations.md").write_text(configuration_page(), encoding="utf-8")
     (pages / "reference" / "http-api.md").write_text(route_page(reference), encoding="utf-8")
     return zensical(out)
 
@@ -114,6 +116,41 @@ def _command(command: Any, name: str, parent: Any) -> Iterator[str]:
 def _parameter(parameter: Any, context: Any) -> str:
     name, text = parameter.get_help_record(context) or (parameter.make_metavar(context), "")
     return f"| {_code(name)} | {_cell(text)} |"
+
+
+# --- configurations ---
+
+
+def configuration_page() -> str:
+    """Return the reference of every field that a configuration file of a training may set."""
+    from marey.registry import trainings
+    from marey.training.config_file import PRESET
+
+    about = (
+        "Fields of the files that `marey train … --config FILE.toml` reads. A file begins with a line such as "
+        f'`{PRESET} = "starter"`, and sets what differs, by table: `train_masked.batch` is `batch` under '
+        "`[train_masked]`. `marey train MODEL config` prints a whole file."
+    )
+    return "\n".join(["# Configurations", "", about, *(_configuration(*each) for each in trainings().items())])
+
+
+def _configuration(name: str, training: Any) -> str:
+    from marey.registry import resolve
+    from marey.training.config_file import list_fields
+
+    named = resolve(training.config)
+    published = {field.path: field.value for field in list_fields(named("paper"))}
+    rows = [
+        f"| `{field.path}` | {_value(field.value)} | {_value(published[field.path])} | {_cell(field.takes)} "
+        f"| {_cell(field.about)} |"
+        for field in list_fields(named("starter"))
+    ]
+    head = "| field | `starter` | `paper` | takes | meaning |\n|---|---|---|---|---|"
+    return "\n".join([f"\n## {name}\n", head, *rows, ""])
+
+
+def _value(value: Any) -> str:
+    return _code(str(list(value) if isinstance(value, tuple) else value))
 
 
 # --- routes ---

@@ -1,14 +1,46 @@
-"""Conversion of model configurations to and from plain JSON values, for manifests and checkpoints."""
+"""Configurations of models: plain JSON values for manifests and checkpoints, and the ranges of their numbers."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
-from typing import Any, Self, TypeVar, cast, get_type_hints
+from typing import Annotated, Any, Self, TypeVar, cast, get_type_hints
 
 from marey.core.errors import InvalidInput
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Between:
+    """Range of a number in a configuration, both ends included; checked where a user writes it, not in bundles."""
+
+    low: float
+    high: float = math.inf
+    above: bool = False
+    """`low` itself is excluded."""
+
+    def contains(self, value: float) -> bool:
+        """Return True if the number is finite and in the range."""
+        return math.isfinite(value) and (value > self.low if self.above else value >= self.low) and value <= self.high
+
+    def __str__(self) -> str:
+        """Return the range for messages and documents: `0 to 1`, `at least 1`, `above 0, at most 1`."""
+        if self.high == math.inf:
+            return f"{'above' if self.above else 'at least'} {self.low:g}"
+        return f"above {self.low:g}, at most {self.high:g}" if self.above else f"{self.low:g} to {self.high:g}"
+
+
+Count = Annotated[int, Between(1)]
+Whole = Annotated[int, Between(0)]
+Weight = Annotated[float, Between(0)]
+Positive = Annotated[float, Between(0, above=True)]
+Share = Annotated[float, Between(0, 1)]
+Part = Annotated[float, Between(0, 1, above=True)]
+"""A share that is not 0."""
+Momentum = Annotated[float, Between(0, 0.99999)]
+"""Share of the old value in a moving average; at 1 nothing would move."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +59,13 @@ class ModelConfig:
             InvalidInput: an unknown field.
         """
         return build_config(cls, values)
+
+    def check(self) -> None:
+        """Check fields against each other where each alone is in its range; configuration files are checked by it.
+
+        Raises:
+            InvalidInput: they contradict each other; `where` is the field to change.
+        """
 
 
 def named(configs: Mapping[str, T], name: str) -> T:

@@ -326,6 +326,8 @@ def test_paper_sizes_are_the_published_ones() -> None:
     i = PAPER.inference
     assert (i.steps, i.motion_steps, i.action_steps, i.guidance, i.top_k, i.residual_guidance) == (10, 2, 5, 4, 0.1, 5)
     assert PAPER.max_tokens == 49
+    assert t.commitment == 0.02
+    assert PAPER.condition.text_width == 512
 
 
 def test_the_starter_bundle_fits_in_16_megabytes() -> None:

@@ -15,6 +15,8 @@ from types import ModuleType
 import pytest
 import yaml
 
+from marey.registry import resolve, trainings
+from marey.training.config_file import list_fields
 from tests.support.pages import ROOT
 
 LOADED = {"src", "srcset", "data", "poster"}
@@ -107,6 +109,15 @@ def test_the_reference_has_every_command_and_route(out: Path) -> None:
     assert "\n### POST /v1/jobs\n" in routes
     assert "\n### NewJobBody\n" in routes
     assert "`validate_only`: nothing was written" in routes
+
+
+def test_the_reference_has_every_field_of_every_configuration(out: Path) -> None:
+    page = (out / "pages" / "reference" / "configurations.md").read_text(encoding="utf-8")
+    for name, training in trainings().items():
+        section = page.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
+        rows = re.findall(r"^\| `([\w.]+)` \| `.+` \| `.+` \| .+ \| (.*) \|$", section, re.MULTILINE)
+        assert [row[0] for row in rows] == [field.path for field in list_fields(resolve(training.config)("paper"))]
+        assert sum(not about for _, about in rows) < len(rows) / 4, "nearly all say what they mean"
 
 
 def test_a_broken_anchor_fails_the_build(out: Path, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from marey.core.configs import ModelConfig
+from marey.core.configs import Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole
 from marey.core.errors import InvalidInput
 
 C = TypeVar("C", bound=ModelConfig)
@@ -15,16 +15,17 @@ C = TypeVar("C", bound=ModelConfig)
 class StageConfig:
     """Optimisation of one training stage."""
 
-    batch: int
-    learning_rate: float = 2e-4
-    warmup_steps: int = 2000
-    warmup_share: float = 0.05  # warm-up = the smaller of the two
+    batch: Count  # samples a step
+    learning_rate: Part = 2e-4  # of AdamW
+    warmup_steps: Count = 2000
+    warmup_share: Part = 0.05  # of the budget; warm-up = the smaller of the two
     decay: Literal["constant", "cosine"] = "constant"
-    final: float = 0.02  # end of the cosine, as a share of the learning rate
-    weight_decay: float = 1e-5
-    betas: tuple[float, float] = (0.9, 0.99)
-    clip: float = 1.0
-    ema: float = 0.999  # of the weights that are validated and shipped
+    final: Share = 0.02  # end of the cosine, as a share of the learning rate
+    weight_decay: Weight = 1e-5  # of matrices; biases and norms have none
+    betas: tuple[Momentum, Momentum] = (0.9, 0.99)  # of AdamW
+    clip: Positive = 1.0  # largest norm of the gradient
+    ema: Momentum = 0.999  # of the weights that are validated and shipped; 0 = the last weights
+    epochs: Whole = 0  # budget where neither steps nor minutes are given; an epoch has as many samples as clips
 
 
 def with_learning_rate(config: C, stage: str, rate: float | None) -> C:

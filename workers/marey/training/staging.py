@@ -18,10 +18,11 @@ from torch import nn
 
 from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix
-from marey.data.prepared import read_manifest
+from marey.data.prepared import PreparedData, read_manifest
 from marey.nn import distributed
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, TrainingStage, train
+from marey.training.optimisation import StageConfig
 from marey.training.parts import TrainedPart, load_part, load_sources, save_part
 
 
@@ -57,6 +58,18 @@ class TrainOptions(Generic[C]):
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet
         )
+
+
+def choose_budget(config: object, stage: str, prepared: Path, steps: int | None, minutes: float | None) -> Budget:
+    """Return the budget of a stage: steps and minutes as given; where neither is, the epochs of its configuration.
+
+    Raises:
+        InvalidInput: there is none, or it is not positive.
+    """
+    own: StageConfig | None = getattr(config, f"train_{stage}", None)
+    if steps is None and minutes is None and own is not None and own.epochs:
+        return Budget.of_epochs(own.epochs, len(PreparedData.open(prepared).split("train")), own.batch)
+    return Budget(steps, minutes)
 
 
 @dataclass(frozen=True)

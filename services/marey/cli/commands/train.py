@@ -40,7 +40,13 @@ app = typer.Typer(cls=TrainGroup, help="Train a model, stage by stage, then writ
 
 Data = Annotated[Path, typer.Argument(metavar="DATA", help="A prepared folder, with its texts.")]
 Run = Annotated[Path, typer.Option("--run", help="Folder of all stages of one bundle.")]
-Config = Annotated[str, typer.Option("--config", help="starter, paper or tiny.")]
+Config = Annotated[
+    str,
+    typer.Option(
+        "--config",
+        help="starter, paper or tiny, or a .toml file that changes one; `config` prints it with every field.",
+    ),
+]
 Steps = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
 Minutes = Annotated[
     float | None, typer.Option("--max-minutes", help="Minutes; schedules follow the budget that ends first.")
@@ -58,6 +64,7 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="The bundle's folde
 Card = Annotated[Path | None, typer.Option("--card", help="A model card for the bundle; default: a generated one.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing bundle.")]
 Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
+CONFIG = "Print a configuration as a file: every field with its range and meaning, to change and give to `--config`."
 UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
 
 
@@ -67,6 +74,7 @@ def _group_of(name: str, training: Training) -> typer.Typer:
     for stage in training.stages:
         group.command(stage.name, help=stage.help)(_with_choices(_stage_command(training, stage.name), training))
     group.command("bundle", help=training.bundle_help)(_with_choices(_bundle_command(training), training))
+    group.command("config", help=CONFIG)(_config_command(training))
     if training.unpack is not None:
 
         def unpack(bundle: Packed, run: Run) -> None:
@@ -126,6 +134,15 @@ def _bundle_command(training: Training) -> Callable[..., None]:
             training, data, run, output, config=config, card=card, overwrite=overwrite, choices=_given(choices)
         )
         console.result(made)
+
+    return command
+
+
+def _config_command(training: Training) -> Callable[..., None]:
+    def command(config: Config = "starter") -> None:
+        from marey.cli.roles.training import show_config
+
+        console.result(show_config(training, config).rstrip("\n"))
 
     return command
 

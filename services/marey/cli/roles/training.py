@@ -31,15 +31,26 @@ def train_stage(
         options: of `marey.training.staging.TrainOptions`.
     """
     try:
-        from marey.training.budget import Budget
+        from marey.training.config_file import open_config
         from marey.training.optimisation import with_learning_rate
-        from marey.training.staging import TrainOptions
+        from marey.training.staging import TrainOptions, choose_budget
 
         named_config, train = resolve(training.config), resolve(training.train)
     except ImportError as error:
         raise needs_extra("train", error) from error
-    chosen = with_learning_rate(named_config(config, **(choices or {})), name, rate)
-    return train(name, TrainOptions(data, run, chosen, Budget(steps, minutes), **options))
+    chosen = with_learning_rate(open_config(named_config, config, choices), name, rate)
+    return train(name, TrainOptions(data, run, chosen, choose_budget(chosen, name, data, steps, minutes), **options))
+
+
+def show_config(training: Training, config: str) -> str:
+    """Return a configuration file with every field, from a preset or another file."""
+    try:
+        from marey.training.config_file import open_config, preset_of, write_toml
+
+        named_config = resolve(training.config)
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    return write_toml(open_config(named_config, config), preset_of(config))
 
 
 def assemble_bundle(
@@ -55,11 +66,13 @@ def assemble_bundle(
 ) -> str:
     """Write the bundle of a run, and return its exact reference."""
     try:
+        from marey.training.config_file import open_config
+
         named_config, assemble = resolve(training.config), resolve(training.assemble)
     except ImportError as error:
         raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
-    chosen = named_config(config, **(choices or {}))
+    chosen = open_config(named_config, config, choices)
     return assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
 
 

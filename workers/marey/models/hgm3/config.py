@@ -3,31 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
-from marey.core.configs import ModelConfig, named
+from marey.core.configs import Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
+from marey.core.errors import InvalidInput
+from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
+
+Levels = Annotated[int, Between(2)]  # the residual transformer predicts all but the first
+Steps = Annotated[int, Between(1, 100)]
+Scale = Annotated[float, Between(0, 100)]
 
 
 @dataclass(frozen=True)
 class TokenizerConfig:
     """RVQ-VAE (HGM³ Sec. 3.1, 4.1; architecture and losses after MoMask)."""
 
-    width: int = 512
-    depth: int = 3  # residual blocks a stage, dilations 3^(depth-1) … 1
-    stages: int = 2  # each halves the frame rate: 4 frames a token
-    dropout: float = 0.2
-    levels: int = 6
-    codes: int = 512
-    code_width: int = 512
-    decay: float = 0.99
-    level_dropout: float = 0.2
-    commitment: float = 0.02  # β of eq. 2
-    feature_bias: float = 5.0  # divides the std of root and contacts (MoMask), which gives them more weight
-    rotation_weight: float = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
-    position_weight: float = 5.0  # ours: L1 on joints in the heading frame, metres
-    velocity_weight: float = 0.5  # ours: L1 on their velocity, m/s; against jitter and skating
-    world_weight: float = 2.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
+    width: Count = 512  # channels of the convolutions
+    depth: Count = 3  # residual blocks a stage, dilations 3^(depth-1) … 1
+    stages: Count = 2  # each halves the frame rate: 4 frames a token
+    dropout: Share = 0.2  # after each residual block
+    levels: Levels = 6  # codebooks
+    codes: Count = 512  # of a codebook
+    code_width: Count = 512  # numbers of a code
+    decay: Momentum = 0.99  # of the codebooks' moving averages
+    level_dropout: Share = 0.2  # of the samples lose their upper levels in training
+    commitment: Weight = 0.02  # β of eq. 2
+    feature_bias: Positive = 5.0  # divides the std of root and contacts (MoMask), which gives them more weight
+    rotation_weight: Weight = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
+    position_weight: Weight = 0.0  # ours: L1 on joints in the heading frame, metres
+    velocity_weight: Weight = 0.0  # ours: L1 on their velocity, m/s; against jitter and skating
+    world_weight: Weight = 0.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
 
     @property
     def frames_per_token(self) -> int:
@@ -39,12 +45,12 @@ class TokenizerConfig:
 class TransformerConfig:
     """One bidirectional transformer."""
 
-    layers: int = 6
-    heads: int = 6
-    width: int = 384
-    feedforward: int = 1024
-    dropout: float = 0.2
-    attention_dropout: float = 0.2
+    layers: Count = 6
+    heads: Count = 6  # of attention; they divide the width
+    width: Count = 384
+    feedforward: Count = 1024  # width of the hidden layer
+    dropout: Share = 0.2  # after attention and the hidden layer
+    attention_dropout: Share = 0.2  # on the weights of attention
     norm_first: bool = False  # MoMask's encoders normalise after the residual
 
 
@@ -52,12 +58,12 @@ class TransformerConfig:
 class ConditionConfig:
     """Semantic graph to condition tokens (HGM³ Sec. 3.3)."""
 
-    text_width: int = 512
-    max_actions: int = 4
-    max_specifics: int = 8
-    dropout: float = 0.1  # on the attention of the graph (GraphMotion)
-    drop: float = 0.1  # share of samples trained without condition, for guidance
-    noise: float = 0.0  # ours: std of the noise added to standardised text features in training
+    text_width: Count = 512  # of the text encoder
+    max_actions: Whole = 4  # action nodes of a prompt
+    max_specifics: Whole = 8  # specific nodes of a prompt
+    dropout: Share = 0.1  # on the attention of the graph (GraphMotion)
+    drop: Share = 0.1  # share of samples trained without condition, for guidance
+    noise: Weight = 0.0  # ours: std of the noise added to standardised text features in training
 
     @property
     def slots(self) -> int:
@@ -69,41 +75,41 @@ class ConditionConfig:
 class MiningConfig:
     """Hard token mining (HGM³ Sec. 3.2)."""
 
-    mask: Literal["hard", "random"] = "hard"
-    alpha_start: float = 0.0  # α_0
-    alpha_end: float = 0.5  # α_T
-    momentum: float = 0.999  # λ of eq. 6; the paper gives none
+    mask: Literal["hard", "random"] = "hard"  # random = α is 0 throughout
+    alpha_start: Share = 0.0  # α_0 of eq. 8
+    alpha_end: Share = 0.5  # α_T of eq. 8
+    momentum: Momentum = 0.999  # λ of eq. 6; the paper gives none
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
-    replace_random: float = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
-    replace_mask: float = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
+    replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
+    replace_mask: Share = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
 
 
 @dataclass(frozen=True)
 class InferenceConfig:
     """Decoding (HGM³ Sec. 3.4)."""
 
-    steps: int = 10  # L
-    motion_steps: int = 2  # L_M
-    action_steps: int = 5  # L_A
-    guidance: float = 4.0
-    temperature: float = 1.0
-    top_k: float = 0.1  # share of the codes that may be drawn
-    residual_guidance: float = 5.0
-    residual_temperature: float = 1.0
-    residual_top_k: float = 0.1
+    steps: Steps = 10  # L, passes of the base level
+    motion_steps: Whole = 2  # L_M, the last pass with the motion node alone
+    action_steps: Whole = 5  # L_A, the last pass without specific nodes
+    guidance: Scale = 4.0  # weight of the prompt at the base level; 1 = none
+    temperature: Scale = 1.0  # randomness of the base level; 0 = the likeliest token
+    top_k: Part = 0.1  # share of the codes that may be drawn
+    residual_guidance: Scale = 5.0  # the same three for the residual levels
+    residual_temperature: Scale = 1.0
+    residual_top_k: Part = 0.1
 
 
 @dataclass(frozen=True)
 class HGM3Config(ModelConfig):
     """Configuration of one bundle: shapes and training."""
 
-    name: str = "paper"
-    layout: str = "humanml3d-263"
-    features: int = 263  # D
-    joints: int = 22
-    fps: float = 20.0
-    max_frames: int = 196
-    min_frames: int = 16
+    name: str = "paper"  # as manifests show it
+    layout: str = "humanml3d-263"  # of the prepared data's features
+    features: Count = 263  # D, numbers of a frame
+    joints: Count = 22
+    fps: Positive = 20.0
+    max_frames: Count = 196  # longest motion
+    min_frames: Count = 16  # shortest motion
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     masked: TransformerConfig = TransformerConfig()
@@ -112,14 +118,15 @@ class HGM3Config(ModelConfig):
     in_order: bool = False  # ours: prompts of several actions are read in the order of time (`TextSpec.in_order`)
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
-    residual_drop: float = 0.2  # condition drop of the residual transformer
-    length_hidden: tuple[int, ...] = (512, 256, 128)
+    residual_drop: Share = 0.2  # condition drop of the residual transformer
+    length_hidden: tuple[Count, ...] = (512, 256, 128)  # widths of the length estimator (MoMask)
     mining: MiningConfig = MiningConfig()
     inference: InferenceConfig = InferenceConfig()
-    windows: tuple[int, ...] = (64,)  # frames; the tokenizer's training windows
-    train_tokenizer: StageConfig = StageConfig(batch=512, ema=0.0)
-    train_masked: StageConfig = StageConfig(batch=256)
-    train_residual: StageConfig = StageConfig(batch=64)
+    windows: tuple[Count, ...] = (64,)  # frames; the tokenizer's training windows
+    # HGM³ Sec. 4.1: 500 epochs, warm-up over 2000 iterations whatever the budget, and no average of the weights
+    train_tokenizer: StageConfig = StageConfig(batch=512, warmup_share=1.0, ema=0.0, epochs=500)
+    train_masked: StageConfig = StageConfig(batch=256, warmup_share=1.0, ema=0.0, epochs=500)
+    train_residual: StageConfig = StageConfig(batch=64, warmup_share=1.0, ema=0.0, epochs=500)
     train_length: StageConfig = StageConfig(batch=128, learning_rate=1e-3)
 
     @property
@@ -132,12 +139,35 @@ class HGM3Config(ModelConfig):
         """Return the length of the shortest clip in tokens."""
         return -(-self.min_frames // self.tokenizer.frames_per_token)
 
+    def check(self) -> None:
+        """Check sizes against each other; see `ModelConfig.check`."""
+        check_body(self.layout, self.features, self.joints, self.fps, (self.min_frames, self.max_frames))
+        check_windows(self.windows, self.tokenizer.frames_per_token)
+        for name in ("masked", "predictor", "residual"):
+            check_heads(name, getattr(self, name).heads, getattr(self, name).width)
+        inference = self.inference
+        if not inference.motion_steps <= inference.action_steps <= inference.steps:
+            raise InvalidInput(
+                f"must not decrease: motion_steps {inference.motion_steps}, action_steps {inference.action_steps}, "
+                f"steps {inference.steps}",
+                where="inference",
+            )
+
 
 PAPER = HGM3Config()
 
 STARTER = HGM3Config(
     name="starter",
-    tokenizer=TokenizerConfig(width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1),
+    tokenizer=TokenizerConfig(
+        width=224,
+        depth=2,
+        code_width=128,
+        dropout=0.0,
+        rotation_weight=0.1,
+        position_weight=5.0,
+        velocity_weight=0.5,
+        world_weight=2.0,
+    ),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16, noise=0.3),
     in_order=True,
     compact=True,
@@ -163,7 +193,17 @@ STARTER = HGM3Config(
 
 TINY = HGM3Config(
     name="tiny",
-    tokenizer=TokenizerConfig(width=32, depth=1, levels=3, codes=32, code_width=16, dropout=0.0),
+    tokenizer=TokenizerConfig(
+        width=32,
+        depth=1,
+        levels=3,
+        codes=32,
+        code_width=16,
+        dropout=0.0,
+        position_weight=5.0,
+        velocity_weight=0.5,
+        world_weight=2.0,
+    ),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
     compact=True,
     masked=TransformerConfig(

@@ -3,44 +3,48 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from marey.core.configs import ModelConfig, named
+from marey.core.configs import Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
 from marey.core.errors import InvalidInput
 from marey.nn.scaled_quantizer import Scale
+from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
+
+Amount = Annotated[float, Between(0, 100)]
 
 
 @dataclass(frozen=True)
 class TokenizerConfig:
     """MoSA-VQ (MOGO Sec. 2.1): one token column a frame."""
 
-    width: int = 512
-    depth: int = 3  # residual blocks, dilations 3^(depth-1) … 1; one stage, as in the public options
-    dropout: float = 0.0
-    levels: int = 6
-    codes: int = 8192
-    code_width: int = 128
-    decay: float = 0.99
-    level_dropout: float = 0.2
-    scale: Scale = "elementwise"
-    feature_bias: float = 5.0  # as in HGM³
-    commitment: float = 0.02  # β of eq. 6
-    regularizer: float = 0.02  # γ of eq. 6; the paper gives none
-    rotation_weight: float = 1.0  # the rest as in HGM³ (ours): see its `TokenizerConfig`
-    position_weight: float = 5.0
-    velocity_weight: float = 0.5
-    world_weight: float = 2.0
+    width: Count = 512  # channels of the convolutions
+    depth: Count = 3  # residual blocks, dilations 3^(depth-1) … 1; one stage, as in the public options
+    dropout: Share = 0.0  # after each residual block
+    levels: Count = 6  # codebooks
+    codes: Count = 8192  # of a codebook
+    code_width: Count = 128  # numbers of a code
+    decay: Momentum = 0.99  # of the codebooks' moving averages
+    level_dropout: Share = 0.2  # of the samples lose their upper levels in training
+    scale: Scale = "elementwise"  # of eq. 1: one a number, one a level, or none
+    feature_bias: Positive = 5.0  # divides the std of root and contacts (MoMask), which gives them more weight
+    commitment: Weight = 0.02  # β of eq. 6
+    regularizer: Weight = 0.02  # γ of eq. 6; the paper gives none
+    rotation_weight: Weight = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
+    position_weight: Weight = 0.0  # ours: L1 on joints in the heading frame, metres
+    velocity_weight: Weight = 0.0  # ours: L1 on their velocity, m/s; against jitter and skating
+    world_weight: Weight = 0.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
 
 
 @dataclass(frozen=True)
 class TransformerConfig:
     """The one causal transformer that all levels share."""
 
-    layers: int = 18
-    heads: int = 16
-    width: int = 1024
-    feedforward: int = 4096
-    dropout: float = 0.15
+    layers: Count = 18
+    heads: Count = 16  # of attention; they divide the width
+    width: Count = 1024
+    feedforward: Count = 4096  # width of the hidden layer
+    dropout: Share = 0.15  # after attention and the hidden layer
     level_gain: bool = False
     """Ours: each level has its own gains on the shared embedding. Without them, a sum of embeddings does not show which
     level a code came from."""
@@ -53,71 +57,86 @@ class TransformerConfig:
 class DepthConfig:
     """Depth head (ours): a small transformer across the levels of one frame; 0 layers draw levels independently."""
 
-    layers: int = 0
-    heads: int = 8
-    width: int = 512
-    feedforward: int = 1024
-    share: float = 1.0  # of the frames whose loss covers all levels; the others cover level 0 alone
+    layers: Whole = 0
+    heads: Count = 8  # of attention; they divide the width
+    width: Count = 512
+    feedforward: Count = 1024  # width of the hidden layer
+    share: Part = 1.0  # of the frames whose loss covers all levels; the others cover level 0 alone
 
 
 @dataclass(frozen=True)
 class ConditionConfig:
     """The prompt, one vector per sentence."""
 
-    text_width: int = 768
-    drop: float = 0.1  # share of samples trained without prompt, for guidance
+    text_width: Count = 768  # of the text encoder
+    drop: Share = 0.1  # share of samples trained without prompt, for guidance
     every_frame: bool = False  # ours: the current prompt is added to every frame, beside being position 0
-    noise: float = 0.0  # ours: std of the noise added to standardised text features in training
+    noise: Weight = 0.0  # ours: std of the noise added to standardised text features in training
     clock: bool = False  # ours: the time since its action began is added to every frame
-    clockless: float = 0.3  # share of actions without that time in training: a stream outlasts every capture
+    clockless: Share = 0.3  # share of actions without that time in training: a stream outlasts every capture
 
 
 @dataclass(frozen=True)
 class InferenceConfig:
     """Sampling of tokens."""
 
-    temperature: float = 1.0  # of level 0
-    top_k: float = 0.1  # share of the codes that level 0 may draw
-    upper_temperature: float = 0.6  # of all other levels: against jitter
-    upper_top_k: float = 0.1
-    guidance: float = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
-    upper_guidance: float = 1.0  # of all other levels: level 0 decides the action, the others its details
-    window: int = 196  # frames that attention reaches back, at most `max_frames`
+    temperature: Amount = 1.0  # randomness of level 0; 0 = the likeliest code
+    top_k: Part = 0.1  # share of the codes that level 0 may draw
+    upper_temperature: Amount = 0.6  # of all other levels: against jitter
+    upper_top_k: Part = 0.1  # share of the codes that all other levels may draw
+    guidance: Amount = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
+    upper_guidance: Amount = 1.0  # of all other levels: level 0 decides the action, the others its details
+    window: Count = 196  # frames that attention reaches back, at most `max_frames`
 
 
 @dataclass(frozen=True)
 class MOGOConfig(ModelConfig):
     """Configuration of one bundle."""
 
-    name: str = "paper"
-    layout: str = "humanml3d-263"
-    features: int = 263  # D
-    joints: int = 22
-    fps: float = 20.0
-    min_frames: int = 16  # shortest motion; END is ignored before
-    max_frames: int = 196  # longest training sequence: no relative distance beyond it is learned
-    corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
-    first_level: float = 1.0  # weight of level 0 in the loss, to 1 of each other level
-    ahead: tuple[int, ...] = ()
+    name: str = "paper"  # as manifests show it
+    layout: str = "humanml3d-263"  # of the prepared data's features
+    features: Count = 263  # D, numbers of a frame
+    joints: Count = 22
+    fps: Positive = 20.0
+    min_frames: Count = 16  # shortest motion; END is ignored before
+    max_frames: Count = 196  # longest training sequence: no relative distance beyond it is learned
+    corruption: Share = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
+    first_level: Positive = 1.0  # weight of level 0 in the loss, to 1 of each other level
+    ahead: tuple[Count, ...] = ()
     """Ours: frames by which level 0 is also predicted ahead of the next one (Gloeckle et al. 2024, "Better & Faster
     Large Language Models via Multi-token Prediction"). The past determines the next frame; the prompt determines the
     frame a second later."""
-    ahead_weight: float = 1.0  # of that loss, to 1 of the loss of eq. 11
-    steers: int = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
-    rollouts: int = 0  # further ones that start from the model's own motions, where training starts from a finished one
+    ahead_weight: Weight = 1.0  # of that loss, to 1 of the loss of eq. 11
+    steers: Whole = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
+    rollouts: Whole = (
+        0  # further ones that start from the model's own motions, where training starts from a finished one
+    )
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
     depth: DepthConfig = DepthConfig()
     inference: InferenceConfig = InferenceConfig()
-    windows: tuple[int, ...] = (64,)  # frames; the tokenizer's training windows
+    windows: tuple[Count, ...] = (64,)  # frames; the tokenizer's training windows
+    # the paper names no optimiser, batch or rate; as in HGM³, the weights are not averaged
     train_tokenizer: StageConfig = StageConfig(batch=256, ema=0.0)
-    train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4)
+    train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4, ema=0.0)
 
     def __post_init__(self) -> None:
         """Refuse a joint sequence without a depth head: its levels would be indistinguishable."""
         if self.transformer.joint and not self.depth.layers:
             raise InvalidInput("one sequence for all levels needs a depth head", where="transformer.joint")
+
+    def check(self) -> None:
+        """Check sizes against each other; see `ModelConfig.check`."""
+        check_body(self.layout, self.features, self.joints, self.fps, (self.min_frames, self.max_frames))
+        check_windows(self.windows, 1)
+        check_heads("transformer", self.transformer.heads, self.transformer.width)
+        check_heads("depth", self.depth.heads, self.depth.width)
+        if self.inference.window > self.max_frames:
+            raise InvalidInput(
+                f"{self.inference.window} is over max_frames, {self.max_frames}: distances beyond are not learned",
+                where="inference.window",
+            )
 
 
 PAPER = MOGOConfig()
@@ -130,7 +149,9 @@ STARTER = MOGOConfig(
     steers=4000,
     rollouts=3000,
     # 220,000 training frames cannot fill 6 x 8192 codes
-    tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
+    tokenizer=TokenizerConfig(
+        width=192, codes=512, rotation_weight=0.1, position_weight=5.0, velocity_weight=0.5, world_weight=2.0
+    ),
     condition=ConditionConfig(text_width=384, noise=0.3, every_frame=True, clock=True),
     transformer=TransformerConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
@@ -148,7 +169,9 @@ TINY = MOGOConfig(
     ahead=(3,),
     steers=6,
     rollouts=6,
-    tokenizer=TokenizerConfig(width=24, depth=2, levels=3, codes=32, code_width=16),
+    tokenizer=TokenizerConfig(
+        width=24, depth=2, levels=3, codes=32, code_width=16, position_weight=5.0, velocity_weight=0.5, world_weight=2.0
+    ),
     condition=ConditionConfig(text_width=384, every_frame=True, clock=True),
     transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
     depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32, share=0.5),
