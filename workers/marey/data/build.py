@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,18 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.core.errors import Conflict, InvalidInput
-from marey.core.hashing import sha256_of
-from marey.data import manifest as names
+from marey.core.errors import InvalidInput
 from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COMPOSED, COUNTS, compose
 from marey.data.describe import ACTIONS, Facts, describe, describe_text
+from marey.data.folder import LEAST_STD, PreparedWriter
 from marey.data.gestures import made_gestures
 from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
-from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
-from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
+from marey.data.manifest import Clip, Manifest, Measured, SourceEntry
+from marey.data.pack import SPLITS, JointsPack, PackClip
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
@@ -198,7 +196,6 @@ def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], name: str,
     return describe(content, clip.style, joints, FPS)
 
 
-_LEAST_STD = 1e-4  # a constant group must not be divided by zero
 _LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a second
 
 
@@ -207,30 +204,11 @@ def _jumps(joints: NDArray[np.float32]) -> bool:
     return bool(np.abs(LAYOUT.encode(joints)[:, 0]).max() > _LARGEST_YAW_STEP)
 
 
-class FolderWriter:
-    """Write a prepared folder beside its final path and move it there once complete."""
+class FolderWriter(PreparedWriter):
+    """Write the prepared folder of captured clips on 22 joints."""
 
     def __init__(self, out: Path) -> None:
-        if out.exists() and any(out.iterdir()):
-            raise Conflict("the folder is not empty", where=str(out), hint="Name another one, or remove it first.")
-        self.out = out
-        self.work = out.with_name(out.name + ".part")
-        shutil.rmtree(self.work, ignore_errors=True)
-        self.work.mkdir(parents=True)
-        self.clips: list[Clip] = []
-        self.frames = 0
-        self._features = (self.work / "features.raw").open("wb")
-        self._local = (self.work / "joints.raw").open("wb")
-        self._roots = (self.work / "roots.raw").open("wb")
-
-    def __enter__(self) -> FolderWriter:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Remove an unfinished folder."""
-        for file in (self._features, self._local, self._roots):
-            file.close()
-        shutil.rmtree(self.work, ignore_errors=True)
+        super().__init__(out, LAYOUT)
 
     def add(
         self,
@@ -246,21 +224,17 @@ class FolderWriter:
         """Encode and append one clip; joints (T, 22, 3)."""
         placed = LAYOUT.canonicalize(joints)
         features = LAYOUT.encode(placed)
-        local, root = split_root(placed)
-        self._features.write(np.ascontiguousarray(features, "<f4").tobytes())
-        self._local.write(np.ascontiguousarray(local, "<f2").tobytes())
-        self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
         walked = actions[0].gait
         told = _choose_texts(actions, name)
         train_alone = len(actions) == 1 and part.source.split == "train"  # the people of two sentences differ
         if told and train_alone and (asked := sayings(part.content, name)):
             told += (asked,)
-        self.clips.append(
+        self.append(
+            features,
+            placed,
             Clip(
                 id=name,
-                start=self.frames,
-                length=len(features),
-                joints_start=self.frames + len(self.clips),
+                **self.place(features),
                 split=part.source.split,
                 dataset=part.source.dataset,
                 content=part.content,
@@ -287,36 +261,16 @@ class FolderWriter:
                     for k, facts in enumerate(actions)
                     if len(actions) > 1
                 ),
-            )
+            ),
         )
-        self.frames += len(features)
 
     def finish(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
         """Write statistics, manifest and hashes, then move the complete folder to its final path."""
-        if not any(clip.split == "train" for clip in self.clips):
-            raise InvalidInput("no training clip is left", where=str(self.out))
-        rows = self.frames + len(self.clips)
-        for file, name, shape, dtype in (
-            (self._features, names.FEATURES, (self.frames, LAYOUT.dim), "<f4"),
-            (self._local, names.JOINTS, (rows, 21, 3), "<f2"),
-            (self._roots, names.ROOTS, (rows, 3), "<f4"),
-        ):
-            file.close()
-            _raw_to_npy(Path(file.name), self.work / name, shape, dtype)
-        with (self.work / names.CLIPS).open("w", encoding="utf-8") as lines:
-            lines.writelines(clip.model_dump_json() + "\n" for clip in self.clips)
-        mean, std = self._statistics()
-        np.savez(self.work / names.STATISTICS, mean=mean, std=std)
-        manifest = self._manifest(packs, left_out)
-        (self.work / names.MANIFEST).write_text(manifest.model_dump_json(indent=1) + "\n", encoding="utf-8")
-        if self.out.exists():
-            self.out.rmdir()
-        self.work.rename(self.out)
-        return manifest
+        self.check_split()
+        return self.complete(self._statistics(self.close_arrays()), self._manifest(packs, left_out))
 
-    def _statistics(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _statistics(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Mean and group-averaged deviation of the captured and mirrored training clips."""
-        features = np.load(self.work / names.FEATURES, mmap_mode="r")
         total, squares, count = np.zeros(LAYOUT.dim), np.zeros(LAYOUT.dim), 0
         for clip in self.clips:
             if clip.split == "train" and not clip.spliced:
@@ -328,41 +282,22 @@ class FolderWriter:
         deviation = np.sqrt(np.maximum(squares / count - mean**2, 0.0))
         std = np.empty_like(deviation)
         for group in LAYOUT.slices.values():
-            std[group] = max(float(deviation[group].mean()), _LEAST_STD)
+            std[group] = max(float(deviation[group].mean()), LEAST_STD)
         return mean.astype(np.float32), std.astype(np.float32)
 
     def _manifest(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
-        kinds = Counter(_kind(clip) for clip in self.clips)
-        lengths = {split: Counter() for split in SPLITS}
-        for clip in self.clips:
-            whole = int(clip.measured.seconds)
-            lengths[clip.split][f"{whole}-{whole + 1}"] += 1
         sources = Counter(pack.terms_of(clip) for pack in packs for clip in pack.clips if clip.id not in left_out)
         return Manifest(
-            format=names.FORMAT,
+            **self.contents(),
             sources=tuple(
                 SourceEntry(**vars(terms), clips=count)
                 for terms, count in sorted(sources.items(), key=lambda entry: (entry[0].name, entry[0].licence))
             ),
             tier=check_mix(sources),
-            layout=LAYOUT.name,
             facing_sigma=LAYOUT.facing_sigma,
-            fps=FPS,
-            skeleton=LAYOUT.skeleton.name,
-            dim=LAYOUT.dim,
-            frames=self.frames,
-            clips=len(self.clips),
-            splits={split: sum(clip.split == split for clip in self.clips) for split in SPLITS},
-            lengths={split: dict(sorted(counts.items())) for split, counts in lengths.items()},
-            kinds=dict(sorted(kinds.items())),
-            captions=len({text for clip in self.clips for text in clip.captions}),
             caption_files={name: sha256 for pack in packs for name, sha256 in pack.caption_files.items()},
             left_out=dict(sorted(left_out.items())),
             compositional_pairs=tuple(sorted(held_out_pairs(packs))),
-            files={
-                name: FileEntry(sha256=sha256_of(self.work / name), bytes=(self.work / name).stat().st_size)
-                for name in names.FILES
-            },
         )
 
 
@@ -371,24 +306,6 @@ def _choose_texts(actions: Sequence[Facts], name: str) -> tuple[tuple[str, ...],
     if not actions[0].text:
         return ()
     return actions[0].text if len(actions) == 1 else joined_texts(actions, name)
-
-
-def _kind(clip: Clip) -> str:
-    if clip.spliced:
-        return "spliced" if len(clip.acts) > 1 else "looped"
-    if clip.made:
-        return "made"
-    if clip.speed != 1:
-        return "retimed"
-    return "mirrored" if clip.mirrored else "captured"
-
-
-def _raw_to_npy(raw: Path, path: Path, shape: tuple[int, ...], dtype: str) -> None:
-    header = {"descr": dtype, "fortran_order": False, "shape": shape}
-    with path.open("wb") as out, raw.open("rb") as data:
-        np.lib.format.write_array_header_1_0(out, header)
-        shutil.copyfileobj(data, out)
-    raw.unlink()
 
 
 def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progress: Progress | None = None) -> Manifest:

@@ -158,14 +158,14 @@ class JointsPack:
 
 
 def split_root(joints: NDArray[np.floating]) -> tuple[NDArray[np.float16], NDArray[np.float32]]:
-    """Split joints (T, 22, 3) into joints relative to the root (T, 21, 3) float16 and the root (T, 3) float32."""
+    """Split joints (T, J, 3) into joints relative to the root (T, J - 1, 3) float16 and the root (T, 3) float32."""
     root = joints[:, 0].astype(np.float32)
     return (joints[:, 1:] - root[:, None]).astype(np.float16), root
 
 
 def join(local: NDArray[np.float16], root: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Invert `split_root`: (T, 22, 3) float32."""
-    joints = np.empty((len(root), 22, 3), np.float32)
+    """Invert `split_root`: (T, J, 3) float32."""
+    joints = np.empty((len(root), 1 + local.shape[1], 3), np.float32)
     joints[:, 0] = root
     joints[:, 1:] = local.astype(np.float32) + root[:, None]
     return joints

@@ -58,7 +58,7 @@ class PreparedData:
                 per gigabyte); sizes, types and shapes are always checked.
 
         Raises:
-            NotFound: the folder or its manifest does not exist.
+            NotFound: the folder or its manifest does not exist, or the layout is unknown.
             InvalidFile: another format, a missing, changed or truncated file, or clips that do not fit the arrays.
         """
         path = Path(path)
@@ -68,7 +68,8 @@ class PreparedData:
         clips = tuple(_read_clips(path / names.CLIPS))
         rows = manifest.frames + manifest.clips
         features = _map(path / names.FEATURES, "float32", (manifest.frames, manifest.dim), finite=verify)
-        local = _map(path / names.JOINTS, "float16", (rows, 21, 3), finite=verify)
+        below_root = len(layout(manifest.layout).skeleton) - 1
+        local = _map(path / names.JOINTS, "float16", (rows, below_root, 3), finite=verify)
         roots = _map(path / names.ROOTS, "float32", (rows, 3), finite=verify)
         mean, std = _statistics(path / names.STATISTICS, manifest.dim)
         _check_clips(clips, manifest, path / names.CLIPS)
@@ -108,7 +109,7 @@ class PreparedData:
         return self.all_features[clip.start : clip.start + clip.length]
 
     def joints(self, clip: Clip) -> NDArray[np.float32]:
-        """(length + 1, 22, 3) metres of a clip, in the canonical frame of its features."""
+        """(length + 1, J, 3) metres of a clip, in the canonical frame of its features."""
         rows = slice(clip.joints_start, clip.joints_start + clip.length + 1)
         return join(self._local[rows], self._roots[rows])
 

@@ -22,7 +22,7 @@ Sources = Annotated[
     typer.Argument(
         metavar="SOURCE PATH …",
         help="A known set (an unknown name lists them) with its archive or folder; own with a folder that has "
-        "dataset.toml and index.csv; pack with a file of `pack`.",
+        "dataset.toml and index.csv; pack with a file of `pack`; snapmogen with its published folder, alone.",
     ),
 ]
 Processes = Annotated[int, typer.Option("--processes", min=1, help="Number of processes that retarget.")]
@@ -59,7 +59,8 @@ def prepare(
         ),
     ] = 0.0,
 ) -> None:
-    """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
+    """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest; or take
+    over a set that is published as features."""
     from marey.cli.roles import data
 
     sources = data.CaptureSources(_named(pairs), processes)

@@ -43,14 +43,19 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
     """
     try:
         from marey.data.dataset import known_sets
+        from marey.data.feature_sets import FEATURE_SETS
         from marey.data.pack import JointsPack
         from marey.data.prepare import CaptureSet, pack_set
     except ImportError as error:
         raise needs_extra("worker", error) from error
     known = known_sets()
     for name, _ in sources.named:
+        if name in FEATURE_SETS:
+            hint = f"Write: marey data prepare {name} FOLDER -o DIR"
+            raise InvalidInput(f"{name} is published as features: it can only be prepared, and by itself", hint=hint)
         if name not in (*known, OWN, PACK):
-            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join((*known, OWN, PACK))}.")
+            every = ", ".join((*known, *FEATURE_SETS, OWN, PACK))
+            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {every}.")
     packs: list[JointsPack] = []
     for name, path in sources.named:
         if name == PACK:
@@ -81,14 +86,27 @@ def prepare_data(
 ) -> str:
     """Prepare training data, with clips slower and faster by the share `speed`, and return a line that describes it.
 
+    A set that is published as features is prepared by itself, as it is.
+
     Raises:
-        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
+        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`; or `speed` with published features.
         Conflict: the folder is in use.
     """
-    packs = read_captures(sources, progress)
-    from marey.data.build import build
+    try:
+        from marey.data.feature_sets import FEATURE_SETS
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    report = partial(progress, "building")
+    if len(sources.named) == 1 and sources.named[0][0] in FEATURE_SETS:
+        name, path = sources.named[0]
+        if speed:
+            raise InvalidInput(f"{name} is published as features, which keep their speed", where="--speed")
+        manifest = FEATURE_SETS[name](path, output, progress=report)
+    else:
+        packs = read_captures(sources, progress)
+        from marey.data.build import build
 
-    manifest = build(packs, output, speed=speed, progress=partial(progress, "building"))
+        manifest = build(packs, output, speed=speed, progress=report)
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
 
 
