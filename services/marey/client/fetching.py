@@ -31,7 +31,7 @@ FORMAT = re.compile(r"[a-z0-9]{1,16}")
 
 
 @dataclass(frozen=True)
-class Download:
+class FileToFetch:
     """One file to fetch."""
 
     url: str
@@ -48,7 +48,7 @@ class Download:
         return self.url.rpartition("/")[2] if self.making is None else self.making.exporter.format
 
 
-Planned = list[tuple[dict[str, Any], list[Download]]]
+Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
 """Items of the API, in input order, each with its files."""
 
 
@@ -114,7 +114,7 @@ def fetch_job(
     wanted = [file for _, files in planned for file in files]
     done: set[Path] = set()
 
-    def note(download: Download) -> None:
+    def note(download: FileToFetch) -> None:
         done.add(download.path)
         observer.fetched(download.path)
 
@@ -207,7 +207,7 @@ def plan(
     planned: Planned = []
     names = FileNames(template)
     for item in items:
-        downloads: list[Download] = []
+        downloads: list[FileToFetch] = []
         motion = item["motion"]
         for file, making in _wanted(motion["files"], formats, root, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
@@ -215,7 +215,7 @@ def plan(
             wanted = file["format"] if making is None else making.exporter.format
             name = names.of(item["id"], naming(item), extension_of(wanted))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
-            downloads.append(Download(url, file["sha256"], file["size"], folder / name, making))
+            downloads.append(FileToFetch(url, file["sha256"], file["size"], folder / name, making))
         planned.append((item, downloads))
     return planned
 
@@ -236,7 +236,7 @@ def naming(item: dict[str, Any]) -> Naming:
 
 
 def download_all(
-    client: Transport, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
+    client: Transport, downloads: Sequence[FileToFetch], *, overwrite: bool, done: Callable[[FileToFetch], None]
 ) -> None:
     """Fetch files, eight at a time, after a check of the existing ones.
 
@@ -248,14 +248,14 @@ def download_all(
         Conflict: a file exists with other content; nothing is fetched then.
         InvalidFile: the data that arrived has another sha256, or cannot be written.
     """
-    missing: list[Download] = []
+    missing: list[FileToFetch] = []
     for download in downloads:
         if _is_there(download, overwrite):
             done(download)
         else:
             missing.append(download)
 
-    def fetch(download: Download) -> None:
+    def fetch(download: FileToFetch) -> None:
         done(_download(client, download, overwrite=overwrite))
 
     with ThreadPoolExecutor(PARALLEL) as pool:
@@ -279,7 +279,7 @@ def _wanted(
         yield by_format[name if making is None else SOURCE], making
 
 
-def _is_there(download: Download, overwrite: bool) -> bool:
+def _is_there(download: FileToFetch, overwrite: bool) -> bool:
     if download.making is not None:  # only making it again tells
         return False
     try:
@@ -301,7 +301,7 @@ def _conflict(path: Path) -> Conflict:
     )
 
 
-def _finish(download: Download, part: Path, overwrite: bool) -> Download:
+def _finish(download: FileToFetch, part: Path, overwrite: bool) -> FileToFetch:
     """Put a file that has arrived in its place, or what is made of it."""
     path = download.path
     if download.making is None:
@@ -318,7 +318,7 @@ def _finish(download: Download, part: Path, overwrite: bool) -> Download:
     return download
 
 
-def _download(client: Transport, download: Download, *, overwrite: bool) -> Download:
+def _download(client: Transport, download: FileToFetch, *, overwrite: bool) -> FileToFetch:
     part = download.path.with_name(download.path.name + ".part")
     for attempt in range(1, ATTEMPTS + 1):
         try:
@@ -339,7 +339,7 @@ def _download(client: Transport, download: Download, *, overwrite: bool) -> Down
     )
 
 
-def _continue(client: Transport, download: Download, part: Path) -> None:
+def _continue(client: Transport, download: FileToFetch, part: Path) -> None:
     have = part.stat().st_size if part.exists() else 0
     if have >= download.size:
         have = 0

@@ -258,7 +258,7 @@ class Checkpoint:
 def _table(value: object, file: Path, key: str | None) -> Mapping[str, Tensor]:
     where = str(file) if key is None else f"{file}: {key}"
     if not isinstance(value, Mapping) or not value:
-        raise InvalidFile("is no table of tensors", where=where, hint="Download the file again.")
+        raise InvalidFile("does not hold tensors by name", where=where, hint="Download the file again.")
     for name, each in value.items():
         if not isinstance(name, str) or not isinstance(each, Tensor):
             raise InvalidFile(f"holds {type(each).__name__} as {name!r}, not a tensor", where=where)

@@ -41,7 +41,7 @@ SENTENCES = ("a person walks forward", "a person sits quietly")
 
 @dataclass(frozen=True)
 class Published:
-    """What is known of a published text encoder.
+    """Facts of a published text encoder, by which its files are checked.
 
     Attributes:
         licence, credit: of the weights.
