@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -17,6 +16,7 @@ from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.watching import Steps, Watcher
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
@@ -159,10 +159,10 @@ class Generator:
         frames = [self.frames(request) for request in requests]
         results: list[Generated | None] = [None] * len(requests)
         groups = self._groups(frames)
-        steps = _Steps(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
+        steps = Steps(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
 
         def make(rows: list[int]) -> None:
-            self._group(_Watcher(steps, rows), requests, frames, inference, options, results)
+            self._group(Watcher(steps, rows), requests, frames, inference, options, results)
 
         with self.batch_threads.open():
             self.batch_threads.map(make, groups)
@@ -217,7 +217,7 @@ class Generator:
 
     def _group(
         self,
-        watcher: _Watcher,
+        watcher: Watcher,
         requests: Sequence[Request],
         frames: Sequence[int],
         inference: InferenceConfig,
@@ -259,44 +259,3 @@ class Generator:
             tokens=torch.full((len(requests), bucket, levels), -1, device=device),
             decided=torch.zeros(len(requests), 3, dtype=torch.long, device=device),
         )
-
-
-class _Steps:
-    """Step counter of all groups, which batch threads run in parallel; reports the progress."""
-
-    def __init__(self, control: GenerationControl, total: int) -> None:
-        self._control = control
-        self._total = total
-        self._done = 0
-        self._lock = threading.Lock()
-
-    def step(self) -> set[int]:
-        """Count one step; return the requests to leave out."""
-        with self._lock:
-            self._done = min(self._done + 1, self._total)
-            self._control.progress(self._done, self._total)
-            return self._control.dropped()
-
-    def dropped(self) -> set[int]:
-        """Return the requests to leave out."""
-        with self._lock:
-            return self._control.dropped()
-
-
-class _Watcher:
-    """Adapter from dropped requests to the rows of one group to keep."""
-
-    def __init__(self, steps: _Steps, rows: list[int]) -> None:
-        """`rows`: the group's requests."""
-        self._steps = steps
-        dropped = steps.dropped()
-        self.rows = [r for r in rows if r not in dropped]
-
-    def step(self) -> Tensor | None:
-        """Count one step; return the rows to keep, or None for all."""
-        dropped = self._steps.step()
-        if not dropped or not any(r in dropped for r in self.rows):
-            return None
-        keep = [r not in dropped for r in self.rows]
-        self.rows = [r for r in self.rows if r not in dropped]
-        return torch.tensor(keep)
