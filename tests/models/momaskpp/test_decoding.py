@@ -47,9 +47,7 @@ def test_a_schedule_never_rises_and_ends_without_masks(total: int, steps: int) -
 @torch.no_grad()
 def test_whole_loops_give_the_published_tokens(name: str, cross: bool, lengths: list[int], words: list[int]) -> None:
     golden, config = GOLDEN[name], RELEASED_HUMANML3D
-    config = replace(
-        config, masked=replace(config.masked, conditioning="cross-attention" if cross else "in-context")
-    )
+    config = replace(config, masked=replace(config.masked, conditioning="cross-attention" if cross else "in-context"))
     scales = Scales.of(config)
     state = drawn(masked_shapes(512, scales.size, 4, cross=cross))
     state["token_emb.weight"] *= 30
@@ -66,9 +64,7 @@ def test_whole_loops_give_the_published_tokens(name: str, cross: bool, lengths: 
     assert same >= 0.98 * total  # near-equal confidences may swap
 
 
-def make_items(
-    model: MaskedTransformer, scales: Scales, lengths: Tensor, states: Tensor, present: Tensor
-) -> Items:
+def make_items(model: MaskedTransformer, scales: Scales, lengths: Tensor, states: Tensor, present: Tensor) -> Items:
     size = (len(lengths), scales.size)
     return Items(
         lengths=lengths,
@@ -115,9 +111,7 @@ def test_guidance_temperature_and_the_share_of_codes_change_the_draw(
 ) -> None:
     model, config = tiny
     scales = Scales.of(config)
-    items = make_items(
-        model, scales, torch.tensor([49]), torch.randn(1, 12, 384), torch.ones(1, 12, dtype=torch.bool)
-    )
+    items = make_items(model, scales, torch.tensor([49]), torch.randn(1, 12, 384), torch.ones(1, 12, dtype=torch.bool))
     base = config.inference
 
     def made(inference: InferenceConfig) -> list[int]:

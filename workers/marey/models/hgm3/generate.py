@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of

@@ -39,6 +39,7 @@ class TokenizerConfig:
     root_weight: float = 0.0  # smooth L1 once more on the root's four columns
     essential: tuple[int, int] = (4, 67)  # columns that L_ess of eq. 6 covers
     essential_weight: float = 2.0  # λ_ess
+    rotation_weight: float = 1.0  # ours: of the 6-D rotations among all features, where layouts hold positions too
     position_weight: float = 0.0  # ours: L1 on joints in the heading frame, metres; 0 where the layout has no such loss
     velocity_weight: float = 0.0  # ours: L1 on their velocity, m/s
     world_weight: float = 0.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
@@ -203,6 +204,7 @@ STARTER = MoMaskPPConfig(
         code_width=128,
         gumbel=0.0,
         essential_weight=0.5,
+        rotation_weight=0.1,
         position_weight=5.0,
         velocity_weight=0.5,
         world_weight=2.0,

@@ -131,6 +131,8 @@ def _pass(
         ~masked, torch.inf
     )
     order = confidence.argsort(dim=1, stable=True)  # least confident first; ties go to the earlier position
-    rank = torch.empty_like(order).scatter_(1, order, torch.arange(order.shape[1], device=order.device).expand_as(order))
+    rank = torch.empty_like(order).scatter_(
+        1, order, torch.arange(order.shape[1], device=order.device).expand_as(order)
+    )
     filled = torch.where(masked, drawn, tokens)
     return filled.masked_fill(rank < masked_left[:, None], model.mask_token)
