@@ -13,6 +13,7 @@ OPTIONS = {
     "extra_columns": "--extra-columns",
     "file_format": "--input-format",
     "fps": "--fps",
+    "licence": "--licence",
     "model": "--model",
     "name_template": "--name-template",
     "overwrite": "--overwrite",
@@ -20,6 +21,7 @@ OPTIONS = {
     "seed": "--seed",
     "settings": "--set",
     "tags": "--tag",
+    "text_encoder": "--text-encoder",
     "variants": "--variants",
 }
 """The option of each argument that an error may name."""

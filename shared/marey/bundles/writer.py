@@ -18,6 +18,7 @@ from safetensors.numpy import save as save_safetensors
 from marey.bundles.bundle import STATISTICS, Bundle, Tensors
 from marey.bundles.manifest import FORMAT, MANIFEST_NAME, BundleFile, BundleManifest, parse_manifest
 from marey.core.errors import Conflict, InvalidInput
+from marey.core.hashing import sha256_of
 
 MAX_SHARD_BYTES = 15 * 2**20
 """Shard size below the limit at which hosts of git repositories refuse files or warn."""
@@ -68,6 +69,19 @@ class BundleWriter:
         for name, shard in zip(names, shards, strict=True):
             self._add_file(name, save_safetensors(shard))
         self._parts[part] = tuple(names)
+
+    @property
+    def folder(self) -> Path:
+        """The temporary folder, for checks of what is written before it is moved into place."""
+        return self._folder
+
+    def copy_part(self, part: str, shards: Mapping[str, Path]) -> None:
+        """Add one part by copies of safetensors files, each under the name given, byte by byte."""
+        for name, source in shards.items():
+            target = self._folder / name
+            shutil.copyfile(source, target)
+            self._files[name] = BundleFile(sha256=sha256_of(target), bytes=target.stat().st_size)
+        self._parts[part] = tuple(shards)
 
     def add_statistics(self, mean: NDArray[np.float32], std: NDArray[np.float32]) -> None:
         """Add mean and standard deviation (D,), stored in float32."""

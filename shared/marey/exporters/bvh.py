@@ -15,23 +15,34 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
     """Write a BVH file.
 
     Raises:
-        InvalidInput: see `marey.motion.io.bvh.write_bvh`.
+        InvalidInput: see `marey.motion.io.bvh.write_bvh`; or the skeleton has no such rest pose.
     """
     from marey.motion.io.bvh_write import format_bvh
 
+    if coordinates.rest_pose != "t":
+        from marey.motion.rest_pose import change_rest_pose
+
+        clip = change_rest_pose(clip, coordinates.rest_pose)
     return format_bvh(clip, unit=coordinates.unit, up=coordinates.up).encode()
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> BvhClip:
-    """Read a BVH file with its own skeleton and facing; bones get a constant length.
+    """Read a BVH file with its own skeleton and facing, in the T-pose if its skeleton is known; bones get a constant
+    length.
 
     Raises:
         InvalidFile, TooLarge: see `marey.motion.io.bvh.read_bvh`.
+        InvalidInput: the skeleton has no such rest pose.
     """
     from marey.motion.io.bvh import parse_bvh
     from marey.motion.io.convert import steady
 
-    return steady(parse_bvh(data, where, unit=coordinates.unit, up=coordinates.up))
+    clip = steady(parse_bvh(data, where, unit=coordinates.unit, up=coordinates.up))
+    if coordinates.rest_pose == "t":
+        return clip
+    from marey.motion.rest_pose import change_rest_pose
+
+    return change_rest_pose(clip, "t")
 
 
 EXPORTER = Exporter(

@@ -13,6 +13,7 @@ from marey.motion.files import read_limited, write_atomically
 from marey.motion.io.bvh import BvhClip
 from marey.motion.io.convert import clip_from_bvh, resample_bvh
 from marey.motion.resample import resample
+from marey.motion.rest_pose import RestPose
 from marey.motion.units import Unit, Up
 
 
@@ -23,8 +24,10 @@ def convert(
     fps: float | None = None,
     unit: Unit = "cm",
     up: Up = "y",
+    rest_pose: RestPose = "t",
     source_unit: Unit = "cm",
     source_up: Up = "y",
+    source_rest_pose: RestPose = "t",
     overwrite: bool = False,
 ) -> tuple[str, ...]:
     """Convert a motion file; the extensions of the names tell the formats.
@@ -32,15 +35,17 @@ def convert(
     Args:
         source, target: files of installed formats, such as `.bvh` and `.npz`.
         fps: rate of the result, in frames a second; None = the source's.
-        unit, up: of a result whose format leaves them open, such as BVH; npz is always metres and Y up.
-        source_unit, source_up: of such a source.
+        unit, up, rest_pose: of a result whose format leaves them open, such as BVH; npz is always metres, Y up and a
+            T-pose.
+        source_unit, source_up, source_rest_pose: of such a source.
         overwrite: replace an existing file.
 
     Returns:
         Notes on oddities of a BVH source.
 
     Raises:
-        InvalidInput: a format that is unknown or write-only, or a rate out of bounds.
+        InvalidInput: a format that is unknown or write-only, a rate out of bounds, or a skeleton without that rest
+            pose.
         Conflict: the target exists.
         NotFound, InvalidFile, TooLarge: from reading.
     """
@@ -48,7 +53,7 @@ def convert(
     reader, writer = _exporter_for(source), _exporter_for(target)
     if target.exists() and not overwrite:
         raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
-    clip = _decode(reader, source, Coordinates(source_unit, source_up))
+    clip = _decode(reader, source, Coordinates(source_unit, source_up, source_rest_pose))
     notes: tuple[str, ...] = ()
     if isinstance(clip, BvhClip):
         notes = clip.notes
@@ -56,7 +61,7 @@ def convert(
         clip = clip if writer is reader else clip_from_bvh(clip, source.name)
     elif fps is not None:
         clip = resample(clip, fps)
-    write_atomically(target, writer.encode(clip, Coordinates(unit, up)))
+    write_atomically(target, writer.encode(clip, Coordinates(unit, up, rest_pose)))
     return notes
 
 

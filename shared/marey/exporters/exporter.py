@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.rest_pose import RestPose
     from marey.motion.units import Unit, Up
 
 Decoded = TypeVar("Decoded")
@@ -20,11 +21,12 @@ _EXTENSION = re.compile(r"[a-z0-9]{1,9}")
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Unit of length and upward axis of a file whose format does not state them, such as BVH; other formats ignore
-    them."""
+    """Unit of length, upward axis and rest pose of a file whose format leaves them open, such as BVH; other formats
+    ignore them."""
 
     unit: Unit = "cm"
     up: Up = "y"
+    rest_pose: RestPose = "t"
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput, NotFound
 from marey.motion.filters import smooth
-from marey.motion.kinematics import across, facing
+from marey.motion.kinematics import across, facing, mirror_joints
+from marey.motion.rig_features import SNAPMOGEN_296
 from marey.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
 from marey.motion.skeleton import HUMANML3D, KIT, Skeleton
 
@@ -83,6 +84,16 @@ class FeatureLayout(Protocol):
         ...
 
 
+@runtime_checkable
+class PosedLayout(FeatureLayout, Protocol):
+    """Port of layouts whose features hold the rotations of the skeleton: no pose is solved from positions."""
+
+    def decode_pose(self, features: Array) -> tuple[Array, Array]:
+        """Decode features (..., Tf, D) to local quaternions (..., Tf, J, 4) and root (..., Tf, 3) in metres, facing +Z
+        in frame 0."""
+        ...
+
+
 def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
     """Canonicalize a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
 
@@ -96,11 +107,6 @@ def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
     joints -= [joints[0, 0, 0], joints[..., 1].min(), joints[0, 0, 2]]
     forward = facing(joints[0], skeleton)
     return rotate(about("Y", -np.arctan2(forward[0], forward[2])), joints)
-
-
-def mirror_joints(joints: Array, skeleton: Skeleton) -> Array:
-    """Mirror joints (..., J, 3): x changes sign, and each joint takes the other side's place."""
-    return joints[..., list(skeleton.mirror), :] * np.array([-1, 1, 1], joints.dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,7 +352,7 @@ KIT_251 = HeadingLayout(
     unit=0.001,
 )
 
-LAYOUTS: Mapping[str, FeatureLayout] = {each.name: each for each in (HUMANML3D_263, KIT_251)}
+LAYOUTS: Mapping[str, FeatureLayout] = {each.name: each for each in (HUMANML3D_263, KIT_251, SNAPMOGEN_296)}
 
 
 def layout(name: str) -> FeatureLayout:

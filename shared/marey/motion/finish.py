@@ -1,4 +1,8 @@
-"""Turn a model's features into a finished clip: decode, solve onto the body, resample, clean the feet, solve again."""
+"""Turn a model's features into a finished clip: decode, solve onto the body, resample, clean the feet, solve again.
+
+A layout with the rotations of its skeleton (`PosedLayout`) gives the pose itself: nothing is solved from positions, and
+after the clean-up only the bones that it moved are turned.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +13,13 @@ from marey.core.errors import InvalidInput
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.bones import bone_fit
 from marey.motion.clip import MotionClip
-from marey.motion.features import FeatureLayout
+from marey.motion.features import FeatureLayout, PosedLayout
 from marey.motion.feet import clean_feet, find_contacts, need_feet
 from marey.motion.hands import join_hands, wrist_distance
 from marey.motion.kinematics import forward_kinematics
-from marey.motion.pose import checked_joints, solve_pose
+from marey.motion.pose import aim_bones, checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
-from marey.motion.rotations import Array
+from marey.motion.rotations import Array, unroll
 
 
 def finish_motion(
@@ -29,10 +33,10 @@ def finish_motion(
 ) -> MotionClip:
     """Finish a generated motion: the bones of one body, and joints that equal the forward kinematics of the rotations.
 
-    The pose is solved on the skeleton of the training data, which the model learned, and turned to rotations; the body
-    takes those, and its travel is scaled by the length of its legs. Feet are cleaned at the rate of the output, after
-    resampling, so that they stand still there too; hands that meet are brought as near as they were decoded; the second
-    solution is exact.
+    The pose is solved on the skeleton of the training data, which the model learned, and turned to rotations, unless
+    the layout holds them; the body takes those, and its travel is scaled by the length of its legs. Feet are cleaned at
+    the rate of the output, after resampling, so that they stand still there too; hands that meet are brought as near as
+    they were decoded; the second solution is exact.
 
     Args:
         features: (Tf, D) as generated, not normalized.
@@ -54,9 +58,9 @@ def finish_motion(
     body = body or standard_body(training)
     skeleton = body.skeleton
     decoded = checked_joints(layout.decode(features), training)
-    pose = solve_pose(bone_fit(training).fit(decoded), training, fps=layout.fps, measure=False)
+    rotations, root = _pose(features, decoded, layout)
     scale = travel_scale(training, skeleton)
-    rotations, root = pose.rotations, scale * pose.root
+    root = scale * root
     hands = scale * wrist_distance(decoded, training)
     if rate != layout.fps:
         times = frame_times(len(root), layout.fps, rate)
@@ -65,8 +69,12 @@ def finish_motion(
     joints = forward_kinematics(skeleton, rotations, root)
     if clean:
         joints, contacts = clean_feet(joints, skeleton, rate)
-        pose = solve_pose(join_hands(joints, hands, skeleton), skeleton, fps=rate, measure=False)
-        rotations, root = pose.rotations, pose.root
+        joints = join_hands(joints, hands, skeleton)
+        if isinstance(layout, PosedLayout):
+            rotations, root = aim_bones(joints, rotations, skeleton), joints[:, 0]
+        else:
+            pose = solve_pose(joints, skeleton, fps=rate, measure=False)
+            rotations, root = pose.rotations, pose.root
     else:
         contacts = find_contacts(joints, skeleton, rate)
     return MotionClip.of(
@@ -79,3 +87,13 @@ def finish_motion(
         features_fps=layout.fps,
         manifest=manifest,
     )
+
+
+def _pose(features: Array, decoded: Array, layout: FeatureLayout) -> tuple[Array, Array]:
+    """Return rotations (Tf, J, 4) and root (Tf, 3) of features: the layout's own, or those that are solved from its
+    joints (Tf, J, 3)."""
+    if isinstance(layout, PosedLayout):
+        rotations, root = layout.decode_pose(features)
+        return unroll(rotations), root
+    pose = solve_pose(bone_fit(layout.skeleton).fit(decoded), layout.skeleton, fps=layout.fps, measure=False)
+    return pose.rotations, pose.root

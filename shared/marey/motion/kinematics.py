@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.rotations import Array, cross, multiply, normalize, rotate
+from marey.motion.rotations import Array, conjugate, cross, multiply, normalize, rotate
 from marey.motion.skeleton import Skeleton
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -17,6 +17,14 @@ def global_rotations(skeleton: Skeleton, rotations: Array) -> Array:
     for level in skeleton.levels[1:]:
         world[:, level] = multiply(world[:, parents[level]], world[:, level])
     return world
+
+
+def local_rotations(skeleton: Skeleton, world: Array) -> Array:
+    """Convert world quaternions (..., J, 4) to local ones."""
+    local = np.array(world, np.float64)
+    parents = np.array(skeleton.parents[1:])
+    local[..., 1:, :] = multiply(conjugate(world[..., parents, :]), world[..., 1:, :])
+    return local
 
 
 def forward_kinematics(
@@ -64,3 +72,8 @@ def facing(joints: Array, skeleton: Skeleton) -> Array:
     """Return the facing direction of the body: unit vectors (..., 3) in the floor plane, up x across."""
     right = across(joints, skeleton)
     return normalize(cross(UP, right))
+
+
+def mirror_joints(joints: Array, skeleton: Skeleton) -> Array:
+    """Mirror joints (..., J, 3): x changes sign, and each joint takes the other side's place."""
+    return joints[..., list(skeleton.mirror), :] * np.array([-1, 1, 1], joints.dtype)

@@ -12,9 +12,9 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.motion.filters import smooth
-from marey.motion.kinematics import bone_lengths
+from marey.motion.kinematics import bone_lengths, global_rotations, local_rotations
 from marey.motion.rigid import bodies_of, fit_rotation, rest_vectors
-from marey.motion.rotations import Array, conjugate, normalize, rotate, unroll
+from marey.motion.rotations import Array, between, conjugate, multiply, normalize, rotate, unroll
 from marey.motion.skeleton import Skeleton
 from marey.motion.solver import FrameSolver
 
@@ -64,6 +64,32 @@ def solve_pose(joints: Array, skeleton: Skeleton, *, fps: float = 20.0, measure:
         skeleton = skeleton.with_offsets(measure_offsets(joints, skeleton))
     local, places = FrameSolver(skeleton).solve(joints, _WholeClip(fps))
     return Pose(skeleton, unroll(local), joints[:, 0].copy(), places)
+
+
+def aim_bones(joints: Array, rotations: Array, skeleton: Skeleton) -> Array:
+    """Turn a pose the shortest way until its bones point at joints that were moved a little.
+
+    Rigid bodies (hips, chest) keep their rotation: they may have been shifted, not turned. A joint without children
+    turns with the bone that ends in it.
+
+    Args:
+        joints: (T, J, 3) metres, with the bone lengths of the skeleton.
+        rotations: (T, J, 4) local quaternions of the pose before.
+
+    Returns:
+        (T, J, 4) local quaternions, continuous in sign.
+    """
+    before = global_rotations(skeleton, rotations)
+    world = before.copy()
+    for j, children in enumerate(skeleton.children):
+        if len(children) == 1:
+            bone = rotate(before[:, j], skeleton.offsets[children[0]].astype(np.float64))
+            aim = joints[:, children[0]] - joints[:, j]
+            world[:, j] = multiply(between(bone, aim), before[:, j])
+        elif not children:
+            above = skeleton.parents[j]
+            world[:, j] = multiply(multiply(world[:, above], conjugate(before[:, above])), before[:, j])
+    return unroll(local_rotations(skeleton, world))
 
 
 def checked_joints(joints: Array, skeleton: Skeleton) -> Array:

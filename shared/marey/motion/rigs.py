@@ -10,6 +10,7 @@ import re
 
 from marey.motion.skeleton import Skeleton
 
+_KINDS = frozenset({"bind", "jnt", "joint"})  # Maya's rigs say what a node is, as in `L_foot0001_bind_JNT`
 _SIDES = {"l": 0, "left": 0, "r": 1, "right": 1}
 # In order of confidence: `shoulder` is the upper arm in SMPL and the collar bone elsewhere, `hip` the thigh in some.
 _PARTS = {
@@ -24,6 +25,7 @@ def _words(name: str) -> tuple[int | None, str]:
     """Return the side (0 left, 1 right, None) of a joint's name, and its other words without numbers."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name.rsplit(":", 1)[-1])
     words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
+    words = [w for w in words if w not in _KINDS]
     words = " ".join(words).replace("upperarm", "upper arm").replace("upleg", "up leg").replace("upperleg", "upper leg")
     words = words.replace("toebase", "toe base").replace("forearm", "fore-arm").split()
     side = next((_SIDES[w] for w in words if w in _SIDES), None)

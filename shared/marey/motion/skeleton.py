@@ -194,41 +194,42 @@ KIT = _sided(
     facing=("RH", "LH", "RS", "LS"),
 )
 
-# SnapMoGen's rig (Guo et al. 2025). Its "centimetres" are a rig scale (the character is about 1.1 m high), kept as
-# published: scale on export.
+# SnapMoGen's rig (Guo et al. 2025): names and T-pose of its files, to the last digit, so left and right differ by
+# micrometres. Its "centimetres" are a rig scale (the character is about 1.1 m high), kept as published: `standard_body`
+# scales it.
 SNAPMOGEN = _sided(
     "snapmogen",
     """
-    ROOT            -              0       56.02   -5.659
-    C_spine0001     ROOT           0        1.619   0
-    C_spine0002     C_spine0001    0        4.942   0
-    C_spine0003     C_spine0002    0        4.8606  0
-    C_neck0001      C_spine0003    0       17.026   0
-    C_neck0002      C_neck0001     0        3.25    0
-    C_head          C_neck0002     0        5.278   0
-    L_clavicle      C_spine0003    4.59    12.067   0.834
-    L_armUpper0001  L_clavicle     7.8296  -0.0005 -3.4524
-    L_armLower0001  L_armUpper0001 16.585   0       0.0015
-    L_hand0001      L_armLower0001 16.988   0       0.0015
-    R_clavicle      C_spine0003    =
-    R_armUpper0001  R_clavicle     =
-    R_armLower0001  R_armUpper0001 =
-    R_hand0001      R_armLower0001 =
-    C_pelvis0001    ROOT           0        0       0
-    L_legUpper0001  C_pelvis0001   6.6     -6.027   0.539
-    L_legLower0001  L_legUpper0001 -0.143 -19.187   0.040
-    L_foot0001      L_legLower0001 -0.134 -18.034  -1.045
-    L_foot0002      L_foot0001     0       -5.392   9.603
-    R_legUpper0001  C_pelvis0001   =
-    R_legLower0001  R_legUpper0001 =
-    R_foot0001      R_legLower0001 =
-    R_foot0002      R_foot0001     =
+    ROOT                     -                         0          56.02      -5.659234
+    C_spine0001_bind_JNT     ROOT                      0           1.618999   0
+    C_spine0002_bind_JNT     C_spine0001_bind_JNT      0           4.942001   0
+    C_spine0003_bind_JNT     C_spine0002_bind_JNT      0           4.860626   0
+    C_neck0001_bind_JNT      C_spine0003_bind_JNT      0          17.026009   0
+    C_neck0002_bind_JNT      C_neck0001_bind_JNT       0           3.249977   0
+    C_head_bind_JNT          C_neck0002_bind_JNT       0           5.278008   0
+    L_clavicle_bind_JNT      C_spine0003_bind_JNT      4.59       12.066994   0.834
+    L_armUpper0001_bind_JNT  L_clavicle_bind_JNT       7.829616   -0.000488  -3.452442
+    L_armLower0001_bind_JNT  L_armUpper0001_bind_JNT  16.585003    0          0.001477
+    L_hand0001_bind_JNT      L_armLower0001_bind_JNT  16.988001   -0.000008   0.001513
+    R_clavicle_bind_JNT      C_spine0003_bind_JNT     -4.59       12.066994   0.834
+    R_armUpper0001_bind_JNT  R_clavicle_bind_JNT      -7.829616   -0.000496  -3.452442
+    R_armLower0001_bind_JNT  R_armUpper0001_bind_JNT -16.584999   -0.000008   0.001476
+    R_hand0001_bind_JNT      R_armLower0001_bind_JNT -16.987003    0          0.001518
+    C_pelvis0001_bind_JNT    ROOT                      0           0          0
+    L_legUpper0001_bind_JNT  C_pelvis0001_bind_JNT     6.599999   -6.027      0.539001
+    L_legLower0001_bind_JNT  L_legUpper0001_bind_JNT  -0.142964  -19.187426   0.040265
+    L_foot0001_bind_JNT      L_legLower0001_bind_JNT  -0.134372  -18.034275  -1.044868
+    L_foot0002_bind_JNT      L_foot0001_bind_JNT      -0.000058   -5.392303   9.602907
+    R_legUpper0001_bind_JNT  C_pelvis0001_bind_JNT    -6.6        -6.027      0.539
+    R_legLower0001_bind_JNT  R_legUpper0001_bind_JNT   0.14296   -19.187145   0.04055
+    R_foot0001_bind_JNT      R_legLower0001_bind_JNT   0.13437   -18.034281  -1.044816
+    R_foot0002_bind_JNT      R_foot0001_bind_JNT       0.000053   -5.392302   9.602905
     """,
     scale=0.01,
     left="L_",
     right="R_",
-    feet=("L_foot0001", "L_foot0002", "R_foot0001", "R_foot0002"),
-    facing=("R_legUpper0001", "L_legUpper0001", "R_armUpper0001", "L_armUpper0001"),
+    feet=("L_foot0001_bind_JNT", "L_foot0002_bind_JNT", "R_foot0001_bind_JNT", "R_foot0002_bind_JNT"),
+    facing=("R_legUpper0001_bind_JNT", "L_legUpper0001_bind_JNT", "R_armUpper0001_bind_JNT", "L_armUpper0001_bind_JNT"),
 )
 
 SKELETONS: dict[str, Skeleton] = {s.name: s for s in (HUMANML3D, KIT, SNAPMOGEN)}

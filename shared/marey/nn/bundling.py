@@ -49,6 +49,7 @@ def write_generator(
     text: TextSpec,
     card: str | None = None,
     overwrite: bool = False,
+    dtype: type[np.floating] = np.float16,
     **manifest: Any,
 ) -> Bundle:
     """Write a bundle from the parts' state dicts.
@@ -62,12 +63,13 @@ def write_generator(
         text: encoder, labeller and caps.
         card: the model card.
         overwrite: replace an existing bundle.
+        dtype: of the stored tensors; imported weights are kept in float32, so that published figures can be repeated.
         manifest: licence, data, metrics, training, random, version.
     """
     skeleton = layout(config.layout).skeleton  # of the prepared data, whose every clip has these bones
     with BundleWriter(path, overwrite=overwrite) as writer:
         for name, state in parts.items():
-            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if stored(k)})
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if stored(k)}, dtype=dtype)
         writer.add_statistics(*statistics)
         if card is not None:
             writer.add_card(card)

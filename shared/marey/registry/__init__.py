@@ -1,5 +1,6 @@
 """Plug-in registries: what an installed distribution adds to the product by an entry point. Standard library only."""
 
+from marey.registry.imports import ImportKind
 from marey.registry.models import (
     Ablation,
     LengthLimits,
@@ -8,6 +9,7 @@ from marey.registry.models import (
     Variety,
     find_model,
     get_model,
+    import_kinds,
     model_names,
     resolve,
     streaming_models,
@@ -19,6 +21,7 @@ from marey.registry.training import Choice, Stage, Training
 __all__ = [
     "Ablation",
     "Choice",
+    "ImportKind",
     "LengthLimits",
     "ModelSpec",
     "PlugIns",
@@ -28,6 +31,7 @@ __all__ = [
     "Variety",
     "find_model",
     "get_model",
+    "import_kinds",
     "model_names",
     "resolve",
     "streaming_models",

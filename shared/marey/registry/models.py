@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import Any
 
 from marey.core.errors import InvalidInput, NotFound, PluginError
+from marey.registry.imports import IMPORTS, ImportKind
 from marey.registry.plugins import PlugIns
 from marey.registry.training import TRAININGS, Training
 
@@ -131,6 +132,7 @@ class ModelSpec:
         live_adherence: `(generator, prompts, *, steers, walks) -> {title: sessions}`; see `marey eval adherence`.
         self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> number of kept motions`.
         ablations: comparisons for `marey train ablate`.
+        imports: kinds of published weights that become its bundles by `marey models import`.
     """
 
     name: str
@@ -151,6 +153,7 @@ class ModelSpec:
     live_adherence: str | None = None
     self_train: str | None = None
     ablations: tuple[Ablation, ...] = ()
+    imports: tuple[ImportKind, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the name and the settings that a variety changes.
@@ -228,6 +231,25 @@ def trainings() -> dict[str, Training]:
             )
         found[name] = training
     return found
+
+
+def import_kinds() -> dict[str, ImportKind]:
+    """All kinds of published weights that can be imported here, by name, sorted: of models, and what else is
+    registered.
+
+    Raises:
+        PluginError: a plug-in cannot be loaded, or two kinds have one name.
+    """
+    found: dict[str, ImportKind] = {}
+    kinds = [kind for spec in MODELS.all().values() for kind in spec.imports]
+    for kind in [*kinds, *IMPORTS.all().values()]:
+        if found.setdefault(kind.name, kind) is not kind:
+            raise PluginError(
+                f"two kinds of import have the name {kind.name!r}: {found[kind.name].run} and {kind.run}",
+                where=f"entry points {GROUP} and {IMPORTS.group}",
+                hint="Uninstall the package of one of them.",
+            )
+    return dict(sorted(found.items()))
 
 
 def resolve(reference: str) -> Any:

@@ -3,7 +3,7 @@ the parser that GraphMotion and HGM³ used.
 
 BERT over the words' pieces, the predicate marked by token type 1, one linear layer to BIO tags, Viterbi over the
 probabilities. AllenNLP took its predicates from spaCy's part-of-speech tagger; here they come from the `light`
-labeller, which learned them from that tool's output. Import the archive once with `python -m marey.text.convert`.
+labeller, which learned them from that tool's output. `marey models import allennlp-srl` imports the archive.
 """
 
 from __future__ import annotations

@@ -30,14 +30,7 @@ class ClipEncoder:
     def __init__(self, folder: Path) -> None:
         from transformers import CLIPTextModelWithProjection, CLIPTokenizer
 
-        config = read_config(folder)
-        text = config.get("text_config") or config
-        if not str(config.get("model_type", "")).startswith("clip") or text.get("hidden_size") != self.width:
-            raise InvalidFile(
-                "is not the text tower of CLIP ViT-B/32 (hidden size 512)",
-                where=str(folder),
-                hint="The folder needs the files of openai/clip-vit-base-patch32.",
-            )
+        check_clip(folder)
         self.sha256 = weights_sha256(folder)
         self._tokenizer: Any = load_pretrained(CLIPTokenizer, folder)
         self._model: Any = load_pretrained(CLIPTextModelWithProjection, folder, weights=True)
@@ -61,3 +54,19 @@ class ClipEncoder:
     def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """One by one, as `pooled`."""
         return [self.encode(text).tokens for text in texts]
+
+
+def check_clip(folder: Path) -> None:
+    """Check that the configuration in a folder is that of CLIP ViT-B/32.
+
+    Raises:
+        InvalidFile: it is missing, or of another model.
+    """
+    config = read_config(folder)
+    text = config.get("text_config") or config
+    if not str(config.get("model_type", "")).startswith("clip") or text.get("hidden_size") != WIDTHS["clip-vit-b32"]:
+        raise InvalidFile(
+            "is not the text tower of CLIP ViT-B/32 (hidden size 512)",
+            where=str(folder),
+            hint="The folder needs the files of openai/clip-vit-base-patch32.",
+        )

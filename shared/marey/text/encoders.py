@@ -125,7 +125,8 @@ def find_weights(name: str, *, config: Settings | None = None) -> Path:
     raise NotFound(
         f"the weights of the text encoder {name!r} are not on this machine",
         where=str(places[0]),
-        hint=f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names.",
+        hint=f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names, or import its "
+        f"files: `marey models import {name} FOLDER -o {name}`.",
     )
 
 
@@ -149,7 +150,7 @@ def weights_sha256(folder: Path) -> str:
         raise InvalidFile(
             "holds no safetensors file",
             where=str(folder),
-            hint="Pickled weights are not loaded: convert them once with `python -m marey.text.convert`.",
+            hint="Pickled weights are not loaded: import them once with `marey models import`.",
         )
     hashes = [_file_sha256(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()

@@ -54,7 +54,7 @@ def load_labeller(name: str) -> RoleLabeller:
         bundle = find_bundle(labeller_bundle(name))
     except NotFound as error:
         if name == "bert-srl":
-            error.hint = "Import AllenNLP's archive once: `python -m marey.text.convert bert-srl --help`."
+            error.hint = "Import AllenNLP's archive once: `marey models import allennlp-srl`."
         raise
     model = bundle.manifest.model
     if bundle.manifest.kind == "labeller" and model == "light":

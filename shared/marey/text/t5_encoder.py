@@ -26,18 +26,9 @@ class T5Encoder:
     def __init__(self, name: str, folder: Path) -> None:
         from transformers import AutoTokenizer, T5EncoderModel
 
+        check_t5(name, folder)
         self.name = name
         self.width = WIDTHS[name]
-        config = read_config(folder)
-        feed_forward = config.get("feed_forward_proj", "relu")
-        if config.get("model_type") != "t5" or config.get("d_model") != self.width:
-            raise InvalidFile(f"is not T5 of width {self.width}", where=str(folder), hint=f"It needs {HUB[name]}.")
-        if feed_forward != FEED_FORWARD[name]:
-            raise InvalidFile(
-                f"is not {name}: its feed-forward is {feed_forward!r}, not {FEED_FORWARD[name]!r}",
-                where=str(folder),
-                hint=f"t5-base and t5-v1_1-base are different models of the same width; it needs {HUB[name]}.",
-            )
         self.sha256 = weights_sha256(folder)
         self._tokenizer: Any = load_pretrained(AutoTokenizer, folder)
         self._model: Any = load_pretrained(T5EncoderModel, folder, weights=True)
@@ -60,3 +51,21 @@ class T5Encoder:
     def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """One by one, as `pooled`."""
         return [self.encode(text).tokens for text in texts]
+
+
+def check_t5(name: str, folder: Path) -> None:
+    """Check that the configuration in a folder is that of this T5.
+
+    Raises:
+        InvalidFile: it is missing, of another model, or of the other version of T5.
+    """
+    config = read_config(folder)
+    feed_forward = config.get("feed_forward_proj", "relu")
+    if config.get("model_type") != "t5" or config.get("d_model") != WIDTHS[name]:
+        raise InvalidFile(f"is not T5 of width {WIDTHS[name]}", where=str(folder), hint=f"It needs {HUB[name]}.")
+    if feed_forward != FEED_FORWARD[name]:
+        raise InvalidFile(
+            f"is not {name}: its feed-forward is {feed_forward!r}, not {FEED_FORWARD[name]!r}",
+            where=str(folder),
+            hint=f"t5-base and t5-v1_1-base are different models of the same width; it needs {HUB[name]}.",
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,12 +13,13 @@ import torch
 import torch.nn.functional as F
 
 from marey.bundles import Bundle
-from marey.core.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
+from marey.core.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput, MareyError, NotFound
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.t2m import T2MEvaluator
-from marey.evaluator.t2m_import import import_t2m, main
+from marey.evaluator.t2m_import import import_t2m
 from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
+from marey.importing import ImportRequest
 
 SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
 VOCABULARY = ["a", "person", "walk", "left", "unk", "sos", "eos", "wave"]
@@ -55,6 +57,14 @@ PUBLIC = {
 State = Mapping[str, torch.Tensor]
 
 
+def request(folder: Path, output: Path) -> ImportRequest:
+    return ImportRequest("t2m-evaluator", folder, output, "LicenseRef-AMASS-NC")
+
+
+def import_small(folder: Path, output: Path) -> Bundle:
+    return import_t2m(request(folder, output), SMALL)
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The public folders in small, with random numbers."""
@@ -86,7 +96,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bundle(files: Path) -> Bundle:
-    import_t2m(files, files / "glove", files / "t2m-small", SMALL)
+    import_small(files, files / "t2m-small")
     return Bundle.open(files / "t2m-small")
 
 
@@ -305,7 +315,7 @@ def test_files_of_exactly_the_public_names_shapes_and_entries_become_an_evaluato
     for name in ("our_vab_words.pkl", "our_vab_idx.pkl"):
         (glove / name).write_bytes((files / "glove" / name).read_bytes())
     np.save(glove / "our_vab_data.npy", np.random.default_rng(1).normal(size=(len(VOCABULARY) + 3, 300)))
-    made = import_t2m(tmp_path, glove, tmp_path / "bundle")
+    made = import_t2m(request(tmp_path, tmp_path / "bundle"))
     evaluator = load_evaluator(made, device="cpu", captions=files / "texts")
     features = motion(75)
     expected = embedded_by_hand(files, drawn, features)
@@ -313,45 +323,91 @@ def test_files_of_exactly_the_public_names_shapes_and_entries_become_an_evaluato
     assert evaluator.embed_text(list(CAPTIONS)).shape == (3, 512)
 
 
-def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(files: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def download(files: Path, tmp_path: Path) -> Path:
+    """A copy of the public folders that a test may break, as they lie in the download."""
+    root = tmp_path / "download"
+    for name in ("text_mot_match", "Comp_v6_KLD005"):
+        shutil.copytree(files / name, root / "checkpoints" / "t2m" / name)
+    shutil.copytree(files / "glove", root / "glove")
+    return root
+
+
+@pytest.mark.parametrize("named", [".", "checkpoints", "checkpoints/t2m"])
+def test_the_folder_of_the_download_is_found_from_any_of_its_levels(
+    download: Path, bundle: Bundle, tmp_path: Path, named: str
+) -> None:
+    made = import_small(download / named, tmp_path / "bundle")
+    assert made.weights_sha256 == bundle.weights_sha256
+    card = (tmp_path / "bundle" / "README.md").read_text(encoding="utf-8")
+    assert "text_mot_match/model/finest.tar" in card
+
+
+def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(download: Path, tmp_path: Path) -> None:
     class Evil:
         def __reduce__(self):
             return (Path.touch, (tmp_path / "touched",))
 
-    for name in ("our_vab_data.npy", "our_vab_idx.pkl"):
-        (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
-    (tmp_path / "our_vab_words.pkl").write_bytes(pickle.dumps([Evil()]))
+    (download / "glove" / "our_vab_words.pkl").write_bytes(pickle.dumps([Evil()]))
     with pytest.raises(InvalidFile, match="is not a plain list or dictionary: refused"):
-        import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
+        import_small(download, tmp_path / "bundle")
     assert not (tmp_path / "touched").exists()
     assert not (tmp_path / "bundle").exists()
 
 
-def test_a_checkpoint_that_is_none_or_of_other_sizes_is_refused(files: Path, tmp_path: Path) -> None:
-    with pytest.raises(InvalidFile, match="movement_encoder does not fit the public evaluator"):
-        import_t2m(files, files / "glove", tmp_path / "bundle")
-    with pytest.raises(InvalidFile, match=r"finest\.tar: cannot be read safely"):
-        import_t2m(tmp_path, files / "glove", tmp_path / "bundle", SMALL)
-    file = tmp_path / "text_mot_match" / "model" / "finest.tar"
-    file.parent.mkdir(parents=True)
-    torch.save([1, 2], file)
-    with pytest.raises(InvalidFile, match="is not a checkpoint"):
-        import_t2m(tmp_path, files / "glove", tmp_path / "bundle", SMALL)
+def break_download(download: Path, change: str) -> None:
+    file = download / "checkpoints" / "t2m" / "text_mot_match" / "model" / "finest.tar"
+    weights = torch.load(file, weights_only=True)
+    if change == "missing weights":
+        file.unlink()
+    elif change == "missing words":
+        shutil.rmtree(download / "glove")
+    elif change == "truncated":
+        file.write_bytes(file.read_bytes()[:500])
+    elif change == "nan":
+        weights["text_encoder"]["hidden"][0, 0, 0] = torch.nan
+        torch.save(weights, file)
+    elif change == "list":
+        torch.save([1, 2], file)
+    elif change == "pickled":
+        torch.save(torch.nn.Linear(2, 2), file)
+    elif change == "unknown":
+        torch.save({**weights, "more": {"weight": torch.ones(2)}}, file)
+    elif change == "statistics":
+        np.save(download / "checkpoints" / "t2m" / "Comp_v6_KLD005" / "meta" / "std.npy", np.ones(262))
+    elif change == "vectors":
+        np.save(download / "glove" / "our_vab_data.npy", np.zeros((4, 5)))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "said"),
+    [
+        ("missing weights", NotFound, r"the evaluator is missing: there is no text_mot_match/model/finest\.tar"),
+        ("missing words", NotFound, r"the folder of word vectors is missing: there is no glove or \.\./glove"),
+        ("truncated", InvalidFile, "truncated"),
+        ("nan", InvalidFile, "hidden holds NaN"),
+        ("list", InvalidFile, "holds list, not a dictionary"),
+        ("pickled", InvalidFile, "holds code or objects of Python"),
+        ("unknown", InvalidFile, "holds tensors that this import does not know: more"),
+        ("statistics", InvalidFile, r"has shape \(262,\), not \(263\)"),
+        ("vectors", InvalidFile, "has 4 vectors, which do not fit the words"),
+    ],
+)
+def test_a_broken_download_is_refused_and_leaves_nothing(
+    download: Path, tmp_path: Path, change: str, kind: type[MareyError], said: str
+) -> None:
+    break_download(download, change)
+    with pytest.raises(kind, match=said) as caught:
+        import_small(download, tmp_path / "models" / "bundle")
+    assert caught.value.where
+    assert not (tmp_path / "models").exists()
+
+
+def test_a_checkpoint_of_other_sizes_is_refused_and_a_bundle_is_not_replaced(files: Path, tmp_path: Path) -> None:
+    with pytest.raises(InvalidFile, match=r"main\.0\.weight has shape \(12, 259, 4\), not \(512, 259, 4\)"):
+        import_t2m(request(files, tmp_path / "bundle"))
     with pytest.raises(Conflict):
-        import_t2m(files, files / "glove", files / "t2m-small", SMALL)
-
-
-def test_words_without_a_vector_are_refused(files: Path, tmp_path: Path) -> None:
-    for name in ("our_vab_words.pkl", "our_vab_idx.pkl"):
-        (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
-    np.save(tmp_path / "our_vab_data.npy", np.zeros((4, 5)))
-    with pytest.raises(InvalidFile, match=r"vectors of shape \(4, 5\) do not fit"):
-        import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
-
-
-def test_the_command_line_tells_what_was_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path), "--glove", str(tmp_path), "-o", str(tmp_path / "out")]) == 2
-    assert "cannot be read safely" in capsys.readouterr().err
+        import_small(files, files / "t2m-small")
 
 
 def test_a_bundle_of_another_evaluator_or_layout_is_refused(bundle: Bundle) -> None:

@@ -29,7 +29,9 @@ def test_trees_are_the_published_ones():
     assert (len(HUMANML3D), len(KIT), len(SNAPMOGEN)) == (22, 21, 24)
     assert (HUMANML3D.feet, HUMANML3D.facing) == ((7, 10, 8, 11), (2, 1, 17, 16))
     assert (KIT.feet, KIT.facing) == ((19, 20, 14, 15), (11, 16, 5, 8))
-    assert [SNAPMOGEN.joint_names.index(n) for n in ("L_clavicle", "C_pelvis0001", "R_foot0002")] == [7, 15, 23]
+    assert [
+        SNAPMOGEN.joint_names.index(n) for n in ("L_clavicle_bind_JNT", "C_pelvis0001_bind_JNT", "R_foot0002_bind_JNT")
+    ] == [7, 15, 23]
 
 
 def test_humanml3d_mirrors_the_published_pairs():
@@ -39,8 +41,9 @@ def test_humanml3d_mirrors_the_published_pairs():
 @pytest.mark.parametrize("skeleton", SKELETONS.values(), ids=SKELETONS)
 def test_the_t_pose_is_symmetrical_faces_z_and_stands(skeleton):
     rest = skeleton.rest
-    np.testing.assert_allclose(rest[list(skeleton.mirror)] * [-1, 1, 1], rest, atol=1e-6)
-    np.testing.assert_allclose(facing(rest.astype(float), skeleton), [0, 0, 1], atol=1e-6)
+    off = 2e-5 if skeleton is SNAPMOGEN else 1e-6  # its published hands are 10 micrometres apart
+    np.testing.assert_allclose(rest[list(skeleton.mirror)] * [-1, 1, 1], rest, atol=off)
+    np.testing.assert_allclose(facing(rest.astype(float), skeleton), [0, 0, 1], atol=off)
     left_toe, left_ankle = skeleton.feet[1], skeleton.feet[0]
     assert rest[left_toe, 2] > rest[left_ankle, 2]
     assert rest[left_toe, 0] > 0, "left is +X"

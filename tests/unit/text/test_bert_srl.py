@@ -14,9 +14,10 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.core.errors import InvalidBundle, InvalidFile
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from marey.importing import ImportRequest, run_import
+from marey.importing.allennlp import import_allennlp
 from marey.text.bert_srl import BertLabeller
-from marey.text.convert import convert_encoder, import_bert_srl, main
 from marey.text.roles import Frame
 from marey.text.wordpiece import WordPieces
 
@@ -49,6 +50,10 @@ def bert(tmp_path: Path) -> Path:
     (folder / "config.json").write_text(json.dumps(config.to_dict()))
     (folder / "vocab.txt").write_text("\n".join(VOCABULARY) + "\n")
     return folder
+
+
+def import_bert_srl(archive: Path, bert: Path | None, output: Path) -> Bundle:
+    return import_allennlp(ImportRequest("allennlp-srl", archive, output, "Apache-2.0", bert))
 
 
 def bert_of(folder: Path) -> BertModel:
@@ -137,40 +142,50 @@ def test_text_past_bert_s_positions_has_no_role(archive: Path, bert: Path, tmp_p
 
 def test_pickle_that_is_no_tensors_is_refused(archive: Path, bert: Path, tmp_path: Path) -> None:
     (archive / "weights.th").write_bytes(pickle.dumps({"a": Path("x")}, protocol=2))
-    with pytest.raises(InvalidFile, match="safely"):
+    with pytest.raises(InvalidFile, match=r"holds code or objects of Python|cannot be read"):
         import_bert_srl(archive, bert, tmp_path / "srl-bert")
     assert not (tmp_path / "srl-bert").exists()
 
 
 def test_an_archive_without_labels_is_refused(archive: Path, bert: Path, tmp_path: Path) -> None:
     (archive / "vocabulary" / "labels.txt").unlink()
-    with pytest.raises(InvalidFile, match=r"labels\.txt"):
+    with pytest.raises(NotFound, match=r"labels\.txt"):
         import_bert_srl(archive, bert, tmp_path / "srl-bert")
 
 
 def test_labels_that_do_not_fit_the_weights_are_refused(archive: Path, bert: Path, tmp_path: Path) -> None:
     (archive / "vocabulary" / "labels.txt").write_text("O\nB-V\n")
-    bundle = import_bert_srl(archive, bert, tmp_path / "srl-bert")
-    with pytest.raises(InvalidBundle, match="do not fit"):
-        BertLabeller(bundle, Second())
+    with pytest.raises(InvalidFile, match=r"tag_projection_layer\.weight has shape \(6, 32\), not \(2, 32\)"):
+        import_bert_srl(archive, bert, tmp_path / "srl-bert")
+    assert not (tmp_path / "srl-bert").exists()
 
 
-def test_the_command_imports_and_names_a_broken_file(
-    archive: Path, bert: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_weights_of_another_bert_or_with_foreign_tensors_are_refused(archive: Path, bert: Path, tmp_path: Path) -> None:
+    weights = torch.load(archive / "weights.th", weights_only=True)
+    torch.save({**weights, "crf.transitions": torch.ones(2)}, archive / "weights.th")
+    with pytest.raises(InvalidFile, match=r"does not know: crf\.transitions"):
+        import_bert_srl(archive, bert, tmp_path / "srl-bert")
+    weights["bert_model.embeddings.word_embeddings.weight"][0, 0] = torch.nan
+    torch.save(weights, archive / "weights.th")
+    with pytest.raises(InvalidFile, match="NaN"):
+        import_bert_srl(archive, bert, tmp_path / "srl-bert")
+    (bert / "vocab.txt").write_text("a\nb\n")
+    with pytest.raises(InvalidFile, match=r"vocab\.txt: has 2 lines, and its config\.json names 11"):
+        import_bert_srl(archive, bert, tmp_path / "srl-bert")
+    with pytest.raises(InvalidInput, match="only names its BERT"):
+        import_bert_srl(archive, None, tmp_path / "srl-bert")
+
+
+def test_the_kind_imports_once_and_names_a_broken_archive(archive: Path, bert: Path, tmp_path: Path) -> None:
     output = tmp_path / "srl-bert"
-    assert main(["bert-srl", str(archive), "--bert", str(bert), "-o", str(output)]) == 0
-    assert (output / "manifest.json").is_file()
+    made = run_import("allennlp-srl", archive, output, text_encoder=bert)
+    assert made.manifest.licence == "Apache-2.0"
+    with pytest.raises(Conflict, match="already exists"):
+        run_import("allennlp-srl", archive, output, text_encoder=bert)
     (tmp_path / "junk.tar.gz").write_bytes(b"junk")
-    assert main(["bert-srl", str(tmp_path / "junk.tar.gz"), "--bert", str(bert), "-o", str(output)]) == 2
-    assert "junk.tar.gz" in capsys.readouterr().err
-
-
-def test_pickled_encoder_weights_become_safetensors(tmp_path: Path) -> None:
-    from safetensors.torch import load_file
-
-    torch.save({"weight": torch.arange(6.0).view(2, 3)}, tmp_path / "pytorch_model.bin")
-    assert torch.equal(load_file(convert_encoder(tmp_path))["weight"], torch.arange(6.0).view(2, 3))
+    with pytest.raises(InvalidFile, match=r"junk\.tar\.gz: is not a readable archive"):
+        run_import("allennlp-srl", tmp_path / "junk.tar.gz", output, text_encoder=bert, overwrite=True)
+    assert Bundle.open(output).weights_sha256 == made.weights_sha256
 
 
 def test_pieces_are_those_of_allennlp_s_reader() -> None:

@@ -152,7 +152,7 @@ def test_another_labeller_than_the_bundle_names_is_refused() -> None:
 def test_a_labeller_that_is_not_there_is_named() -> None:
     with pytest.raises(NotFound, match="srl-bert") as caught:
         TextPipeline.load(TextSpec(labeller="bert-srl"))
-    assert "marey.text.convert" in str(caught.value.hint)
+    assert "marey models import allennlp-srl" in str(caught.value.hint)
 
 
 def test_one_bad_prompt_is_an_error_before_any_work(pipeline: TextPipeline) -> None:

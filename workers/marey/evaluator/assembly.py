@@ -93,9 +93,17 @@ def renew_reference(bundle: Bundle, prepared: Path, output: Path, *, overwrite: 
         reference,
         text=known.text,
         card=card_of(output.name, config, known.text, manifest, reference),
+        model=known.model,
+        dtype=_stored_dtype(bundle),
         overwrite=overwrite,
         **manifest,
     )
+
+
+def _stored_dtype(bundle: Bundle) -> type[np.floating]:
+    """Return the precision of a bundle's tensors: half for trained ones, single for imported ones."""
+    floating = {value.dtype for value in bundle.tensors("motion", dtype=None).values() if value.dtype.kind == "f"}
+    return np.float16 if floating == {np.dtype(np.float16)} else np.float32
 
 
 def _as_stored(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

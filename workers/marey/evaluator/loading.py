@@ -28,6 +28,10 @@ def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path
         from marey.evaluator.tmr import TMREvaluator
 
         return TMREvaluator.load(verified, device=device)
+    if manifest.kind == "evaluator" and manifest.model == "snapmogen":
+        from marey.evaluator.snapmogen import SnapMoGenEvaluator
+
+        return SnapMoGenEvaluator.load(verified, device=device)
     if manifest.kind == "evaluator" and manifest.model == "t2m":
         from marey.evaluator.t2m import T2MEvaluator
         from marey.evaluator.t2m_words import TaggedCaptions

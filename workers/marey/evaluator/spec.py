@@ -1,8 +1,8 @@
-"""The evaluator's training as the registry knows it. Standard library only."""
+"""The evaluator's training, and imports of published evaluators, as the registry knows them. Standard library only."""
 
 from __future__ import annotations
 
-from marey.registry import Stage, Training
+from marey.registry import ImportKind, Stage, Training
 
 TRAINING = Training(
     help="Evaluator of generated motions: stage `tmr`, then `bundle`.",
@@ -11,4 +11,19 @@ TRAINING = Training(
     train="marey.evaluator.train:train_stage",
     assemble="marey.evaluator.assembly:assemble",
     bundle_help="Write the bundle from the part of a run, with captions and embeddings of the real test clips.",
+)
+
+T2M_IMPORT = ImportKind(
+    name="t2m-evaluator",
+    help="Evaluator of HumanML3D (Guo et al. 2022): checkpoints/t2m, with the folder glove in it or beside it.",
+    run="marey.evaluator.t2m_import:import_t2m",
+    licence="LicenseRef-AMASS-NC",  # the weights have no stated terms, and derive from AMASS
+)
+
+SNAPMOGEN_IMPORT = ImportKind(
+    name="snapmogen-evaluator",
+    help="Evaluator of SnapMoGen (Guo et al. 2025): checkpoint_dir, with the data set's meta_data in it or beside it.",
+    run="marey.evaluator.snapmogen_import:import_snapmogen",
+    licence="LicenseRef-Snap-NC",
+    text_encoder=True,
 )

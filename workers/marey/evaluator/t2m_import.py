@@ -1,81 +1,79 @@
-"""Import the public T2M evaluator, once, offline: checkpoint, statistics and word vectors become a bundle.
+"""Import the public T2M evaluator: checkpoint, statistics and word vectors become a bundle.
 
-    python -m marey.evaluator.t2m_import CHECKPOINTS --glove GLOVE -o BUNDLE
+    marey models import t2m-evaluator FOLDER -o BUNDLE
 
-CHECKPOINTS is the public folder `checkpoints/t2m`, with `text_mot_match/model/finest.tar` and
-`Comp_v6_KLD005/meta/mean.npy` and `std.npy`; GLOVE the public folder `glove` with `our_vab_data.npy`,
-`our_vab_words.pkl` and `our_vab_idx.pkl`.
+FOLDER is the published folder `checkpoints/t2m`, or one that holds it, with `text_mot_match/model/finest.tar` and
+`Comp_v6_KLD005/meta/mean.npy` and `std.npy`. The folder `glove`, with `our_vab_data.npy`, `our_vab_words.pkl` and
+`our_vab_idx.pkl`, lies in it or beside `checkpoints`, as published.
 
-The checkpoint is read with `weights_only=True`, which refuses anything but tensors and plain values. The two pickles of
-words are read by an unpickler without classes, which creates strings, numbers, lists and dictionaries alone.
-Evaluations later load the bundle: safetensors and JSON, with hashes.
+The two pickles of words are read by an unpickler without classes, which creates strings, numbers, lists and
+dictionaries alone.
 
 It has never run on the public files: see `marey.evaluator.t2m`.
 """
 
 from __future__ import annotations
 
-import argparse
+import io
 import pickle
-import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import nn
 
 from marey.bundles import Bundle, BundleWriter, DataSource
-from marey.core.arrays import read_npy
-from marey.core.characters import escape
-from marey.core.errors import InvalidFile, MareyError
+from marey.core.documents import read_bytes
+from marey.core.errors import InvalidFile
 from marey.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
 from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import END, START, UNKNOWN
+from marey.importing import Download, ImportRequest, make_card, provenance
 from marey.motion.features import layout
 from marey.nn.bundling import stored
 
-LICENCE = "LicenseRef-AMASS-NC"
-"""The code is MIT; the weights have no stated terms, and derive from HumanML3D, which is made of AMASS."""
+INSIDE = ("checkpoints/t2m", "checkpoint_dir/humanml3d")
+"""Where the files lie in the downloads of T2M and MoMask, and in that of MoMask++."""
+GLOVE = ("glove", "../glove", "../../glove")
+GLOVE_FILES = ("our_vab_data.npy", "our_vab_words.pkl", "our_vab_idx.pkl")
+MAX_PICKLE_BYTES = 2**26
+CREDIT = "Guo et al. 2022; GloVe, Pennington et al. 2014"
 
 
-def import_t2m(checkpoints: Path, glove: Path, output: Path, config: T2MConfig | None = None) -> Bundle:
-    """Convert the public files to a bundle.
+def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundle:
+    """Import the evaluator of a download.
 
     Args:
-        checkpoints: see the top of this module.
-        glove: see the top of this module.
-        output: the bundle's folder.
-        config: other sizes, or another layout (KIT-ML's); None = the public ones.
+        request: the import.
+        config: other sizes; None = the public ones.
 
     Raises:
-        InvalidFile: a file is missing, damaged, or of another kind.
+        NotFound: a file is missing.
+        InvalidFile: a file is damaged, of another kind, or of other sizes.
         Conflict: the bundle already exists.
     """
     config = config or T2MConfig()
+    download = Download(request.folder, inside=INSIDE)
     motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
-    file = checkpoints / "text_mot_match" / "model" / "finest.tar"
-    weights = _checkpoint(file)
-    for name, network in (
-        ("movement_encoder", motion.movement),
-        ("motion_encoder", motion.motion),
-        ("text_encoder", text),
-    ):
-        _fill(network, weights, name, file)
-    mean, std = (_statistic(checkpoints / "Comp_v6_KLD005" / "meta" / f"{n}.npy", config) for n in ("mean", "std"))
-    words, vectors = _read_words(glove, config)
-    with BundleWriter(output) as writer:
+    file = download.find("text_mot_match/model/finest.tar", what="the evaluator")
+    checkpoint = download.checkpoint(file)
+    checkpoint.section("movement_encoder").fill(motion.movement)
+    checkpoint.section("motion_encoder").fill(motion.motion)
+    checkpoint.section("text_encoder").fill(text)
+    meta = download.find("Comp_v6_KLD005/meta", what="the statistics of the evaluator")
+    mean, std = download.statistics(meta, config.features)
+    words, vectors = _read_words(download, config)
+    accounts = download.finish()
+    with BundleWriter(request.output, overwrite=request.overwrite) as writer:
         for name, network in (("motion", motion), ("text", text)):
             state = {k: v.numpy() for k, v in network.state_dict().items() if stored(k)}
             writer.add_part(name, state, dtype=np.float32)  # as published: numbers are compared with published ones
         writer.add_statistics(mean, std)
         writer.add_part(WORDS_PART, {"vectors": vectors}, dtype=np.float32)
         writer.add_json(WORDS_FILE, words)
-        writer.add_card(CARD)
+        writer.add_card(make_card(request, accounts, about=ABOUT, normalisation=NORMALISATION))
         return writer.finish(
-            name=output.name,
+            name=request.output.name,
             version="1",
             kind="evaluator",
             model=MODEL,
@@ -84,51 +82,26 @@ def import_t2m(checkpoints: Path, glove: Path, output: Path, config: T2MConfig |
             skeleton=layout(config.layout).skeleton.name,
             layout=config.layout,
             fps=config.fps,
-            data=(
-                DataSource(name="HumanML3D", licence=LICENCE, credit="Guo et al. 2022; GloVe, Pennington et al. 2014"),
-            ),
-            licence=LICENCE,
+            data=(DataSource(name="HumanML3D", licence=request.licence, credit=CREDIT),),
+            licence=request.licence,
+            training=provenance(request, accounts),
         )
 
 
-def _checkpoint(file: Path) -> Mapping[str, Any]:
-    try:
-        loaded: Any = torch.load(file, map_location="cpu", weights_only=True)
-    except (OSError, pickle.UnpicklingError, RuntimeError, EOFError, ValueError) as error:
-        raise InvalidFile(f"cannot be read safely: {error}", where=str(file), hint="Download it again.") from error
-    if not isinstance(loaded, Mapping):
-        raise InvalidFile("is not a checkpoint", where=str(file))
-    return loaded
-
-
-def _fill(network: nn.Module, weights: Mapping[str, Any], name: str, file: Path) -> None:
-    try:
-        network.load_state_dict(weights[name])
-    except (KeyError, TypeError, RuntimeError) as error:
-        raise InvalidFile(f"its {name} does not fit the public evaluator: {error}", where=str(file)) from error
-
-
-def _statistic(file: Path, config: T2MConfig) -> NDArray[np.float32]:
-    values = _array(file)
-    if values.shape != (config.features,) or not np.isfinite(values).all():
-        raise InvalidFile(f"has shape {values.shape}, not ({config.features},) finite numbers", where=str(file))
-    return values.astype(np.float32)
-
-
-def _read_words(folder: Path, config: T2MConfig) -> tuple[list[str], NDArray[np.float32]]:
+def _read_words(download: Download, config: T2MConfig) -> tuple[list[str], NDArray[np.float32]]:
     """Return the vocabulary and its vectors, row by row."""
-    data = folder / "our_vab_data.npy"
-    vectors, words, index = _array(data), _plain(folder / "our_vab_words.pkl"), _plain(folder / "our_vab_idx.pkl")
+    folder = download.find(*GLOVE, what="the folder of word vectors")
+    data, listed, indexed = (folder / name for name in GLOVE_FILES)
+    vectors = download.array(data, (None, config.word_width))
+    words, index = _plain(listed), _plain(indexed)
     if not isinstance(words, list) or not isinstance(index, dict) or not {START, END, UNKNOWN} <= set(words):
         raise InvalidFile("is not a vocabulary of the T2M evaluator", where=str(folder))
     rows = [index.get(word, -1) for word in words]
-    if vectors.ndim != 2 or vectors.shape[1] != config.word_width or not all(0 <= r < len(vectors) for r in rows):
-        raise InvalidFile(f"vectors of shape {vectors.shape} do not fit the words", where=str(data))
+    if not all(isinstance(row, int) and 0 <= row < len(vectors) for row in rows):
+        raise InvalidFile(f"has {len(vectors)} vectors, which do not fit the words", where=str(data))
+    download.note(listed)
+    download.note(indexed)
     return words, vectors[rows].astype(np.float32)
-
-
-def _array(file: Path) -> NDArray[Any]:
-    return read_npy(file)
 
 
 class _PlainValues(pickle.Unpickler):
@@ -140,41 +113,18 @@ class _PlainValues(pickle.Unpickler):
 
 
 def _plain(file: Path) -> Any:
+    data = read_bytes(file, limit=MAX_PICKLE_BYTES, hint="It is a part of the published folder `glove`.")
     try:
-        with file.open("rb") as stream:
-            return _read_plain(stream)
-    except (OSError, pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError, IndexError) as error:
-        raise InvalidFile(f"is not a plain list or dictionary: {error}", where=str(file)) from error
+        return _PlainValues(io.BytesIO(data)).load()
+    except Exception as error:  # a crafted or truncated pickle raises nearly any exception
+        raise InvalidFile(f"is not a plain list or dictionary: {error}", where=str(file)) from None
 
 
-def _read_plain(stream: IO[bytes]) -> Any:
-    return _PlainValues(stream).load()
+ABOUT = """The public T2M evaluator: Guo et al. 2022, "Generating Diverse and Natural 3D Human Motions from Text",
+`text_mot_match` with GloVe `our_vab`. Trained on HumanML3D. The code is MIT; the weights have no stated terms, and
+derive from HumanML3D, which is made of AMASS.
 
-
-CARD = """# The public T2M evaluator, imported
-
-Guo et al. 2022, "Generating Diverse and Natural 3D Human Motions from Text": `text_mot_match` with GloVe `our_vab` and
-the statistics `Comp_v6_KLD005`, converted by `python -m marey.evaluator.t2m_import`. Trained on HumanML3D. Before
-its numbers are believed, its ground-truth row should be compared with the published one: R@1 .511, matching score
-2.974.
-"""
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the command line of this module; return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m marey.evaluator.t2m_import", description="See the module.")
-    parser.add_argument("checkpoints", type=Path)
-    parser.add_argument("--glove", type=Path, required=True)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args(arguments)
-    try:
-        made = import_t2m(options.checkpoints, options.glove, options.output).path
-    except MareyError as error:
-        sys.stderr.write(f"{escape(str(error))}\n")
-        return error.exit_code
-    sys.stdout.write(f"{made}\n")
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+Before its numbers are believed, its row of real data should be compared with the published one: R@1 .511, matching
+score 2.974."""
+NORMALISATION = """Mean and deviation of `Comp_v6_KLD005/meta`, the evaluator's own; a generator's are never used for
+it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 import torch
@@ -48,7 +49,7 @@ class TMREvaluator(LoadedNetworks[EvaluatorConfig, MotionEncoder, SentenceEncode
         self.text.encoder.pack()
 
     @classmethod
-    def load(cls, bundle: Bundle, *, device: str = "auto", encoder: TextEncoder | None = None) -> TMREvaluator:
+    def load(cls, bundle: Bundle, *, device: str = "auto", encoder: TextEncoder | None = None) -> Self:
         """Load a bundle.
 
         Args:
@@ -79,10 +80,14 @@ class TMREvaluator(LoadedNetworks[EvaluatorConfig, MotionEncoder, SentenceEncode
         """See `Evaluator`; any English prompt (`check_prompt`), read as far as the text encoder reads."""
         checked = [check_prompt(sentence, where=f"sentence {n}", stored=True) for n, sentence in enumerate(sentences)]
         found = np.zeros((len(checked), self.width), np.float32)
-        states = token_states(self.encoder, checked)
+        states = self._states(checked)
         for rows in _alike([len(each) for each in states]):
             found[rows] = _array(self.text.embed(*padded([states[row] for row in rows], self.device)))
         return found
+
+    def _states(self, sentences: Sequence[str]) -> list[Tensor]:
+        """Return the states (S, W) of each sentence that the text network reads."""
+        return token_states(self.encoder, sentences)
 
 
 @torch.inference_mode()

@@ -32,6 +32,13 @@ class Up(StrEnum):
     Z = "z"
 
 
+class RestPose(StrEnum):
+    """Rest poses of files that do not name theirs."""
+
+    T = "t"
+    A = "a"
+
+
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="A motion file, such as .bvh or .npz.")]
 FromUnit = Annotated[Unit, typer.Option("--from-unit", help="Unit of a BVH source.")]
 FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that points up.")]
@@ -43,11 +50,17 @@ def convert(
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
+    rest_pose: Annotated[
+        RestPose, typer.Option("--rest-pose", help="Rest pose of a BVH result: T-pose, or A-pose where it is known.")
+    ] = RestPose.T,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
+    from_rest_pose: Annotated[
+        RestPose, typer.Option("--from-rest-pose", help="Rest pose of a BVH source whose A-pose is known.")
+    ] = RestPose.T,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Convert a motion between BVH, npz and installed formats, with another rate, unit or axis if wanted."""
+    """Convert a motion between BVH, npz and installed formats, with another rate, unit, axis or rest pose."""
     from marey.core.extras import needs_extra
 
     try:
@@ -60,8 +73,10 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
+        rest_pose=rest_pose.value,
         source_unit=from_unit.value,
         source_up=from_up.value,
+        source_rest_pose=from_rest_pose.value,
         overwrite=overwrite,
     )
     for note in notes:

@@ -81,6 +81,39 @@ def quantize(
     console.result(made.reference)
 
 
+@app.command("import")
+def import_bundle(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="Kind of the weights; an unknown one lists those of this machine.")
+    ],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The published files, unpacked as downloaded.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the bundle, whose name is the bundle's.")],
+    text_encoder: Annotated[
+        Path | None,
+        typer.Option(
+            "--text-encoder",
+            metavar="PATH",
+            help="Folder of the text encoder that the weights were trained with, as the models' hub has it; it is "
+            "installed beside the bundle. Default: the installed one.",
+        ),
+    ] = None,
+    licence: Annotated[
+        str | None,
+        typer.Option(
+            "--licence",
+            metavar="ID",
+            help="Terms of the weights, as an SPDX identifier. Default: those that their source states, if any.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing bundle.")] = False,
+) -> None:
+    """Import published weights as a bundle, offline: every tensor is checked, and code in files is never run."""
+    from marey.cli.roles.importing import import_weights
+
+    made = import_weights(kind, folder, output, text_encoder=text_encoder, licence=licence, overwrite=overwrite)
+    console.result(made)
+
+
 def _server_named() -> bool:
     import os
 
