@@ -34,7 +34,7 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
     return x * (kept.to(x.dtype) * (256 / (256 - cut)))
 
 
-def _attention(query: Tensor, key: Tensor, value: Tensor, bias: Tensor, rate: float) -> Tensor:
+def attend(query: Tensor, key: Tensor, value: Tensor, bias: Tensor, rate: float) -> Tensor:
     """Compute scaled dot-product attention step by step, for CPUs: queries (B · H, Q, D), keys and values (B · H, S,
     D), `bias` of the scores (B · H or 1, Q or 1, S or 1).
 
@@ -74,7 +74,7 @@ class Attention(nn.Module):
             if mask is not None:
                 bias = key_bias(mask, query.dtype).expand(batch, self.heads, -1, -1).flatten(0, 1)
             query, key, value = (part.reshape(batch * self.heads, size, part.shape[-1]) for part in (query, key, value))
-            mixed = _attention(query, key, value, bias, rate).view(batch, self.heads, size, query.shape[-1])
+            mixed = attend(query, key, value, bias, rate).view(batch, self.heads, size, query.shape[-1])
         # Not before: float32 products of few rows add in another order on some processors.
         mixed = mixed[:, :, : size if rows is None else rows]
         return self.out(mixed.transpose(1, 2).flatten(2))
@@ -82,7 +82,7 @@ class Attention(nn.Module):
     def ragged(self, x: Tensor, where: Ragged, kept: Tensor | None = None) -> Tensor:
         """`forward` of rows without padding: (R, w) -> (R, w), or the rows `kept` of it; no gradient."""
         query, key, value = where.sequences(self.qkv(x))
-        return self.out(where.rows(_attention(query, key, value, where.bias, 0.0), kept))
+        return self.out(where.rows(attend(query, key, value, where.bias, 0.0), kept))
 
 
 class Block(nn.Module):

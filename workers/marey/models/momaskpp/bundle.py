@@ -1,0 +1,77 @@
+"""MoMask++'s networks as one bundle: loading, and a random bundle for tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from marey.bundles import Bundle, TextSpec
+from marey.core.errors import InvalidBundle
+from marey.models.momaskpp.config import MoMaskPPConfig, named_config
+from marey.models.momaskpp.model import LengthEstimator, MaskedTransformer, RootRefiner
+from marey.models.momaskpp.tokenizer import Tokenizer
+from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.motion_tokenizer import biased_std
+
+MODEL = "momaskpp"
+
+
+@dataclass(frozen=True)
+class Networks:
+    """All networks of a bundle."""
+
+    tokenizer: Tokenizer
+    masked: MaskedTransformer
+    refiner: RootRefiner | None
+    length: LengthEstimator | None
+
+    @classmethod
+    def build(cls, config: MoMaskPPConfig) -> Networks:
+        """Build freshly initialised networks: those that the configuration has."""
+        return cls(
+            Tokenizer(config),
+            MaskedTransformer(config),
+            RootRefiner(config) if config.has_refiner else None,
+            LengthEstimator(config) if config.has_length else None,
+        )
+
+    def parts(self) -> dict[str, nn.Module]:
+        """Return the networks by part name."""
+        found = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {name: network for name, network in found.items() if network is not None}
+
+
+def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, Networks]:
+    """Build and fill the networks of a bundle, float32, in evaluation mode.
+
+    Raises:
+        InvalidBundle: of another model, or its tensors do not fit its configuration.
+    """
+    if bundle.manifest.model != MODEL:
+        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
+    config = MoMaskPPConfig.from_dict(bundle.manifest.parameters)
+    networks = Networks.build(config)
+    for name, network in networks.parts().items():
+        fill(network, bundle, name)
+    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
+    networks.tokenizer.set_statistics(mean, std)
+    return config, networks
+
+
+def random_bundle(path: Path | str, config: str | MoMaskPPConfig = "tiny", seed: int = 0) -> Bundle:
+    """Write a bundle with random weights, for tests: it runs like a trained one (manifest `random` = true).
+
+    Statistics are those of a person standing still, so that joints stay within a sane range.
+    """
+    path = Path(path)
+    config = named_config(config) if isinstance(config, str) else config
+    parts = random_parts(lambda: Networks.build(config).parts(), ("masked",), seed)
+    mean, std = standing(config.layout)
+    text = TextSpec(encoder="minilm" if config.text.width == 384 else "t5-v1_1-base", width=config.text.width)
+    biased = biased_std(torch.from_numpy(std), config.tokenizer.feature_bias).numpy()
+    return write_generator(
+        path, MODEL, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True
+    )

@@ -1,0 +1,138 @@
+"""The decoding loop of MoMask++ (Sec. 4.2.2): tokens of all scales at once, by confidence.
+
+An item's tokens depend on its own seed, text, length and kept tokens alone. A forward holds items of one bucket, all
+with the same positions, and both branches of guidance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from marey.models.momaskpp.config import InferenceConfig
+from marey.models.momaskpp.model import MaskedTransformer
+from marey.models.momaskpp.scales import Scales
+from marey.nn.quantizer import NO_TOKEN
+from marey.nn.sampling import sample_top_k, uniform
+
+TOKEN_STREAM, LENGTH_STREAM = 1, 2
+"""Streams of random numbers; see `marey.nn.sampling.uniform`."""
+
+KeepRows = Callable[[], Tensor | None]
+"""Called after each pass: bool (B,) rows to go on with, or None for all."""
+
+
+@dataclass(frozen=True)
+class Items:
+    """The items of one bucket, at S of the N positions."""
+
+    lengths: Tensor  # (B,) own tokens n of the full scale
+    seeds: Tensor  # (B,) int64
+    words: Tensor  # (B, L, w) condition tokens
+    null: Tensor  # (B, L, w) condition tokens without condition
+    present: Tensor  # (B, L) bool
+    tokens: Tensor  # (B, N) int64, NO_TOKEN where not decoded
+    kept: Tensor  # (B, N) bool: tokens that stay as they are
+
+    def select(self, rows: Tensor) -> Items:
+        """Return the items at `rows`."""
+        return Items(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
+
+
+def remaining_counts(total: int, steps: int) -> list[int]:
+    """Return the masked tokens before each pass, and 0 at the end: round(cos(πt/2)·n), t = 0 … 1, at least one.
+
+    The published schedule; it ends with a pass for the last token, where the paper's is one step ahead.
+
+    Args:
+        total: n, tokens to decode, all scales together.
+        steps: L.
+    """
+    times = [i / max(1, steps - 1) for i in range(steps)]
+    return [*(min(total, max(1, round(math.cos(math.pi / 2 * t) * total))) for t in times), 0]
+
+
+def decode(model: MaskedTransformer, items: Items, scales: Scales, config: InferenceConfig, keep: KeepRows) -> Items:
+    """Fill `tokens` at the positions that the items have: L passes, each masks the least confident tokens anew.
+
+    Args:
+        model: the transformer.
+        items: of one bucket.
+        scales: of the bundle.
+        config: passes, guidance, temperature, top-k.
+        keep: called after each pass.
+    """
+    columns = _positions(items, scales)  # (S,)
+    valid = scales.valid(items.lengths)[:, columns]  # (B, S)
+    tokens = items.tokens[:, columns].masked_fill(~items.kept[:, columns], model.mask_token)
+    open_counts = (valid & (tokens == model.mask_token)).sum(1).tolist()
+    schedule = torch.tensor([remaining_counts(n, config.steps) for n in open_counts], device=valid.device).T
+    for step in range(config.steps):
+        before, after = schedule[step], schedule[step + 1]
+        rows = (after < before).nonzero().squeeze(1)  # a pass that keeps no token changes nothing
+        if len(rows):
+            some = items.select(rows)
+            tokens[rows] = _pass(model, some, tokens[rows], valid[rows], columns, after[rows], step, config)
+        stay = keep()
+        if stay is not None:
+            items, tokens, valid, schedule = items.select(stay), tokens[stay], valid[stay], schedule[:, stay]
+    filled = torch.full_like(items.tokens, NO_TOKEN)
+    filled[:, columns] = tokens.masked_fill(~valid, NO_TOKEN)
+    return replace(items, tokens=filled)
+
+
+def bucket_positions(scales: Scales, bucket: int) -> Tensor:
+    """Return the positions (S,) that a clip of `bucket` tokens has in the row of all scales."""
+    return scales.valid(torch.tensor([bucket]))[0].nonzero().squeeze(1)
+
+
+def bucket_of(length: int, size: int, longest: int) -> int:
+    """Return a length in tokens rounded up to a multiple of `size`, at most the longest clip's."""
+    return min(-(-length // size) * size, longest)
+
+
+BUCKET = 8
+"""Tokens of the full scale; an item is padded to a multiple of this, not to the longest of its batch."""
+
+
+def _positions(items: Items, scales: Scales) -> Tensor:
+    longest = bucket_of(int(items.lengths.max()), BUCKET, scales.longest)
+    return bucket_positions(scales, longest).to(items.tokens.device)
+
+
+def _pass(
+    model: MaskedTransformer,
+    items: Items,
+    tokens: Tensor,
+    valid: Tensor,
+    positions: Tensor,
+    masked_left: Tensor,
+    step: int,
+    config: InferenceConfig,
+) -> Tensor:
+    """One pass: predict the masked tokens, keep all but the `masked_left` (B,) least confident. (B, S) -> (B, S)."""
+    masked = (tokens == model.mask_token) & valid
+    logits = model(
+        tokens.repeat(2, 1),
+        positions,
+        valid.repeat(2, 1),
+        torch.cat([items.words, items.null]),
+        items.present.repeat(2, 1),
+        config.guidance,
+    )  # (B, S, K)
+    noise = uniform(items.seeds, TOKEN_STREAM, step, positions)
+    drawn = sample_top_k(logits, noise, temperature=config.temperature, share=config.top_k)  # (B, S)
+    # Confidence = the guided softmax itself, before temperature and top-k; tokens of earlier passes stay.
+    confidence = (logits.gather(-1, drawn[..., None]).squeeze(-1) - logits.logsumexp(-1)).masked_fill(
+        ~masked, torch.inf
+    )
+    order = confidence.argsort(dim=1, stable=True)  # least confident first; ties go to the earlier position
+    rank = torch.empty_like(order).scatter_(
+        1, order, torch.arange(order.shape[1], device=order.device).expand_as(order)
+    )
+    filled = torch.where(masked, drawn, tokens)
+    return filled.masked_fill(rank < masked_left[:, None], model.mask_token)

@@ -1,0 +1,244 @@
+"""MoMask++'s inference behind one class: prompts to features of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from marey.bundles import Bundle
+from marey.bundles.body import layout_of
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.generation.groups import RowWatcher, StepCounter, group_rows
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.models.momaskpp.bundle import Networks, load_networks
+from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
+from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, Items, bucket_of, decode
+from marey.models.momaskpp.model import ROOT_VELOCITY, RootRefiner, inputs_of
+from marey.models.momaskpp.words import WordReader, pad_states
+from marey.motion.features import FeatureLayout
+from marey.nn.batch_threads import BatchThreads
+from marey.nn.quantizer import NO_TOKEN
+from marey.nn.sampling import uniform
+
+MAX_ROWS = 32
+"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
+
+
+@dataclass(frozen=True)
+class SamplingSettings:
+    """Sampling settings, uniform over a batch; None = the bundle's value."""
+
+    steps: int | None = None
+    guidance: float | None = None
+    temperature: float | None = None
+    top_k: float | None = None
+
+    def inference(self, default: InferenceConfig) -> InferenceConfig:
+        """Return the bundle's decoding settings with this batch's changes.
+
+        Raises:
+            InvalidInput: a value out of range.
+        """
+        config = replace(default, **{name: value for name, value in asdict(self).items() if value is not None})
+        if not 1 <= config.steps <= 100:
+            raise InvalidInput("must lie between 1 and 100", where="steps")
+        if not 0 < config.top_k <= 1:
+            raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where="top_k")
+        for name in ("temperature", "guidance"):
+            if not 0 <= getattr(config, name) <= 100:
+                raise InvalidInput("must lie between 0 and 100", where=name)
+        return config
+
+
+@dataclass(frozen=True)
+class Generated:
+    """One motion as the network generated it, before decoding to joints and clean-up."""
+
+    tokens: NDArray[np.int16]  # (1, N): a block a scale, coarse to fine, -1 where the motion has no token
+    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
+
+
+class Generator:
+    """A loaded bundle. Not thread-safe; one per process."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        config: MoMaskPPConfig,
+        networks: Networks,
+        reader: WordReader,
+        device: torch.device,
+        batch_threads: BatchThreads,
+    ) -> None:
+        self.bundle = bundle
+        self.config = config
+        self.networks = networks
+        self.reader = reader
+        self.device = device
+        self.dtype = torch.float32
+        self.batch_threads = batch_threads
+        self.layout: FeatureLayout = layout_of(bundle.manifest)
+        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.text.width)
+        self.batch = MAX_ROWS
+        self.scales = networks.tokenizer.scales
+
+    @classmethod
+    def load(
+        cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
+    ) -> Generator:
+        """Load a bundle, and the text encoder that it names: words are encoded here (docs/decisions/0026).
+
+        Args:
+            bundle: a verified bundle, or its name or path.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            threads: of torch; 0 leaves torch's own choice.
+            dtype: float32 alone: published weights are compared in it.
+
+        Raises:
+            InvalidBundle: not MoMask++, damaged, or made with another text encoder than is installed.
+            InvalidInput: unknown device, or another dtype.
+            NotFound: the encoder is not installed.
+        """
+        if dtype not in (None, torch.float32):
+            raise InvalidInput(f"runs in float32, not {dtype}", where="dtype")
+        verified, chosen, _ = open_bundle(bundle, device, threads, torch.float32)
+        config, networks = load_networks(verified)
+        spec = verified.manifest.text
+        if spec is None:
+            raise InvalidBundle("names no text encoder", where=str(verified.path))
+        for part in networks.parts().values():
+            part.to(chosen)
+        batch_threads = BatchThreads(torch.get_num_threads() if chosen.type == "cpu" else 1)
+        networks.masked.prepare_inference(batch_threads)
+        return cls(verified, config, networks, WordReader(spec, config.text.max_words), chosen, batch_threads)
+
+    @property
+    def frames_per_token(self) -> int:
+        """Return N/n, the frames of a token of the full scale."""
+        return self.config.tokenizer.frames_per_token
+
+    @torch.inference_mode()
+    def generate(
+        self,
+        requests: Sequence[Request],
+        settings: SamplingSettings | None = None,
+        *,
+        control: GenerationControl | None = None,
+    ) -> list[Generated | None]:
+        """Generate one motion per request; None where `control` dropped it.
+
+        The tokens of an item do not depend on the number or order of the others.
+
+        Raises:
+            InvalidInput: a length or seed out of range, or features of another encoder.
+        """
+        inference = (settings or SamplingSettings()).inference(self.config.inference)
+        frames = [self.frames(request) for request in requests]
+        words = self.reader.states([request.text.rewritten for request in requests])
+        results: list[Generated | None] = [None] * len(requests)
+        groups = self._groups(frames)
+        steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + 1))
+
+        def make(rows: list[int]) -> None:
+            watcher = RowWatcher(steps, rows)
+            if watcher.rows:
+                own = watcher.rows
+                items = self._items([requests[r] for r in own], [frames[r] for r in own], [words[r] for r in own])
+                items = decode(self.networks.masked, items, self.scales, inference, watcher.step)
+                for position, row in enumerate(watcher.rows):
+                    results[row] = self._generated(items, position, frames[row])
+                if watcher.rows:
+                    watcher.step()
+
+        with self.batch_threads.open():
+            self.batch_threads.map(make, groups)
+        return results
+
+    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
+        """Check an item's settings. Raises InvalidInput."""
+        settings = read_settings(SamplingSettings, values, InferenceConfig.__dataclass_fields__)
+        settings.inference(self.config.inference)
+        return settings
+
+    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
+        """Return all settings that decide how tokens are drawn."""
+        return asdict(settings.inference(self.config.inference))
+
+    def resolve_length(self, request: Request) -> Request:
+        """Return the request with a length; a missing one is drawn with the request's seed."""
+        return replace(request, frames=self.frames(request))
+
+    def frames(self, request: Request) -> int:
+        """Return the feature frames: as requested, drawn by the length estimator, or, where the bundle has none, one of
+        its `open_frames`.
+
+        Raises:
+            InvalidInput: as `Limits.check`.
+        """
+        self.limits.check(request)
+        if request.frames is not None:
+            return request.frames
+        seeds = torch.tensor([request.seed], device=self.device)
+        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
+        if self.networks.length is None:
+            choices = self.config.open_frames
+            return choices[min(int(draw * len(choices)), len(choices) - 1)]
+        # From the middle third of the estimated distribution (ours): seeds differ, without extremes.
+        sentence = torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
+        with torch.inference_mode():
+            share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
+        tokens = int((share < (1 + draw) / 3 * share[:, -1:]).sum()) + 1
+        return min(max(tokens * self.frames_per_token, self.config.min_frames), self.config.max_frames)
+
+    def bucket(self, request: Request) -> int:
+        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
+        return self._bucket(self.frames(request))
+
+    def _bucket(self, frames: int) -> int:
+        return bucket_of(self._tokens(frames), BUCKET, self.scales.longest)
+
+    def _tokens(self, frames: int) -> int:
+        return -(-frames // self.frames_per_token)
+
+    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
+        """Group rows by bucket, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
+        most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
+        return group_rows([self._bucket(count) for count in frames], most)
+
+    def _items(self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]) -> Items:
+        masked, device = self.networks.masked, self.device
+        text = pad_states(words, self.config.text.max_words, device)
+        size = (len(requests), self.scales.size)
+        return Items(
+            lengths=torch.tensor([self._tokens(f) for f in frames], device=device),
+            seeds=torch.tensor([r.seed for r in requests], device=device),
+            words=masked.words(text.states),
+            null=masked.words(text.states, torch.ones(len(requests), dtype=torch.bool, device=device)),
+            present=text.present,
+            tokens=torch.full(size, NO_TOKEN, device=device),
+            kept=torch.zeros(size, dtype=torch.bool, device=device),
+        )
+
+    def _generated(self, items: Items, position: int, frames: int) -> Generated:
+        """Decode one item alone: a convolution rounds differently in another batch, and files would differ."""
+        tokens, length = items.tokens[position : position + 1], items.lengths[position : position + 1]
+        tokenizer, refiner = self.networks.tokenizer, self.networks.refiner
+        features = tokenizer.decode(tokens[..., None], length)
+        if refiner is not None:
+            features = self._refined(refiner, features)
+        return Generated(tokens.cpu().numpy().astype(np.int16), features[0, :frames].cpu().numpy())
+
+    def _refined(self, refiner: RootRefiner, features: Tensor) -> Tensor:
+        """Replace the root's velocity by what the refiner makes of the other columns (1, T, D).
+
+        It reads them as they are (ours): the published demo encodes the motion anew first and loses two frames.
+        """
+        normalized = self.networks.tokenizer.normalize(features)
+        normalized[..., ROOT_VELOCITY] = refiner(normalized[..., inputs_of(self.config)])
+        return self.networks.tokenizer.restore(normalized)

@@ -1,0 +1,154 @@
+"""Training stage of the multi-scale RVQ-VAE (eq. 4 and 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from marey.models.momaskpp.config import MoMaskPPConfig
+from marey.models.momaskpp.tokenizer import Tokenizer
+from marey.motion.features import layout
+from marey.nn.convolution import frame_mask
+from marey.nn.motion_tokenizer import ROOT, biased_std
+from marey.training.joints import heading_joints, world_joints
+from marey.training.loop import StepContext
+from marey.training.motions import MotionData
+from marey.training.tokenizing import feature_weights, reconstruction_errors, tokenizer_weights
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Terms of the training objective; all but the first without gradient."""
+
+    total: Tensor
+    features: Tensor
+    essential: Tensor
+    commitment: Tensor
+    joints: Tensor
+    perplexity: Tensor
+
+
+def has_positions(config: MoMaskPPConfig) -> bool:
+    """Return True if the features hold joint positions behind the root's four columns, as HumanML3D's do."""
+    return "positions" in (slices := layout(config.layout).slices) and slices["positions"].start == ROOT.stop
+
+
+def tokenizer_loss(
+    model: Tokenizer, config: MoMaskPPConfig, features: Tensor, lengths: Tensor, fraction: float
+) -> Losses:
+    """Compute eq. 6 with smooth L1, plus the root once more (published), plus terms on the joints (ours).
+
+    Args:
+        model: the tokenizer.
+        config: weights of the terms.
+        features: (B, T, D) in their own units.
+        lengths: (B,) frames.
+        fraction: of the budget used.
+    """
+    t = config.tokenizer
+    output, quantized = model(features, lengths)
+    valid = frame_mask(lengths, features.shape[1]).float()
+    error = F.smooth_l1_loss(output, model.normalize(features), reduction="none")  # (B, T, D)
+
+    weights = feature_weights(config).to(features.device)  # (D,)
+    whole = _average((error * weights).sum(-1) / weights.sum(), valid)
+    essential = _average(error[..., slice(*t.essential)].mean(-1), valid)
+    joints = _joint_losses(model.restore(output), features, valid, config, fraction)
+    total = whole + t.commitment * quantized.commitment + t.essential_weight * essential + joints
+    if t.root_weight:
+        total = total + t.root_weight * _average(error[..., ROOT].mean(-1), valid)
+    return Losses(
+        total=total,
+        features=whole.detach(),
+        essential=essential.detach(),
+        commitment=quantized.commitment.detach(),
+        joints=joints.detach(),
+        perplexity=quantized.perplexity[0],
+    )
+
+
+def _joint_losses(restored: Tensor, features: Tensor, valid: Tensor, config: MoMaskPPConfig, fraction: float) -> Tensor:
+    """Return the weighted sum of the terms on joints; 0 where none has a weight."""
+    t, total = config.tokenizer, features.new_zeros(())
+    if t.position_weight or t.velocity_weight:
+        local = heading_joints(restored, config.joints) - heading_joints(features, config.joints)
+        total = total + t.position_weight * _average(local.abs().sum(-1).mean(-1), valid)
+        speed = local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps
+        total = total + t.velocity_weight * _average(speed, valid[:, 1:])
+    if t.world_weight:
+        drift = world_joints(restored, config.joints) - world_joints(features, config.joints)
+        weight = t.world_weight * min(1.0, 2 * fraction) ** 2  # drift adds up: at first it would dominate
+        total = total + weight * _average(drift.abs().sum(-1).mean(-1), valid)
+    return total
+
+
+def _average(values: Tensor, valid: Tensor) -> Tensor:
+    return (values * valid).sum() / valid.sum().clamp(min=1)
+
+
+class TokenizerStage:
+    """Windows of random clips; `module` is the tokenizer itself."""
+
+    name = "tokenizer"
+
+    def __init__(self, config: MoMaskPPConfig, data: MotionData, module: Tokenizer) -> None:
+        """Train `module` on the data's statistics."""
+        self.config = config
+        self.optimisation = config.train_tokenizer
+        self.data = data
+        self.module = module.to(data.features.device)
+        self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
+        rate = module.frames_per_token
+        self.clips = [c for c in data.prepared.split("train") if not c.spliced and c.length >= rate]
+        self.weights = tokenizer_weights(self.clips)
+        self.first = np.array([c.start for c in self.clips])
+        self.lengths = np.array([c.length - c.length % rate for c in self.clips])
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """Return one group."""
+        return [list(self.module.parameters())]
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of one window size per step; the batch is scaled to a constant number of frames."""
+        rng, config = context.rng, self.config
+        window = int(rng.choice(config.windows))
+        batch = max(1, self.optimisation.batch * min(config.windows) // window)
+        chosen = rng.choice(len(self.clips), size=batch, p=self.weights)
+        slack = np.maximum(self.lengths[chosen] - window, 0)
+        offsets = np.floor(rng.random(batch) * (slack + 1)).astype(np.int64)
+        device = self.data.features.device
+        lengths = torch.from_numpy(np.minimum(self.lengths[chosen], window)).to(device)
+        features = self.data.windows(torch.from_numpy(self.first[chosen] + offsets).to(device), window)
+        losses = tokenizer_loss(self.module, config, features, lengths, context.fraction)
+        logs = {name: value.detach() for name, value in vars(losses).items() if name != "total"}
+        return losses.total, {"loss": losses.total.detach(), **logs}
+
+    def after_step(self, context: StepContext) -> None:
+        """Do nothing: the codebook is updated in the forward pass."""
+
+    def validate(self) -> Mapping[str, float]:
+        """Return errors on whole validation clips."""
+        return self._errors("val")
+
+    def test(self) -> dict[str, float]:
+        """Return errors on whole captured test clips."""
+        return {f"test/{name}": value for name, value in self._errors("test").items()}
+
+    @torch.no_grad()
+    def _errors(self, split: str) -> dict[str, float]:
+        longest = self.config.max_frames
+        clips = [c.model_copy(update={"length": min(c.length, longest)}) for c in self.data.originals(split)]
+        if has_positions(self.config):
+            return reconstruction_errors(self.module, self.config, self.data, clips)
+        rate, found = self.module.frames_per_token, list[float]()
+        for clip in (c for c in clips if c.length >= rate):
+            lengths = torch.tensor([clip.length - clip.length % rate], device=self.data.features.device)
+            features = self.data.windows(torch.tensor([clip.start], device=lengths.device), int(lengths))
+            decoded = self.module.decode(self.module.encode(features, lengths), lengths // rate)
+            found.append(float((self.module.normalize(decoded) - self.module.normalize(features)).abs().mean()))
+        return {"error": float(np.mean(found))}

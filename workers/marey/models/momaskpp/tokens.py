@@ -1,0 +1,73 @@
+"""Tokens of all scales of all clips of a prepared folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from marey.models.momaskpp.scales import Scales
+from marey.models.momaskpp.tokenizer import Tokenizer
+from marey.nn.quantizer import NO_TOKEN
+from marey.training.motions import TOKENS, MotionData, TokenData, fingerprint, made_once
+
+
+@dataclass(frozen=True)
+class ScaleTokens(TokenData):
+    """As `TokenData`, but a sequence holds the tokens that a clip has at every scale, block after block; `lengths`
+    counts those of the full scale."""
+
+    scales: Scales
+
+    def rows(self, clips: Tensor, phases: Tensor) -> tuple[Tensor, Tensor]:
+        """Return tokens (B, N), NO_TOKEN where a clip has none, and lengths (B,) of the full scale."""
+        lengths = self.lengths[clips, phases]
+        valid = self.scales.valid(lengths)  # (B, N)
+        index = self.starts[clips, phases][:, None] + valid.long().cumsum(1) - 1
+        tokens = self.tokens[index.clamp(0, len(self.tokens) - 1), 0]
+        return tokens.masked_fill(~valid, NO_TOKEN), lengths
+
+
+def load_scale_tokens(run: Path, tokenizer: Tokenizer, data: MotionData) -> ScaleTokens:
+    """Return the tokens of all clips: encoded once per tokenizer and data, then read from the run folder."""
+    key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}"
+    device = data.features.device
+    made = made_once(run / TOKENS, key, device, lambda: encode_clips(tokenizer, data))
+    return ScaleTokens(**made, scales=tokenizer.scales)
+
+
+@torch.no_grad()
+def encode_clips(tokenizer: Tokenizer, data: MotionData, *, batch: int = 64) -> dict[str, Tensor]:
+    """Encode every clip, longer ones up to the longest that the model makes; training clips at all phases, others at
+    phase 0. Returns the fields of `TokenData`."""
+    tokenizer.eval()
+    rate, longest = tokenizer.frames_per_token, tokenizer.scales.longest
+    device = data.features.device
+    clips = data.prepared.clips
+    jobs = [
+        (c, p, clip.start + p, min((clip.length - p) // rate, longest))
+        for c, clip in enumerate(clips)
+        for p in range(rate if clip.split == "train" else 1)
+        if clip.length - p >= rate
+    ]
+    jobs.sort(key=lambda job: job[3])  # similar lengths together
+    starts = torch.zeros(len(clips), rate, dtype=torch.long)
+    lengths = torch.zeros(len(clips), rate, dtype=torch.long)
+    found: list[Tensor] = []
+    total = 0
+    for at in range(0, len(jobs), batch):
+        part = jobs[at : at + batch]
+        counts = torch.tensor([job[3] for job in part], device=device)
+        features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
+        tokens = tokenizer.encode(features, counts * rate)[..., 0]  # (B, N)
+        for row, (clip, phase, _, count) in enumerate(part):
+            own = tokens[row][tokens[row] != NO_TOKEN]
+            starts[clip, phase], lengths[clip, phase] = total, count
+            found.append(own)
+            total += len(own)
+    missing = lengths == 0
+    starts = torch.where(missing, starts[:, :1], starts).to(device)
+    lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
+    return {"tokens": torch.cat(found)[:, None], "starts": starts, "lengths": lengths}

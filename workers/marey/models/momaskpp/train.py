@@ -1,0 +1,85 @@
+"""Training of MoMask++: tokenizer, tokens, masked transformer, refiner, length estimator, then the bundle."""
+
+from __future__ import annotations
+
+import torch
+
+from marey.core.errors import InvalidInput
+from marey.models.momaskpp.assembly import recipe_of
+from marey.models.momaskpp.captions import WordData
+from marey.models.momaskpp.config import MoMaskPPConfig
+from marey.models.momaskpp.stage_masked import MaskedStage
+from marey.models.momaskpp.stage_refiner import LengthStage, RefinerStage
+from marey.models.momaskpp.stage_tokenizer import TokenizerStage
+from marey.models.momaskpp.tokenizer import Tokenizer
+from marey.models.momaskpp.tokens import load_scale_tokens
+from marey.nn.devices import choose_device
+from marey.training.loop import TrainingStage, start_process_group
+from marey.training.motions import MotionData
+from marey.training.staging import TrainOptions, finish, train_all, use_threads
+
+
+def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, float]:
+    """Train one stage, or with `all` every stage that the configuration has, and write its part; return its metrics.
+
+    Raises:
+        NotFound: a stage it builds on has not finished, or captions have no text features.
+        InvalidInput: unknown stage, one that the configuration does not have, or parts or data of another one.
+    """
+    recipe = recipe_of(options.config)
+    if name == "all":
+        return train_all(recipe, train_stage, options)
+    recipe.check_name(name)
+    start_process_group()
+    use_threads(options.threads)
+    data = MotionData.load(options.prepared, choose_device(options.device))
+    check_layout(options.config, data)
+    torch.manual_seed(options.seed)
+    stage = _stage(name, options, data)
+    metrics = recipe.train(stage, options)
+    if isinstance(stage, TokenizerStage):
+        metrics |= stage.test()
+    finish(stage.module, options, name, metrics, data.prepared.sha256)
+    return metrics
+
+
+def _stage(name: str, options: TrainOptions[MoMaskPPConfig], data: MotionData) -> TrainingStage:
+    config = options.config
+    if name == "tokenizer":
+        return TokenizerStage(config, data, Tokenizer(config))
+    if name == "refiner":
+        return RefinerStage(config, data)
+    tokens = load_scale_tokens(options.run, load_tokenizer(options, data), data)
+    words = WordData.load(data.prepared, config.text, data.features.device)
+    torch.manual_seed(options.seed)
+    clips = data.prepared.clips
+    kind = MaskedStage if name == "masked" else LengthStage
+    return kind(config, clips, tokens, words)
+
+
+def check_layout(config: MoMaskPPConfig, data: MotionData) -> None:
+    """Refuse data of another layout.
+
+    Raises:
+        InvalidInput: the features of the folder are not the configuration's.
+    """
+    found = data.prepared.manifest.layout
+    if found != config.layout:
+        raise InvalidInput(
+            f"holds features of the layout {found}; the configuration {config.name!r} reads {config.layout}",
+            where=str(data.prepared.path),
+            hint="Prepare the data with this layout, or choose another configuration.",
+        )
+
+
+def load_tokenizer(options: TrainOptions[MoMaskPPConfig], data: MotionData) -> Tokenizer:
+    """Load the run's trained tokenizer, with the statistics of the data it was trained on.
+
+    Raises:
+        NotFound: not trained yet.
+        InvalidInput: trained with another configuration.
+    """
+    part = recipe_of(options.config).part("tokenizer", options.config, options.run)
+    tokenizer = Tokenizer(options.config).to(data.features.device)
+    tokenizer.load_state_dict(part.state)
+    return tokenizer.eval().requires_grad_(False)
