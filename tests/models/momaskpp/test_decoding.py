@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from marey.models.momaskpp.config import RELEASED_HUMANML3D, TINY, InferenceConfig, MoMaskPPConfig
-from marey.models.momaskpp.decoding import Items, decode, remaining_counts
-from marey.models.momaskpp.model import MaskedTransformer
+from marey.models.momaskpp.decoding import ScaleItems, decode, remaining_counts
+from marey.models.momaskpp.model import ScaleTransformer
 from marey.models.momaskpp.released import MASKED, renamed
 from marey.models.momaskpp.scales import Scales
 from marey.nn.convolution import frame_mask
@@ -51,7 +51,7 @@ def test_whole_loops_give_the_published_tokens(name: str, cross: bool, lengths: 
     scales = Scales.of(config)
     state = drawn(masked_shapes(512, scales.size, 4, cross=cross))
     state["token_emb.weight"] *= 30
-    model = MaskedTransformer(config)
+    model = ScaleTransformer(config)
     filled(model, renamed(state, MASKED))
     states, present = normal(13, 2, 20, 768) * 0.2, frame_mask(torch.tensor(words), 20)
     items = make_items(model, scales, torch.tensor(lengths), states, present)
@@ -64,9 +64,9 @@ def test_whole_loops_give_the_published_tokens(name: str, cross: bool, lengths: 
     assert same >= 0.98 * total  # near-equal confidences may swap
 
 
-def make_items(model: MaskedTransformer, scales: Scales, lengths: Tensor, states: Tensor, present: Tensor) -> Items:
+def make_items(model: ScaleTransformer, scales: Scales, lengths: Tensor, states: Tensor, present: Tensor) -> ScaleItems:
     size = (len(lengths), scales.size)
-    return Items(
+    return ScaleItems(
         lengths=lengths,
         seeds=torch.arange(len(lengths)),
         words=model.words(states),
@@ -78,17 +78,17 @@ def make_items(model: MaskedTransformer, scales: Scales, lengths: Tensor, states
 
 
 @pytest.fixture(params=["in-context", "cross-attention"])
-def tiny(request: pytest.FixtureRequest) -> tuple[MaskedTransformer, MoMaskPPConfig]:
+def tiny(request: pytest.FixtureRequest) -> tuple[ScaleTransformer, MoMaskPPConfig]:
     config = replace(TINY, masked=replace(TINY.masked, conditioning=request.param))
     torch.manual_seed(0)
-    model = MaskedTransformer(config).eval().requires_grad_(False)
+    model = ScaleTransformer(config).eval().requires_grad_(False)
     for layer in model.modules():
         if isinstance(layer, torch.nn.Linear):
             torch.nn.init.normal_(layer.weight, std=0.2)
     return model, config
 
 
-def test_kept_tokens_stay_and_the_others_follow_them(tiny: tuple[MaskedTransformer, MoMaskPPConfig]) -> None:
+def test_kept_tokens_stay_and_the_others_follow_them(tiny: tuple[ScaleTransformer, MoMaskPPConfig]) -> None:
     model, config = tiny
     scales, lengths = Scales.of(config), torch.tensor([30, 45])
     states, present = torch.randn(2, 12, 384), torch.ones(2, 12, dtype=torch.bool)
@@ -107,7 +107,7 @@ def test_kept_tokens_stay_and_the_others_follow_them(tiny: tuple[MaskedTransform
 
 
 def test_guidance_temperature_and_the_share_of_codes_change_the_draw(
-    tiny: tuple[MaskedTransformer, MoMaskPPConfig],
+    tiny: tuple[ScaleTransformer, MoMaskPPConfig],
 ) -> None:
     model, config = tiny
     scales = Scales.of(config)
@@ -123,7 +123,7 @@ def test_guidance_temperature_and_the_share_of_codes_change_the_draw(
     assert made(replace(base, temperature=0.0)) == made(replace(base, top_k=1 / 32))
 
 
-def test_items_that_are_dropped_leave_the_others_as_they_are(tiny: tuple[MaskedTransformer, MoMaskPPConfig]) -> None:
+def test_items_that_are_dropped_leave_the_others_as_they_are(tiny: tuple[ScaleTransformer, MoMaskPPConfig]) -> None:
     model, config = tiny
     scales = Scales.of(config)
     items = make_items(

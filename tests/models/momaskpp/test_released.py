@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from marey.core.errors import InvalidFile
 from marey.models.momaskpp.config import RELEASED_HUMANML3D, RELEASED_SNAPMOGEN, MoMaskPPConfig
-from marey.models.momaskpp.model import MaskedTransformer, RootRefiner
+from marey.models.momaskpp.model import RootRefiner, ScaleTransformer
 from marey.models.momaskpp.released import MASKED, REFINER, TOKENIZER, renamed
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.tokenizer import Tokenizer
@@ -45,11 +45,11 @@ def filled(network: nn.Module, state: dict[str, Tensor]) -> None:
     network.eval().requires_grad_(False)
 
 
-def transformer(config: MoMaskPPConfig, *, cross: bool) -> MaskedTransformer:
+def transformer(config: MoMaskPPConfig, *, cross: bool) -> ScaleTransformer:
     masked = replace(config.masked, conditioning="cross-attention" if cross else "in-context")
     config = replace(config, masked=masked)
     scales = Scales.of(config)
-    model = MaskedTransformer(config)
+    model = ScaleTransformer(config)
     shapes = masked_shapes(config.tokenizer.codes, scales.size, len(scales.divisors), cross=cross)
     filled(model, renamed(drawn(shapes), MASKED))
     return model

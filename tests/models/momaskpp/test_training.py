@@ -18,8 +18,8 @@ from marey.models.momaskpp.captions import INDEX, STATES, WordData
 from marey.models.momaskpp.config import PAPER, RELEASED_SNAPMOGEN, STARTER, TINY, MoMaskPPConfig, PerturbationConfig
 from marey.models.momaskpp.generate import Generator
 from marey.models.momaskpp.scales import Scales
-from marey.models.momaskpp.stage_masked import MaskedSample, MaskedStage, choose_masks
-from marey.models.momaskpp.stage_tokenizer import TokenizerStage, has_positions, tokenizer_loss
+from marey.models.momaskpp.stage_masked import ScaleSample, ScaleStage, choose_masks
+from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage, has_positions, tokenizer_loss
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import ScaleTokens, encode_clips
 from marey.models.momaskpp.train import train_stage
@@ -60,17 +60,17 @@ def words(prepared: PreparedData, run: Path) -> WordData:
 
 
 @pytest.fixture(scope="module")
-def stage(prepared: PreparedData, words: WordData) -> MaskedStage:
+def stage(prepared: PreparedData, words: WordData) -> ScaleStage:
     return masked_stage(prepared, words)
 
 
-def masked_stage(prepared: PreparedData, words: WordData, config: MoMaskPPConfig = TINY) -> MaskedStage:
+def masked_stage(prepared: PreparedData, words: WordData, config: MoMaskPPConfig = TINY) -> ScaleStage:
     data = MotionData.load(prepared.path, CPU)
     torch.manual_seed(0)
     tokenizer = Tokenizer(config)
     tokenizer.quantizer.codebooks.normal_()
     tokens = ScaleTokens(**encode_clips(tokenizer, data), scales=tokenizer.scales)
-    return MaskedStage(config, prepared.clips, tokens, words)
+    return ScaleStage(config, prepared.clips, tokens, words)
 
 
 def test_all_stages_end_in_a_bundle_that_generates_and_trains_on(
@@ -137,13 +137,13 @@ def test_words_of_captions_are_encoded_once_and_again_for_other_captions(
     other = PreparedData.open(write_prepared(tmp_path / "other", acts=("walk", "bow")))
     for name in (STATES, INDEX):
         (other.path / name).write_bytes((prepared.path / name).read_bytes())
-    assert len(WordData.load(other, TINY.text, CPU).start) == 1 + 4  # two acts, two captions each
+    assert len(WordData.load(other, TINY.text, CPU).start) == 1 + 4  # two captions of each of two actions
     (other.path / STATES).write_bytes(b"no array")
     with pytest.raises(InvalidFile):
         WordData.load(other, TINY.text, CPU)
 
 
-def test_tokens_of_all_scales_come_back_in_their_places(prepared: PreparedData, stage: MaskedStage) -> None:
+def test_tokens_of_all_scales_come_back_in_their_places(prepared: PreparedData, stage: ScaleStage) -> None:
     data = MotionData.load(prepared.path, CPU)
     torch.manual_seed(0)
     tokenizer = Tokenizer(TINY).eval()
@@ -173,11 +173,11 @@ def test_masks_are_counted_on_the_tokens_a_clip_has_or_as_published_on_all() -> 
     ]
 
 
-def test_tokens_are_replaced_in_the_published_shares(stage: MaskedStage) -> None:
+def test_tokens_are_replaced_in_the_published_shares(stage: ScaleStage) -> None:
     sample = next(iter(stage.samples(np.arange(4).repeat(64), np.random.default_rng(0))))
     half = torch.arange(sample.tokens.shape[1])[None] % 2 == 0
     masked = half.expand_as(sample.tokens) & (sample.tokens >= 0)
-    sample = MaskedSample(sample.tokens, sample.positions, sample.lengths, sample.text, masked, sample.dropped)
+    sample = ScaleSample(sample.tokens, sample.positions, sample.lengths, sample.text, masked, sample.dropped)
     shown, valid = stage.shown(sample), sample.tokens >= 0
     hidden = (shown == stage.module.mask_token)[masked].float().mean()
     assert float(hidden) == pytest.approx(0.9 * 0.88, abs=0.03)
@@ -204,7 +204,7 @@ def test_only_masked_tokens_are_predicted_and_the_loss_falls(prepared: PreparedD
     assert np.mean(losses[-5:]) < np.mean(losses[:5]) - 0.2
 
 
-def test_samples_without_condition_read_no_caption(stage: MaskedStage) -> None:
+def test_samples_without_condition_read_no_caption(stage: ScaleStage) -> None:
     model = stage.module.eval()
     states = torch.randn(2, 3, 384)
     dropped = model.words(states, torch.tensor([True, False]))
@@ -214,7 +214,7 @@ def test_samples_without_condition_read_no_caption(stage: MaskedStage) -> None:
 
 def test_the_tokenizers_loss_weighs_essential_columns_and_the_root_once_more(prepared: PreparedData) -> None:
     data = MotionData.load(prepared.path, CPU)
-    stage = TokenizerStage(TINY, data, Tokenizer(TINY))
+    stage = ScaleTokenizerStage(TINY, data, Tokenizer(TINY))
     model = stage.module.eval()
     model.quantizer.codebooks.normal_()
     features, lengths = data.windows(torch.tensor([0]), 32), torch.tensor([32])
@@ -222,7 +222,7 @@ def test_the_tokenizers_loss_weighs_essential_columns_and_the_root_once_more(pre
     def total(**weights: float) -> float:
         plain = {"essential_weight": 0.0, "position_weight": 0.0, "commitment": 0.0, **weights}
         config = replace(TINY, tokenizer=replace(TINY.tokenizer, **plain))
-        return float(tokenizer_loss(model, config, features, lengths, 1.0).total)
+        return tokenizer_loss(model, config, features, lengths, 1.0).total.item()
 
     losses = tokenizer_loss(model, TINY, features, lengths, 1.0)
     assert total() == pytest.approx(float(losses.features), rel=1e-5)

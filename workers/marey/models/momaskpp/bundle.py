@@ -11,7 +11,7 @@ from torch import nn
 from marey.bundles import Bundle, TextSpec
 from marey.core.errors import InvalidBundle
 from marey.models.momaskpp.config import MoMaskPPConfig, named_config
-from marey.models.momaskpp.model import LengthEstimator, MaskedTransformer, RootRefiner
+from marey.models.momaskpp.model import LengthHead, RootRefiner, ScaleTransformer
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.nn.bundling import fill, random_parts, standing, write_generator
 from marey.nn.motion_tokenizer import biased_std
@@ -20,22 +20,22 @@ MODEL = "momaskpp"
 
 
 @dataclass(frozen=True)
-class Networks:
+class ScaleNetworks:
     """All networks of a bundle."""
 
     tokenizer: Tokenizer
-    masked: MaskedTransformer
+    masked: ScaleTransformer
     refiner: RootRefiner | None
-    length: LengthEstimator | None
+    length: LengthHead | None
 
     @classmethod
-    def build(cls, config: MoMaskPPConfig) -> Networks:
+    def build(cls, config: MoMaskPPConfig) -> ScaleNetworks:
         """Build freshly initialised networks: those that the configuration has."""
         return cls(
             Tokenizer(config),
-            MaskedTransformer(config),
+            ScaleTransformer(config),
             RootRefiner(config) if config.has_refiner else None,
-            LengthEstimator(config) if config.has_length else None,
+            LengthHead(config) if config.has_length else None,
         )
 
     def parts(self) -> dict[str, nn.Module]:
@@ -44,7 +44,7 @@ class Networks:
         return {name: network for name, network in found.items() if network is not None}
 
 
-def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, Networks]:
+def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, ScaleNetworks]:
     """Build and fill the networks of a bundle, float32, in evaluation mode.
 
     Raises:
@@ -53,7 +53,7 @@ def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, Networks]:
     if bundle.manifest.model != MODEL:
         raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
     config = MoMaskPPConfig.from_dict(bundle.manifest.parameters)
-    networks = Networks.build(config)
+    networks = ScaleNetworks.build(config)
     for name, network in networks.parts().items():
         fill(network, bundle, name)
     mean, std = (torch.from_numpy(v) for v in bundle.statistics())
@@ -68,7 +68,7 @@ def random_bundle(path: Path | str, config: str | MoMaskPPConfig = "tiny", seed:
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config
-    parts = random_parts(lambda: Networks.build(config).parts(), ("masked",), seed)
+    parts = random_parts(lambda: ScaleNetworks.build(config).parts(), ("masked",), seed)
     mean, std = standing(config.layout)
     text = TextSpec(encoder="minilm" if config.text.width == 384 else "t5-v1_1-base", width=config.text.width)
     biased = biased_std(torch.from_numpy(std), config.tokenizer.feature_bias).numpy()

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from marey.models.momaskpp.config import InferenceConfig
-from marey.models.momaskpp.model import MaskedTransformer
+from marey.models.momaskpp.model import ScaleTransformer
 from marey.models.momaskpp.scales import Scales
 from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import sample_top_k, uniform
@@ -27,7 +27,7 @@ KeepRows = Callable[[], Tensor | None]
 
 
 @dataclass(frozen=True)
-class Items:
+class ScaleItems:
     """The items of one bucket, at S of the N positions."""
 
     lengths: Tensor  # (B,) own tokens n of the full scale
@@ -38,9 +38,9 @@ class Items:
     tokens: Tensor  # (B, N) int64, NO_TOKEN where not decoded
     kept: Tensor  # (B, N) bool: tokens that stay as they are
 
-    def select(self, rows: Tensor) -> Items:
+    def select(self, rows: Tensor) -> ScaleItems:
         """Return the items at `rows`."""
-        return Items(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
+        return ScaleItems(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
 
 def remaining_counts(total: int, steps: int) -> list[int]:
@@ -56,7 +56,9 @@ def remaining_counts(total: int, steps: int) -> list[int]:
     return [*(min(total, max(1, round(math.cos(math.pi / 2 * t) * total))) for t in times), 0]
 
 
-def decode(model: MaskedTransformer, items: Items, scales: Scales, config: InferenceConfig, keep: KeepRows) -> Items:
+def decode(
+    model: ScaleTransformer, items: ScaleItems, scales: Scales, config: InferenceConfig, keep: KeepRows
+) -> ScaleItems:
     """Fill `tokens` at the positions that the items have: L passes, each masks the least confident tokens anew.
 
     Args:
@@ -99,14 +101,14 @@ BUCKET = 8
 """Tokens of the full scale; an item is padded to a multiple of this, not to the longest of its batch."""
 
 
-def _positions(items: Items, scales: Scales) -> Tensor:
+def _positions(items: ScaleItems, scales: Scales) -> Tensor:
     longest = bucket_of(int(items.lengths.max()), BUCKET, scales.longest)
     return bucket_positions(scales, longest).to(items.tokens.device)
 
 
 def _pass(
-    model: MaskedTransformer,
-    items: Items,
+    model: ScaleTransformer,
+    items: ScaleItems,
     tokens: Tensor,
     valid: Tensor,
     positions: Tensor,

@@ -16,9 +16,9 @@ from marey.bundles.body import layout_of
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.groups import RowWatcher, StepCounter, group_rows
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
-from marey.models.momaskpp.bundle import Networks, load_networks
+from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
-from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, Items, bucket_of, decode
+from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, ScaleItems, bucket_of, decode
 from marey.models.momaskpp.model import ROOT_VELOCITY, RootRefiner, inputs_of
 from marey.models.momaskpp.words import WordReader, pad_states
 from marey.motion.features import FeatureLayout
@@ -71,7 +71,7 @@ class Generator:
         self,
         bundle: Bundle,
         config: MoMaskPPConfig,
-        networks: Networks,
+        networks: ScaleNetworks,
         reader: WordReader,
         device: torch.device,
         batch_threads: BatchThreads,
@@ -211,11 +211,13 @@ class Generator:
         most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
         return group_rows([self._bucket(count) for count in frames], most)
 
-    def _items(self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]) -> Items:
+    def _items(
+        self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]
+    ) -> ScaleItems:
         masked, device = self.networks.masked, self.device
         text = pad_states(words, self.config.text.max_words, device)
         size = (len(requests), self.scales.size)
-        return Items(
+        return ScaleItems(
             lengths=torch.tensor([self._tokens(f) for f in frames], device=device),
             seeds=torch.tensor([r.seed for r in requests], device=device),
             words=masked.words(text.states),
@@ -225,7 +227,7 @@ class Generator:
             kept=torch.zeros(size, dtype=torch.bool, device=device),
         )
 
-    def _generated(self, items: Items, position: int, frames: int) -> Generated:
+    def _generated(self, items: ScaleItems, position: int, frames: int) -> Generated:
         """Decode one item alone: a convolution rounds differently in another batch, and files would differ."""
         tokens, length = items.tokens[position : position + 1], items.lengths[position : position + 1]
         tokenizer, refiner = self.networks.tokenizer, self.networks.refiner

@@ -1,8 +1,8 @@
 """MoMask++: the networks beside the tokenizer, read top to bottom.
 
-    words ── Words (null condition: states times zero) ── condition tokens
-    tokens of all scales + words ── MaskedTransformer (eq. 7) ── logits
-    sentence                     ── LengthEstimator (ours)    ── logits of the number of tokens
+    words ── WordTokens (null condition: states times zero) ── condition tokens
+    tokens of all scales + words ── ScaleTransformer (eq. 7) ── logits
+    sentence                     ── LengthHead (ours)    ── logits of the number of tokens
     features without the root's velocity ── RootRefiner       ── that velocity
 
 Shapes: B batch, N positions of all scales, S of them that a batch has, L words, K codes, W width of the text states,
@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from marey.models.momaskpp.attention import CrossTransformer
 from marey.models.momaskpp.config import MoMaskPPConfig, TextConfig
 from marey.models.momaskpp.scales import Scales
-from marey.models.momaskpp.tokenizer import Residuals
+from marey.models.momaskpp.tokenizer import DilatedBlocks
 from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import pack_linears, packed_gelu
 from marey.nn.sampling import guide
@@ -40,7 +40,7 @@ class TextStates:
         return TextStates(self.states[rows], self.present[rows])
 
 
-class TextNormalizer(nn.Module):
+class WordNormalizer(nn.Module):
     """Standardisation of text states by the training captions' mean and std (ours); identity until they are set.
 
     Noise in training stands in for phrasings that the captions lack.
@@ -61,14 +61,14 @@ class TextNormalizer(nn.Module):
         return x + self.noise * torch.randn_like(x) if self.training and self.noise > 0 else x
 
 
-class Words(nn.Module):
+class WordTokens(nn.Module):
     """Condition tokens of a text. Without condition the states are zero; bias, positions and the mask stay."""
 
     positions: Tensor  # (L, w)
 
     def __init__(self, config: TextConfig, width: int) -> None:
         super().__init__()
-        self.normalizer = TextNormalizer(config)
+        self.normalizer = WordNormalizer(config)
         self.project = nn.Linear(config.width, width)
         self.register_buffer("positions", sinusoidal_positions(config.max_words, width), persistent=False)
 
@@ -79,7 +79,7 @@ class Words(nn.Module):
         return self.project(x) + self.positions[: x.shape[1]]
 
 
-class MaskedTransformer(nn.Module):
+class ScaleTransformer(nn.Module):
     """Predicts masked tokens of all scales from the others and a text (eq. 7)."""
 
     positions: Tensor  # (N, w)
@@ -88,7 +88,7 @@ class MaskedTransformer(nn.Module):
         super().__init__()
         c, codes = config.masked, config.tokenizer.codes
         self.mask_token, self.pad_token = codes, codes + 1
-        self.words = Words(config.text, c.width)
+        self.words = WordTokens(config.text, c.width)
         self.embedding = nn.Embedding(codes + 2, c.embedding)
         self.project = nn.Linear(c.embedding, c.width)
         self.register_buffer("positions", sinusoidal_positions(Scales.of(config).size, c.width), persistent=False)
@@ -147,12 +147,12 @@ class MaskedTransformer(nn.Module):
         return self.codes(hidden).float()
 
 
-class LengthEstimator(nn.Module):
+class LengthHead(nn.Module):
     """Number of tokens from the encoding of the whole sentence: classes 1 … n_max (ours, after MoMask's estimator)."""
 
     def __init__(self, config: MoMaskPPConfig) -> None:
         super().__init__()
-        self.normalizer = TextNormalizer(config.text)
+        self.normalizer = WordNormalizer(config.text)
         widths = (config.text.width, *config.length_hidden)
         layers: list[nn.Module] = []
         for before, after in itertools.pairwise(widths):
@@ -171,7 +171,7 @@ class RootRefiner(nn.Module):
         super().__init__()
         c = config.refiner
         self.in_proj = nn.Conv1d(len(inputs_of(config)), c.width, 3, padding=1)
-        self.residuals = Residuals(c.width, c.depth, c.dropout)
+        self.residuals = DilatedBlocks(c.width, c.depth, c.dropout)
         self.out_proj = nn.Conv1d(c.width, 2, 3, padding=1)
 
     def forward(self, features: Tensor) -> Tensor:

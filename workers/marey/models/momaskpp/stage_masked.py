@@ -14,7 +14,7 @@ from marey.data.manifest import Clip
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
 from marey.models.momaskpp.decoding import bucket_positions
-from marey.models.momaskpp.model import MaskedTransformer, TextStates
+from marey.models.momaskpp.model import ScaleTransformer, TextStates
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.tokens import ScaleTokens
 from marey.nn.losses import token_losses
@@ -24,7 +24,7 @@ from marey.training.pairs import Pairs, pieces_of
 
 
 @dataclass(frozen=True)
-class MaskedSample:
+class ScaleSample:
     """Part of a batch of (clip, caption) pairs, with all random choices but those of replaced tokens made."""
 
     tokens: Tensor  # (B, S), NO_TOKEN where a clip has none
@@ -53,7 +53,7 @@ def choose_masks(scales: Scales, lengths: Tensor, progress: Tensor, noise: Tenso
     return easy_to_hard_mask(zero, noise, valid, mask_counts(progress, valid.sum(1)), 0.0)
 
 
-class MaskedStage:
+class ScaleStage:
     """Predicts masked tokens from the others and the words of a caption."""
 
     name = "masked"
@@ -64,7 +64,7 @@ class MaskedStage:
         self.optimisation = config.train_masked
         self.tokens, self.words = tokens, words
         self.scales = tokens.scales
-        self.module = MaskedTransformer(config).to(tokens.tokens.device)
+        self.module = ScaleTransformer(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, words.sentences, config.min_tokens)
         mean, std = words.statistics(self.pairs.train.tolist())
         self.module.words.normalizer.mean.copy_(mean)
@@ -95,7 +95,7 @@ class MaskedStage:
             totals += torch.stack([value.float().cpu() for value in self._batch(clips, rng)])
         return {"loss": float(totals[0] / totals[2]), "accuracy": float(totals[1] / totals[2])}
 
-    def samples(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Iterator[MaskedSample]:
+    def samples(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Iterator[ScaleSample]:
         """Draw phase, caption, τ, masks and drop of each clip, in pieces of similar lengths."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
@@ -110,9 +110,9 @@ class MaskedStage:
             columns = bucket_positions(self.scales, int(lengths[rows].max())).to(device)
             text = self.words.words(captions[rows])
             own = tokens[rows][:, columns], columns, lengths[rows], text, masked[rows][:, columns], dropped[rows]
-            yield MaskedSample(*own)
+            yield ScaleSample(*own)
 
-    def shown(self, sample: MaskedSample) -> Tensor:
+    def shown(self, sample: ScaleSample) -> Tensor:
         """Return what the transformer sees of the tokens (B, S): masked ones as [MASK], and some of all replaced."""
         p, codes = self.config.perturbation, self.config.tokenizer.codes
         targets = sample.tokens.clamp(min=0)
@@ -128,7 +128,7 @@ class MaskedStage:
         losses, right, counts = zip(*found, strict=True)
         return torch.stack(losses).sum(), torch.stack(right).sum(), torch.stack(counts).sum()
 
-    def _piece(self, sample: MaskedSample) -> tuple[Tensor, Tensor, Tensor]:
+    def _piece(self, sample: ScaleSample) -> tuple[Tensor, Tensor, Tensor]:
         model = self.module
         valid = self.scales.valid(sample.lengths)[:, sample.positions]
         words = model.words(sample.text.states, sample.dropped)

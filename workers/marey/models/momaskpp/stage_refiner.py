@@ -14,7 +14,7 @@ from marey.data.manifest import Clip
 from marey.data.sampling import sampling_weights
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
-from marey.models.momaskpp.model import ROOT_VELOCITY, LengthEstimator, RootRefiner, inputs_of
+from marey.models.momaskpp.model import ROOT_VELOCITY, LengthHead, RootRefiner, inputs_of
 from marey.models.momaskpp.tokens import ScaleTokens
 from marey.nn.motion_tokenizer import biased_std
 from marey.training.loop import StepContext
@@ -71,7 +71,7 @@ class RefinerStage:
         return F.smooth_l1_loss(self.module(noisy).float(), features[..., ROOT_VELOCITY])
 
 
-class LengthStage:
+class LengthHeadStage:
     """Training stage of the length: number of tokens from the sentence, on clips of natural length."""
 
     name = "length"
@@ -83,7 +83,7 @@ class LengthStage:
         self.sentences = words.sentences
         self.pairs = Pairs(clips, tokens, words.sentences, config.min_tokens, natural=True)
         self.lengths = tokens.lengths[:, 0]
-        self.module = LengthEstimator(config).to(tokens.tokens.device)
+        self.module = LengthHead(config).to(tokens.tokens.device)
         mean, std = words.sentence_statistics(self.pairs.train.tolist())
         self.module.normalizer.mean.copy_(mean)
         self.module.normalizer.std.copy_(std)

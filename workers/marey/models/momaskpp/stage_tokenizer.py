@@ -91,7 +91,7 @@ def _average(values: Tensor, valid: Tensor) -> Tensor:
     return (values * valid).sum() / valid.sum().clamp(min=1)
 
 
-class TokenizerStage:
+class ScaleTokenizerStage:
     """Windows of random clips; `module` is the tokenizer itself."""
 
     name = "tokenizer"

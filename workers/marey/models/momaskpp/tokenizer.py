@@ -23,7 +23,7 @@ from marey.nn.quantizer import NO_TOKEN, Quantized
 from marey.nn.transformer import Attention
 
 
-class Residuals(nn.Module):
+class DilatedBlocks(nn.Module):
     """Residual blocks with falling dilation: 3^(depth-1), …, 3, 1."""
 
     def __init__(self, width: int, depth: int, dropout: float) -> None:
@@ -53,7 +53,7 @@ class FrameAttention(nn.Module):
 
 def _stages(config: TokenizerConfig) -> tuple[nn.ModuleList, nn.ModuleList]:
     """Residual blocks and attention of each stage."""
-    residuals = (Residuals(config.width, config.depth, config.dropout) for _ in range(config.stages))
+    residuals = (DilatedBlocks(config.width, config.depth, config.dropout) for _ in range(config.stages))
     return nn.ModuleList(residuals), nn.ModuleList(FrameAttention(config) for _ in range(config.stages))
 
 

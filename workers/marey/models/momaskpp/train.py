@@ -8,9 +8,9 @@ from marey.core.errors import InvalidInput
 from marey.models.momaskpp.assembly import recipe_of
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
-from marey.models.momaskpp.stage_masked import MaskedStage
-from marey.models.momaskpp.stage_refiner import LengthStage, RefinerStage
-from marey.models.momaskpp.stage_tokenizer import TokenizerStage
+from marey.models.momaskpp.stage_masked import ScaleStage
+from marey.models.momaskpp.stage_refiner import LengthHeadStage, RefinerStage
+from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import load_scale_tokens
 from marey.nn.devices import choose_device
@@ -37,7 +37,7 @@ def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, f
     torch.manual_seed(options.seed)
     stage = _stage(name, options, data)
     metrics = recipe.train(stage, options)
-    if isinstance(stage, TokenizerStage):
+    if isinstance(stage, ScaleTokenizerStage):
         metrics |= stage.test()
     finish(stage.module, options, name, metrics, data.prepared.sha256)
     return metrics
@@ -46,14 +46,14 @@ def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, f
 def _stage(name: str, options: TrainOptions[MoMaskPPConfig], data: MotionData) -> TrainingStage:
     config = options.config
     if name == "tokenizer":
-        return TokenizerStage(config, data, Tokenizer(config))
+        return ScaleTokenizerStage(config, data, Tokenizer(config))
     if name == "refiner":
         return RefinerStage(config, data)
     tokens = load_scale_tokens(options.run, load_tokenizer(options, data), data)
     words = WordData.load(data.prepared, config.text, data.features.device)
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
-    kind = MaskedStage if name == "masked" else LengthStage
+    kind = ScaleStage if name == "masked" else LengthHeadStage
     return kind(config, clips, tokens, words)
 
 
