@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from marey.core.errors import InvalidInput
 from marey.exporters import Coordinates, exporters
 from marey.exporters.convert import convert
+from marey.generation.export import export_clip
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip, load_npz, parse_npz
 from marey.motion.features import HUMANML3D_263, FeatureLayout, PosedLayout, layout
@@ -27,6 +28,8 @@ from marey.motion.rotations import about, angle_between, between, from_euler, mu
 from marey.motion.skeleton import SNAPMOGEN
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
+from marey.quality.record import PromptMatch
+from marey.selector.records import match_of
 from marey.viz.player import html_player
 from marey.viz.render import contact_sheet
 from tests.support.rigged import mirrored, rigged
@@ -259,9 +262,13 @@ def test_cleaning_turns_only_legs_and_what_meets():
     assert turned[legs].max() > 1
 
 
-def test_quality_of_this_skeleton_is_not_measured():
+def test_a_clip_of_this_skeleton_is_exported_without_quality_and_match():
     clip = finish_motion(SNAPMOGEN_296.encode_pose(*rigged()), SNAPMOGEN_296)
-    assert quality_of(clip, expected_by_prompts(["a person sways"])) is None
+    assert quality_of(clip, expected_by_prompts(["a person walks"])) is None
+    assert match_of(clip, ["a person walks"]) == PromptMatch()
+    made = export_clip(clip, "non-commercial")
+    assert {file.format for file in made.files} == set(exporters())
+    assert (made.frames, made.fps) == (clip.frames, 30)
 
 
 def test_features_that_are_not_finite_are_refused():

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console
+from marey.cli.commands.convert import FromUnit, Unit
 from marey.core.errors import InvalidInput
 
 app = typer.Typer(help="Training data from capture archives.", no_args_is_help=True)
@@ -142,3 +143,31 @@ def text(
         task = bar.add_task("captions", total=None)
         count = data.encode_captions(folder, model, lambda done, total: bar.update(task, completed=done, total=total))
     console.say(f"{count} captions encoded")
+
+
+@app.command()
+def segment(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Long captures, such as .bvh or .npz.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],
+    shortest: Annotated[float, typer.Option("--shortest", help="Shortest piece in seconds.")] = 4.0,
+    longest: Annotated[
+        float, typer.Option("--longest", help="Longest piece in seconds; at least twice the shortest.")
+    ] = 12.0,
+    share: Annotated[
+        float, typer.Option("--share", help="Probability of a cut at the stillest moment; 0 at the fastest trough.")
+    ] = 0.5,
+    sigma: Annotated[
+        float, typer.Option("--sigma", help="Smoothing of the speed: standard deviation in seconds.")
+    ] = 0.25,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the draws.")] = 0,
+    from_unit: FromUnit = Unit.CENTIMETRE,
+) -> None:
+    """Cut long captures at still moments: writes an index.csv of the pieces, and a picture of each capture's speed."""
+    from marey.cli.roles import data
+
+    options = data.SegmentOptions(shortest, longest, share, sigma, seed, from_unit.value)
+    with _progress() as progress:
+        lines = data.segment_captures(files, output, options, progress)
+    for line in lines:
+        console.say(line)
+    console.result(str(output))

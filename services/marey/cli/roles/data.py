@@ -14,6 +14,7 @@ from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
     from marey.data.pack import JointsPack
+    from marey.motion.units import Unit
 
 
 OWN, PACK = "own", "pack"
@@ -193,3 +194,38 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
     processes = os.cpu_count() or 1
     CaptionTexts.build(captions, TextPipeline.load(spec), processes=processes, progress=progress).save(folder)
     return sum(map(len, captions))
+
+
+@dataclass(frozen=True)
+class SegmentOptions:
+    """How captures are cut; see `marey.data.segment.SegmentRule`, and `unit` of BVH files."""
+
+    shortest: float
+    longest: float
+    share: float
+    sigma: float
+    seed: int
+    unit: Unit
+
+
+def segment_captures(
+    files: Sequence[Path], output: Path, options: SegmentOptions, progress: Callable[[str, int, int | None], None]
+) -> list[str]:
+    """Cut captures into pieces, write their index and pictures, and return a line about each file.
+
+    Raises:
+        InvalidInput, Conflict, NotFound, InvalidFile, TooLarge: see `marey.data.segment_files.segment_files`.
+    """
+    try:
+        from marey.data.segment import SegmentRule
+        from marey.data.segment_files import segment_files
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    rule = SegmentRule(options.shortest, options.longest, options.share, options.sigma, options.seed)
+    done = segment_files(files, output, rule, unit=options.unit, progress=partial(progress, "segmenting"))
+    lines: list[str] = []
+    for file in done:
+        seconds, pieces = len(file.found.speed) / file.found.fps, len(file.found.pieces)
+        short = "" if pieces else f": shorter than {options.shortest:g} s, left out"
+        lines.append(f"{file.path.name}: {seconds:.1f} s, {pieces} pieces{short}")
+    return lines
