@@ -15,7 +15,7 @@ from marey.generation.port import Request
 from marey.models.momaskpp.bundle import load_networks, random_bundle
 from marey.models.momaskpp.config import CONFIGS, TINY, MoMaskPPConfig
 from marey.models.momaskpp.generate import Generated, Generator, SamplingSettings
-from marey.models.momaskpp.words import pad_states, word_states
+from marey.models.momaskpp.words import pad_states
 from marey.nn.batch_threads import BatchThreads
 from tests.support.prepared import text_features
 
@@ -197,15 +197,11 @@ def test_the_same_seed_gives_the_same_random_bundle(tmp_path: Path) -> None:
     assert a.weights_sha256 == b.weights_sha256 != c.weights_sha256
 
 
-def test_long_texts_are_cut_as_if_they_ended_there(generator: Generator) -> None:
-    encoder = generator.reader.encoder
-    long = "a person walks forward and waves with the left hand many times before sitting down"
-    (cut,) = word_states(encoder, [long], 8)
-    whole = encoder.encode("a person walks forward and waves")
-    assert np.allclose(cut, whole.tokens, atol=1e-5)
-    assert len(cut) == 8  # with the tokens that begin and end it
-    (short,) = word_states(encoder, ["a person walks"], 8)
-    assert np.allclose(short, encoder.encode("a person walks").tokens, atol=1e-5)
+def test_prompts_of_too_many_words_are_read_up_to_their_limit(generator: Generator) -> None:
+    words = "a person walks forward and waves with the left"
+    long, cut = generator.reader.states([f"{words} hand many times before sitting down", f"{words} hand"])
+    assert len(long) == TINY.text.max_words
+    assert np.allclose(long, cut, atol=1e-5)
 
 
 def test_states_of_a_prompt_are_read_once(generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,11 +23,11 @@ from marey.data.manifest import CLIPS
 from marey.data.prepared import PreparedData
 from marey.models.momaskpp.config import TextConfig
 from marey.models.momaskpp.model import TextStates
-from marey.models.momaskpp.words import word_states
 from marey.nn import distributed
 from marey.text.encoders import TextEncoder, encoder_sha256
 from marey.text.loading import load_encoder
 from marey.text.pipeline import refuse_mismatch
+from marey.text.truncation import truncated_tokens
 from marey.training.sentences import SentenceData, text_statistics
 from marey.training.texts import CaptionTexts
 
@@ -104,7 +104,7 @@ def _write(folder: Path, captions: Sequence[str], encoder: TextEncoder, config: 
     (folder / INDEX).unlink(missing_ok=True)
     found: list[NDArray[np.float16]] = []
     for at in range(0, len(unique), CHUNK):
-        states = word_states(encoder, unique[at : at + CHUNK], config.max_words)
+        states = truncated_tokens(encoder, unique[at : at + CHUNK], config.max_words)
         found += [each.astype(np.float16) for each in states]
     number = {text: i for i, text in enumerate(unique)}
     start = np.concatenate([[0], np.cumsum([len(each) for each in found])]).astype(np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import LengthLimits, ModelSpec, Setting, Stage, Training, Variety
+from marey.registry import ImportKind, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
 
 SPEC = ModelSpec(
     name="momaskpp",
@@ -42,4 +42,12 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     tokenizer="marey.models.momaskpp.tokenizer:build_tokenizer",
     random_bundle="marey.models.momaskpp.bundle:random_bundle",
+)
+
+IMPORT = ImportKind(
+    name="momaskpp",
+    help="MoMask++ (Guo et al. 2025): checkpoint_dir/snapmogen, with the data set's meta_data, or /humanml3d.",
+    run="marey.models.momaskpp.importing:import_momaskpp",
+    licence="LicenseRef-Snap-NC",
+    text_encoder=True,
 )

@@ -11,36 +11,13 @@ from numpy.typing import NDArray
 
 from marey.bundles import TextSpec
 from marey.models.momaskpp.model import TextStates
-from marey.text.encoders import TextEncoder, encoder_sha256
+from marey.text.encoders import encoder_sha256
 from marey.text.loading import load_encoder
 from marey.text.pipeline import refuse_mismatch
+from marey.text.truncation import truncated_tokens
 
 CACHED_TEXTS = 256
 """Prompts whose states are kept: candidates of one prompt come one after another."""
-
-
-def word_states(encoder: TextEncoder, texts: Sequence[str], limit: int) -> list[NDArray[np.float32]]:
-    """Return the states (L, W) of each text, special tokens included, L at most `limit`.
-
-    A longer text is cut after its last word that fits and encoded again, as encoders truncate: what is cut off then
-    changes no state.
-    """
-    found = encoder.tokens(texts)
-    return [
-        states if len(states) <= limit else _cut(encoder, text, limit)
-        for text, states in zip(texts, found, strict=True)
-    ]
-
-
-def _cut(encoder: TextEncoder, text: str, limit: int) -> NDArray[np.float32]:
-    encoding = encoder.encode(text)
-    ends = [stop for start, stop in encoding.offsets if stop > start]
-    special = len(encoding.offsets) - len(ends)
-    for count in range(limit - special, 0, -1):  # a cut word may become more tokens
-        states = encoder.encode(text[: ends[count - 1]]).tokens
-        if len(states) <= limit:
-            return states
-    return encoding.tokens[:limit]
 
 
 def pad_states(states: Sequence[NDArray[np.floating]], limit: int, device: torch.device) -> TextStates:
@@ -73,7 +50,7 @@ class WordReader:
         found = {text: self._read[text] for text in texts if text in self._read}
         missing = [text for text in dict.fromkeys(texts) if text not in found]
         if missing:
-            found.update(zip(missing, word_states(self.encoder, missing, self.limit), strict=True))
+            found.update(zip(missing, truncated_tokens(self.encoder, missing, self.limit), strict=True))
         for text, states in found.items():
             self._read[text] = states
             self._read.move_to_end(text)
