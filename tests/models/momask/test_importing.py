@@ -167,7 +167,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
     "a norm": (lambda f: options(f, RVQ, vq_norm="LN"), InvalidFile, "vq_norm: is 'LN'"),
     "another rate": (lambda f: options(f, RVQ, stride_t=4), InvalidFile, "stride_t: is '4', not 2"),
     "tokenizers that differ": (lambda f: options(f, RESIDUAL, vq_name="rvq_x"), InvalidFile, "vq_name: is 'rvq_x'"),
-    "a tokenizer elsewhere": (lambda f: options(f, MASKED, vq_name="../x"), InvalidFile, "cannot be the name of a folder"),
+    "a tokenizer elsewhere": (lambda f: options(f, MASKED, vq_name="../x"), InvalidFile, "cannot be the name"),
     "kit's transformer": (lambda f: options(f, MASKED, dataset_name="kit"), InvalidFile, "is 'kit', not 't2m'"),
     "kit's tokenizer": (lambda f: options(f, RVQ, dataset_name="kit"), InvalidFile, "is 'kit', not 't2m'"),
     "kit's statistics": (

@@ -45,9 +45,10 @@ class Folder:
             InvalidInput: there are several, so that it is not clear which to import.
         """
         masked = download.find("t2m_*/model/latest.tar", "t2m_*/model/net_best_fid.tar", what="the masked transformer")
-        tokenizer = download.options(_options(masked)).text("vq_name")
+        options = download.options(_options(masked))
+        tokenizer = options.text("vq_name")
         if Path(tokenizer).name != tokenizer:
-            raise InvalidFile(f"vq_name: {tokenizer[:80]!r} cannot be the name of a folder", where=str(_options(masked)))
+            raise InvalidFile(f"vq_name: {tokenizer[:80]!r} cannot be the name of a folder", where=options.where)
         return cls(
             masked,
             download.find("tres_*/model/net_best_fid.tar", "tres_*/model/latest.tar", what="the residual transformer"),
