@@ -61,7 +61,9 @@ def transformer_options(sizes: Sizes, data_set: str = "t2m", **changes: Any) -> 
     return options | changes
 
 
-def write_download(root: Path, sizes: Sizes = FULL, *, data_set: str = "t2m", shared: bool = True) -> Path:
+def write_download(
+    root: Path, sizes: Sizes = FULL, *, data_set: str = "t2m", shared: bool = True, salt: str = ""
+) -> Path:
     """Write `checkpoints/t2m` or `checkpoints/kit` below `root`, and return that folder."""
     folder = root / "checkpoints" / data_set
     rvq, masked, residual = (folder / (name + ("_k" if data_set == "kit" else "")) for name in (RVQ, MASKED, RESIDUAL))
@@ -70,14 +72,16 @@ def write_download(root: Path, sizes: Sizes = FULL, *, data_set: str = "t2m", sh
     write_options(masked / "opt.txt", transformer_options(sizes, data_set, name=masked.name, **names))
     options = transformer_options(sizes, data_set, name=residual.name, share_weight=shared, **names)
     write_options(residual / "opt.txt", options)
-    tensors = weights(rvq_shapes(sizes))
+    tensors = weights(rvq_shapes(sizes), salt)
     save(rvq / "model" / "net_best_fid.tar", vq_model=tensors, opt_vq_model={"state": {0: tensors}}, scheduler={})
     statistics = np.random.RandomState(0)
     (rvq / "meta").mkdir()
     np.save(rvq / "meta" / "mean.npy", statistics.normal(size=FEATURES[data_set]).astype(np.float32) / 50)
     np.save(rvq / "meta" / "std.npy", statistics.uniform(0.02, 0.1, FEATURES[data_set]).astype(np.float32))
-    tensors = weights(masked_shapes(sizes))
+    tensors = weights(masked_shapes(sizes), salt)
     save(masked / "model" / "latest.tar", t2m_transformer=tensors, opt_t2m_transformer={"state": {0: tensors}})
-    save(residual / "model" / "net_best_fid.tar", res_transformer=weights(residual_shapes(sizes, shared=shared)))
-    save(folder / "length_estimator" / "model" / "finest.tar", estimator=weights(length_shapes()), epoch=1, niter=2)
+    save(residual / "model" / "net_best_fid.tar", res_transformer=weights(residual_shapes(sizes, shared=shared), salt))
+    save(
+        folder / "length_estimator" / "model" / "finest.tar", estimator=weights(length_shapes(), salt), epoch=1, niter=2
+    )
     return folder

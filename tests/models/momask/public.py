@@ -118,9 +118,9 @@ def length_shapes(s: Sizes = FULL) -> Shapes:
     }
 
 
-def drawn(name: str, shape: tuple[int, ...]) -> Tensor:
+def drawn(name: str, shape: tuple[int, ...], salt: str = "") -> Tensor:
     """The weight that the golden numbers were made with: normal numbers seeded by the tensor's name."""
-    values = np.random.RandomState(zlib.crc32(name.encode())).standard_normal(shape)
+    values = np.random.RandomState(zlib.crc32((salt + name).encode())).standard_normal(shape)
     if len(shape) >= 2:
         values = values / np.sqrt(np.prod(shape[1:]))
     elif name.endswith("weight"):
@@ -130,9 +130,9 @@ def drawn(name: str, shape: tuple[int, ...]) -> Tensor:
     return torch.from_numpy(values.astype(np.float32))
 
 
-def weights(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Tensor]:
-    """Weights of the golden numbers; positions as the public code computes them."""
-    found = {name: drawn(name, shape) for name, shape in shapes.items() if name != "position_enc.pe"}
+def weights(shapes: Mapping[str, tuple[int, ...]], salt: str = "") -> dict[str, Tensor]:
+    """Weights of the golden numbers, or others with `salt`; positions as the public code computes them."""
+    found = {name: drawn(name, shape, salt) for name, shape in shapes.items() if name != "position_enc.pe"}
     if "position_enc.pe" in shapes:
         found["position_enc.pe"] = _positions(shapes["position_enc.pe"])
     return found

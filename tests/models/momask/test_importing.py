@@ -14,13 +14,12 @@ import torch
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound
-from marey.exporters import exporters
 from marey.generation.export import finish
 from marey.generation.port import Request
 from marey.importing import run_import
 from marey.models.momask.bundle import load_networks
 from marey.models.momask.generate import Generator, SamplingSettings
-from marey.motion.files import read_bvh
+from marey.motion import read_bvh, write_bvh
 from marey.text.pipeline import TextPipeline
 from tests.models.momask.download import (
     MASKED,
@@ -32,7 +31,7 @@ from tests.models.momask.download import (
     write_options,
 )
 from tests.models.momask.public import FULL, SMALL, Sizes
-from tests.support.command import run_command
+from tests.support.marey import Marey
 from tests.support.tiny_encoders import write_tiny_clip
 
 
@@ -73,9 +72,9 @@ def test_the_bundle_holds_the_public_tensors_and_options(bundle: Bundle, publish
     assert (config.masked.heads, config.masked.layers, config.residual.width) == (2, 2, 16)
     assert (config.tokenizer.levels, config.tokenizer.codes, config.shared) == (4, 24, True)
     masked = checkpoint(published, MASKED, "latest.tar")["t2m_transformer"]
-    block = networks.masked.sequence.transformer.blocks[1]
     assert torch.equal(
-        block.get_submodule("attention.qkv").weight, masked["seqTransEncoder.layers.1.self_attn.in_proj_weight"]
+        networks.masked.state_dict()["sequence.transformer.blocks.1.attention.qkv.weight"],
+        masked["seqTransEncoder.layers.1.self_attn.in_proj_weight"],
     )
     rvq = checkpoint(published, RVQ, "net_best_fid.tar")["vq_model"]
     assert torch.equal(networks.tokenizer.codebooks[2], rvq["quantizer.layers.2.codebook"])
@@ -110,10 +109,10 @@ def test_a_prompt_becomes_a_bvh_file(bundle: Bundle, clip: Path, tmp_path: Path)
     assert not np.array_equal(made[0].tokens, made[1].tokens)
     assert generator.frames(replace(requests[0], frames=None)) >= 16
     clip_made = finish(generator, requests[0], made[0], SamplingSettings())
-    file = tmp_path / "walk.bvh"
-    clip_made.save_bvh(file)
-    assert read_bvh(file).seconds == pytest.approx(3, abs=0.1)
-    assert "bvh" in exporters()
+    write_bvh(tmp_path / "walk.bvh", clip_made)
+    joints = read_bvh(tmp_path / "walk.bvh").joints()
+    assert len(joints) == clip_made.frames
+    assert np.isfinite(joints).all()
 
 
 @pytest.mark.parametrize("place", ["checkpoints/t2m", "checkpoints", "."])
@@ -123,7 +122,7 @@ def test_the_folder_may_be_named_from_above(published: Path, clip: Path, tmp_pat
 
 
 def test_kit_with_separate_tables_is_imported(clip: Path, tmp_path: Path) -> None:
-    folder = write_download(tmp_path, SMALL, data_set="kit", shared=False)
+    folder = write_download(tmp_path, replace(SMALL, features=251), data_set="kit", shared=False)
     made = run_import("momask", folder, tmp_path / "models" / "kit", text_encoder=clip, licence="CC-BY-4.0")
     config, networks = load_networks(made)
     assert (config.layout, config.fps, config.inference.guidance) == ("kit-251", 12.5, 2.0)
@@ -144,8 +143,8 @@ def nan(entries: dict[str, Any]) -> None:
 
 
 def options(folder: Path, part: str, **changes: Any) -> None:
-    known = vq_options if part == RVQ else transformer_options
-    values = known(SMALL, **({"share_weight": True} if part == RESIDUAL else {}) | changes)
+    values = vq_options(SMALL) if part == RVQ else transformer_options(SMALL, share_weight=part == RESIDUAL)
+    values |= changes
     write_options(folder / part / "opt.txt", {key: value for key, value in values.items() if value != "absent"})
 
 
@@ -162,13 +161,13 @@ FAULTS: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
     "other heads": (lambda f: options(f, RESIDUAL, n_heads=3), InvalidFile, "3 heads do not divide a width of 16"),
     "many layers": (lambda f: options(f, MASKED, n_layers=10**9), InvalidFile, "n_layers: 1000000000 is outside"),
     "more layers": (lambda f: options(f, MASKED, n_layers=3), InvalidFile, r"lacks the tensor .*layers\.2"),
-    "fewer layers": (lambda f: options(f, MASKED, n_layers=1), InvalidFile, "12 tensors that this import does not"),
+    "fewer layers": (lambda f: options(f, MASKED, n_layers=1), InvalidFile, "does not know: .* and 7 more"),
     "other sharing": (lambda f: options(f, RESIDUAL, share_weight=False), InvalidFile, "lacks the tensor token_embed"),
     "shared codebook": (lambda f: options(f, RVQ, shared_codebook=True), InvalidFile, "shared_codebook: is 'True'"),
     "a norm": (lambda f: options(f, RVQ, vq_norm="LN"), InvalidFile, "vq_norm: is 'LN'"),
     "another rate": (lambda f: options(f, RVQ, stride_t=4), InvalidFile, "stride_t: is '4', not 2"),
     "tokenizers that differ": (lambda f: options(f, RESIDUAL, vq_name="rvq_x"), InvalidFile, "vq_name: is 'rvq_x'"),
-    "a tokenizer elsewhere": (lambda f: options(f, MASKED, vq_name="../x"), InvalidFile, "no name of a folder"),
+    "a tokenizer elsewhere": (lambda f: options(f, MASKED, vq_name="../x"), InvalidFile, "cannot be the name"),
     "kit's transformer": (lambda f: options(f, MASKED, dataset_name="kit"), InvalidFile, "is 'kit', not 't2m'"),
     "kit's tokenizer": (lambda f: options(f, RVQ, dataset_name="kit"), InvalidFile, "is 'kit', not 't2m'"),
     "kit's statistics": (
@@ -177,7 +176,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
     "NaN": (lambda f: change(f, RESIDUAL, "net_best_fid.tar", nan), InvalidFile, "cond_emb.weight holds NaN"),
     "an unknown tensor": (
         lambda f: change(f, MASKED, "latest.tar", lambda e: e["t2m_transformer"].update(extra=torch.ones(1))),
-        InvalidFile, r"1 tensors that this import does not know: t2m_transformer\.extra",
+        InvalidFile, r"tensors that this import does not know: t2m_transformer\.extra",
     ),
     "another wrapper": (
         lambda f: change(f, MASKED, "latest.tar", lambda e: e.update(model=e.pop("t2m_transformer"))),
@@ -238,9 +237,9 @@ def test_full_size_checkpoints_become_motions_by_the_command_line(
 ) -> None:
     sizes: Sizes = replace(FULL, features={"t2m": 263, "kit": 251}[data_set])
     folder = write_download(tmp_path, sizes, data_set=data_set, shared=shared)
-    models = tmp_path / "models"
-    env = {"MAREY_MODELS": str(models), "MAREY_HOME": str(tmp_path / "home")}
-    run_command("models", "import", "momask", folder, "-o", models / "mine", "--text-encoder", clip, env=env)
-    run_command("generate", "a person walks", "--model", models / "mine", "-o", tmp_path / "out", "--seed", 1, env=env)
+    marey = Marey(tmp_path / "home", tmp_path / "models")
+    bundle = marey.models / "mine"
+    marey("models", "import", "momask", folder, "-o", bundle, "--text-encoder", clip).ok()
+    marey("generate", "a person walks", "--model", bundle, "-o", tmp_path / "out", "--seed", 1).ok()
     (file,) = (tmp_path / "out").rglob("*.bvh")
-    assert read_bvh(file).frames > 10
+    assert len(read_bvh(file).joints()) > 10

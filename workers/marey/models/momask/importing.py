@@ -45,9 +45,10 @@ class Folder:
             InvalidInput: there are several, so that it is not clear which to import.
         """
         masked = download.find("t2m_*/model/latest.tar", "t2m_*/model/net_best_fid.tar", what="the masked transformer")
-        tokenizer = download.options(_options(masked)).text("vq_name")
+        options = download.options(_options(masked))
+        tokenizer = options.text("vq_name")
         if Path(tokenizer).name != tokenizer:
-            raise InvalidFile(f"vq_name: {tokenizer[:80]!r} is no name of a folder", where=str(_options(masked)))
+            raise InvalidFile(f"vq_name: {tokenizer[:80]!r} cannot be the name of a folder", where=options.where)
         return cls(
             masked,
             download.find("tres_*/model/net_best_fid.tar", "tres_*/model/latest.tar", what="the residual transformer"),
@@ -86,7 +87,7 @@ def import_momask(request: ImportRequest) -> Bundle:
         return write_bundle(
             request.output, config, parts, statistics, text=text, card=card, overwrite=request.overwrite,
             licence=request.licence, training=provenance(request, accounts),
-            data=(replace(DATA[config.name], licence=request.licence),),
+            data=(DataSource(**DATA[config.name], licence=request.licence),),
         )  # fmt: skip
 
 
@@ -168,8 +169,8 @@ def _options(checkpoint: Path) -> Path:
 
 
 DATA = {
-    "t2m": DataSource(name="HumanML3D", licence="", credit="Guo et al. 2022; made of AMASS and HumanAct12"),
-    "kit": DataSource(name="KIT Motion-Language", licence="", credit="Plappert et al. 2016"),
+    "t2m": {"name": "HumanML3D", "credit": "Guo et al. 2022; made of AMASS and HumanAct12"},
+    "kit": {"name": "KIT Motion-Language", "credit": "Plappert et al. 2016"},
 }
 NORMALISATION = """\
 Mean and deviation of the RVQ-VAE's own `meta` folder. They differ from the data set's: the deviation of the root and of
