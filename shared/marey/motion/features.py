@@ -88,6 +88,10 @@ class FeatureLayout(Protocol):
 class PosedLayout(FeatureLayout, Protocol):
     """Port of layouts whose features hold the rotations of the skeleton: no pose is solved from positions."""
 
+    def encode_pose(self, rotations: Array, root: Array) -> Float32:
+        """Encode local quaternions (T, J, 4) and root (T, 3) in metres as features (T - 1, D)."""
+        ...
+
     def decode_pose(self, features: Array) -> tuple[Array, Array]:
         """Decode features (..., Tf, D) to local quaternions (..., Tf, J, 4) and root (..., Tf, 3) in metres, facing +Z
         in frame 0."""

@@ -19,6 +19,7 @@ import typer
 
 from marey.cli.main import app
 from marey.data.dataset import known_sets
+from marey.data.feature_sets import FEATURE_SETS
 from tests.support.pages import ROOT, Block, blocks
 
 ALL = blocks()
@@ -54,7 +55,7 @@ def unknown_source(words: list[str]) -> str | None:
     if words[:2] not in (["data", "prepare"], ["data", "pack"]):
         return None
     sources = set([*takewhile(lambda word: not word.startswith("-"), words[2:])][::2])
-    unknown = sources - {"own", "pack", *known_sets()}
+    unknown = sources - {"own", "pack", *known_sets(), *FEATURE_SETS}
     return f"no known set: {unknown}" if unknown else None
 
 

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
+from marey.evaluator.measuring import encoded
 from marey.exporters import Coordinates, exporters
 from marey.exporters.convert import convert
 from marey.generation.export import export_clip
@@ -269,6 +270,17 @@ def test_a_clip_of_this_skeleton_is_exported_without_quality_and_match():
     made = export_clip(clip, "non-commercial")
     assert {file.format for file in made.files} == set(exporters())
     assert (made.frames, made.fps) == (clip.frames, 30)
+
+
+def test_an_evaluator_reads_the_rotations_of_an_exported_clip():
+    features = SNAPMOGEN_296.encode_pose(*rigged(11, 60))
+    clip = finish_motion(features, SNAPMOGEN_296, clean=False)
+    again = encoded(SNAPMOGEN_296, clip)
+    assert again.shape == features.shape
+    within = slice(10, 40)  # away from the ends, where the facing is smoothed over other frames
+    np.testing.assert_allclose(again[within, SLICES["rotations"]], features[within, SLICES["rotations"]], atol=0.02)
+    np.testing.assert_allclose(again[within, 1:3], features[within, 1:3], atol=0.05)
+    assert np.abs(again - features)[-1, SLICES["rotations"]].max() < 0.2
 
 
 def test_features_that_are_not_finite_are_refused():

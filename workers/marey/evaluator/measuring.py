@@ -22,8 +22,9 @@ from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_pro
 from marey.items.expected import read_expected
 from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip, parse_npz
-from marey.motion.features import FeatureLayout, layout
+from marey.motion.features import FeatureLayout, PosedLayout, layout
 from marey.motion.resample import resample
+from marey.motion.rotations import conjugate, multiply
 from marey.quality.record import read_quality
 
 Piece = TypeVar("Piece")
@@ -178,7 +179,12 @@ def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
 
     An encoder needs the step after the last frame: the previous step is repeated.
     """
-    joints = travel_scale(clip.skeleton, space.skeleton) * np.asarray(clip.joints, np.float64)
+    scale = travel_scale(clip.skeleton, space.skeleton)
+    if isinstance(space, PosedLayout):
+        turns, root = np.asarray(clip.rotations, np.float64), scale * np.asarray(clip.root, np.float64)
+        onward = multiply(multiply(turns[-1:], conjugate(turns[-2:-1])), turns[-1:])
+        return space.encode_pose(np.concatenate([turns, onward]), np.concatenate([root, 2 * root[-1:] - root[-2:-1]]))
+    joints = scale * np.asarray(clip.joints, np.float64)
     return space.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
 
 
