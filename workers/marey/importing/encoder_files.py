@@ -112,8 +112,14 @@ def write_encoder(
     known = PUBLISHED[name]
     if not source.is_dir():
         raise NotFound("there is no such folder", where=str(source), hint=f"It should hold the files of {HUB[name]}.")
-    check_t5(name, source) if name.startswith("t5") else check_clip(source)
-    with TemporaryDirectory() as temporary, BundleWriter(output, overwrite=overwrite) as writer:
+    if name.startswith("t5"):
+        check_t5(name, source)
+    else:
+        check_clip(source)
+    with (
+        BundleWriter(output, overwrite=overwrite) as writer,
+        TemporaryDirectory(prefix=".", dir=output.parent) as temporary,  # /tmp may not have room for a gigabyte
+    ):
         weights, account = _weights(name, source, Path(temporary))
         writer.add_json("config.json", read_config(source))
         for file, content in _tokenizer(name, source, Path(temporary)).items():
