@@ -15,6 +15,7 @@ OPTIONS = {
     "file_format": "--input-format",
     "fps": "--fps",
     "in_place": "--in-place",
+    "mesh": "--mesh",
     "model": "--model",
     "name_template": "--name-template",
     "overwrite": "--overwrite",
