@@ -36,15 +36,18 @@ def blender() -> list[str]:
     pytest.skip("there is no Blender here (name a Python that has `bpy` in MAREY_BPY_PYTHON)")
 
 
+@pytest.mark.parametrize("options", [{}, {"root_bone": True}, {"bvh_root": "offset"}], ids=["plain", "root", "offset"])
 @pytest.mark.parametrize("name", CLIPS)
-def test_blender_puts_every_joint_where_the_npz_has_it(name, blender, tmp_path):
+def test_blender_puts_every_joint_where_the_npz_has_it(name, options, blender, tmp_path):
     clip = CLIPS[name]
+    if options.get("root_bone") and "root" in clip.skeleton.joint_names:
+        pytest.skip("this skeleton has a joint named root")
     clip.save_npz(tmp_path / "a.npz")
-    write_bvh(tmp_path / "a.bvh", clip)
+    write_bvh(tmp_path / "a.bvh", clip, **options)
     subprocess.run([*blender, tmp_path / "a.bvh", tmp_path / "seen.npz"], check=True, capture_output=True, timeout=300)
     wanted = load_npz(tmp_path / "a.npz")
     with np.load(tmp_path / "seen.npz") as seen:
         order = [list(seen["names"]).index(joint) for joint in wanted.skeleton.joint_names]
-        assert seen["joints"].shape == wanted.joints.shape
+        assert seen["joints"][:, order].shape == wanted.joints.shape
         assert np.linalg.norm(seen["joints"][:, order] - wanted.joints, axis=-1).max() < 1e-3
         assert float(seen["fps"]) == pytest.approx(wanted.fps, rel=1e-4)

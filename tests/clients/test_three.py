@@ -34,11 +34,14 @@ def three() -> list[str]:
     return [node, str(SCRIPT), folder]
 
 
+@pytest.mark.parametrize("root_bone", [False, True])
 @pytest.mark.parametrize("name", CLIPS)
-def test_three_puts_every_joint_where_the_npz_has_it(name, three, tmp_path):
+def test_three_puts_every_joint_where_the_npz_has_it(name, root_bone, three, tmp_path):
     clip = CLIPS[name]
+    if root_bone and "root" in clip.skeleton.joint_names:
+        pytest.skip("this skeleton has a joint named root")
     clip.save_npz(tmp_path / "a.npz")
-    write_bvh(tmp_path / "a.bvh", clip)
+    write_bvh(tmp_path / "a.bvh", clip, root_bone=root_bone)
     done = subprocess.run([*three, tmp_path / "a.bvh"], check=True, capture_output=True, text=True, timeout=120)
     assert done.stderr == ""
     wanted, seen = load_npz(tmp_path / "a.npz"), json.loads(done.stdout)

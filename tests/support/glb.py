@@ -44,9 +44,9 @@ class Glb:
         about = self.document["accessors"][number]
         view = self.document["bufferViews"][about["bufferView"]]
         width = WIDTHS[about["type"]]
-        assert about["componentType"] == 5126
-        assert view["byteLength"] == 4 * width * about["count"]
-        return np.frombuffer(self.data, "<f4", about["count"] * width, view["byteOffset"]).reshape(-1, width)
+        kind = {5126: "<f4", 5123: "<u2"}[about["componentType"]]
+        assert view["byteLength"] == np.dtype(kind).itemsize * width * about["count"]
+        return np.frombuffer(self.data, kind, about["count"] * width, view["byteOffset"]).reshape(-1, width)
 
     def times(self) -> np.ndarray:
         (animation,) = self.document["animations"]
@@ -64,7 +64,8 @@ class Glb:
 
     def world(self) -> np.ndarray:
         """World matrices (T, J, 4, 4) of the animated nodes."""
-        nodes, turns, places = self.document["nodes"], self.tracks("rotation"), self.tracks("translation")
+        nodes = [node for node in self.document["nodes"] if "mesh" not in node]
+        turns, places = self.tracks("rotation"), self.tracks("translation")
         frames = len(self.times())
         parents = {child: parent for parent, node in enumerate(nodes) for child in node.get("children", ())}
         world = np.zeros((frames, len(nodes), 4, 4))
@@ -82,7 +83,7 @@ class Glb:
 
     def rest(self) -> np.ndarray:
         """World positions (J, 3) of the nodes at rest, none of which is turned."""
-        nodes = self.document["nodes"]
+        nodes = [node for node in self.document["nodes"] if "mesh" not in node]
         assert not any("rotation" in node or "scale" in node or "matrix" in node for node in nodes)
         parents = {child: parent for parent, node in enumerate(nodes) for child in node.get("children", ())}
         places = np.zeros((len(nodes), 3))

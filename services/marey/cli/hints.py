@@ -16,6 +16,7 @@ OPTIONS = {
     "fps": "--fps",
     "in_place": "--in-place",
     "licence": "--licence",
+    "mesh": "--mesh",
     "model": "--model",
     "name_template": "--name-template",
     "overwrite": "--overwrite",

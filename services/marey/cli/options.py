@@ -12,7 +12,7 @@ import typer
 from marey.client.names import DEFAULT_TEMPLATE
 from marey.core.errors import InvalidInput
 from marey.items.item import MAX_BEST_OF, MAX_REDRAWS, read_setting
-from marey.motion.root_options import RootOptions
+from marey.motion.export_options import ExportOptions
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:
@@ -87,26 +87,28 @@ class PlacementOption(StrEnum):
     KEEP = "keep"
 
 
-def root_options(
+def export_options(
     bvh_root: BvhRootOption,
     root_bone: bool,
     in_place: InPlaceOption | None,
     tpose_frame: bool,
     rest_pose: RestPoseOption,
     placement: PlacementOption,
-) -> RootOptions:
-    """Return the options of root, rest pose and place of the files.
+    mesh: bool,
+) -> ExportOptions:
+    """Return the options of the files.
 
     Raises:
         InvalidInput: two contradict each other.
     """
-    return RootOptions(
+    return ExportOptions(
         bvh_root=bvh_root.value,
         root_bone=root_bone,
         in_place=None if in_place is None else in_place.value,
         tpose_frame=tpose_frame,
         rest_pose=rest_pose.value,
         placement=placement.value,
+        mesh=mesh,
     )
 
 
@@ -219,4 +221,5 @@ Placement = Annotated[
     PlacementOption,
     typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
 ]
+Mesh = Annotated[bool, typer.Option("--mesh", help="Add a neutral body to glb files, for viewers that show no bones.")]
 TEMPLATE = DEFAULT_TEMPLATE

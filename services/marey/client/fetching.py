@@ -19,8 +19,8 @@ from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
 from marey.exporters import check_options, exporters, extension_of
+from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.files import write_atomically
-from marey.motion.root_options import PLAIN, RootOptions
 
 PARALLEL = 8
 ATTEMPTS = 4
@@ -82,7 +82,7 @@ def fetch_job(
     review: str | None = None,
     prune: bool = False,
     overwrite: bool = False,
-    root: RootOptions = PLAIN,
+    export: ExportOptions = PLAIN,
     observer: FetchObserver | None = None,
 ) -> Planned:
     """Fetch the files that a job has so far, and write the manifest.
@@ -92,7 +92,7 @@ def fetch_job(
         review: fetch only motions with this verdict.
         prune: remove files that earlier manifests named for the job and this one does not.
         overwrite: replace files with other content.
-        root: root, rest pose and place of the motions: files of formats that have these options are made here of the
+        export: options of the files, such as a root bone: those of formats that have these options are made here of the
             npz, as are formats that the server does not have and this process has.
 
     Returns:
@@ -105,9 +105,9 @@ def fetch_job(
     """
     observer = observer or FetchObserver()
     known = exporters()
-    check_options((known[name] for name in formats or known if name in known), root)
+    check_options((known[name] for name in formats or known if name in known), export)
     pages = transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000)
-    planned = plan(pages, folder, formats, template, root=root)
+    planned = plan(pages, folder, formats, template, export=export)
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
     make_folders(folder, (file.path for _, files in planned for file in files))
@@ -190,14 +190,14 @@ def plan(
     formats: Sequence[str] | None,
     template: str = DEFAULT_TEMPLATE,
     *,
-    root: RootOptions = PLAIN,
+    export: ExportOptions = PLAIN,
 ) -> Planned:
     """Plan the files of each item and their paths.
 
     Args:
         items: items of the API, in input order.
         formats: of files; None = all there are.
-        root: options of the files.
+        export: options of the files.
 
     Raises:
         InvalidInput: two motions would have one name, or a name is not a plain file name.
@@ -209,7 +209,7 @@ def plan(
     for item in items:
         downloads: list[FileToFetch] = []
         motion = item["motion"]
-        for file, making in _wanted(motion["files"], formats, root, item["id"]) if motion else ():
+        for file, making in _wanted(motion["files"], formats, export, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
             wanted = file["format"] if making is None else making.exporter.format
@@ -268,12 +268,12 @@ def download_all(
 
 
 def _wanted(
-    files: list[dict[str, Any]], formats: Sequence[str] | None, root: RootOptions, item: str
+    files: list[dict[str, Any]], formats: Sequence[str] | None, export: ExportOptions, item: str
 ) -> Iterator[tuple[dict[str, Any], Making | None]]:
     """Yield the file to fetch for each format, with how the wanted one is made of it."""
     by_format = {file["format"]: file for file in files}
     for name in by_format if formats is None else formats:
-        making = making_of(name, by_format, root)
+        making = making_of(name, by_format, export)
         if making is None and name not in by_format:
             raise Conflict(f"was not made as {name}", where=f"item {item}", hint=f"It has {', '.join(by_format)}.")
         yield by_format[name if making is None else SOURCE], making

@@ -28,7 +28,7 @@ from marey.client.types.jobs import (
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
-from marey.motion.root_options import BvhRoot, InPlace, Placement, RootOptions
+from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Placement
 from marey.vocabulary.scope import ScopePolicy
 
 Row = Item | Mapping[str, object] | str
@@ -387,6 +387,7 @@ class Jobs(Resource):
         in_place: InPlace | None = None,
         tpose_frame: bool = False,
         placement: Placement = "origin",
+        mesh: bool = False,
         on_progress: OnFetched | FetchObserver | None = None,
     ) -> Sequence[FetchedItem]:
         """Fetch the motions that a job has so far, eight files at a time, with a `manifest.csv`.
@@ -396,12 +397,12 @@ class Jobs(Resource):
         Args:
             folder: created if missing.
             formats: such as bvh and npz; None = all that the server has. Others that this process can write, and files
-                with the options of the root, are made of the npz (extra `motion`), at every fetch anew.
+                with options of the export, are made of the npz (extra `motion`), at every fetch anew.
             name_template: of the paths, from `{index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}`.
             review: only motions with this review.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
-            bvh_root, root_bone, in_place, tpose_frame, placement: of the files whose formats have these options; see
+            bvh_root, root_bone, in_place, tpose_frame, placement, mesh: of files whose formats have these options; see
                 `docs/reference/formats.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
@@ -426,8 +427,13 @@ class Jobs(Resource):
             review=review,
             prune=prune,
             overwrite=overwrite,
-            root=RootOptions(
-                bvh_root=bvh_root, root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement
+            export=ExportOptions(
+                bvh_root=bvh_root,
+                root_bone=root_bone,
+                in_place=in_place,
+                tpose_frame=tpose_frame,
+                placement=placement,
+                mesh=mesh,
             ),
             observer=_Counting(on_progress) if callable(on_progress) else on_progress,
         )

@@ -1,4 +1,4 @@
-"""Files that the server does not have, made here of the npz: another format, root, place or rest pose."""
+"""Files that the server does not have, made here of the npz: another format, or one with options."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from marey.core.extras import needs_extra
 from marey.exporters import Coordinates, Exporter, exporters
-from marey.motion.root_options import RootOptions
+from marey.motion.export_options import ExportOptions
 
 SOURCE = "npz"
 
@@ -39,17 +39,17 @@ class Making:
             raise needs_extra("motion", error) from error
 
 
-def making_of(name: str, stored: Collection[str], root: RootOptions) -> Making | None:
+def making_of(name: str, stored: Collection[str], export: ExportOptions) -> Making | None:
     """Return how a file of a format is made, None if it is fetched as the server has it.
 
     Args:
         name: the format.
         stored: formats that the server has of the motion.
-        root: options that the file is to have.
+        export: options that the file is to have.
     """
     exporter = exporters().get(name)
     if exporter is None or SOURCE not in stored:
         return None
-    if name in stored and not exporter.options.intersection(root.chosen):
+    if name in stored and not exporter.options.intersection(export.chosen):
         return None
-    return Making(exporter, Coordinates.of(root))
+    return Making(exporter, Coordinates.of(export))

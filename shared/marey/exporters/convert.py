@@ -9,11 +9,11 @@ from marey.core.errors import Conflict, InvalidInput
 from marey.exporters.exporter import Coordinates, Exporter
 from marey.exporters.registry import check_options, exporters
 from marey.motion.clip import MAX_UNPACKED, MotionClip
+from marey.motion.export_options import PLAIN, ExportOptions, RestPose
 from marey.motion.files import read_limited, write_atomically
 from marey.motion.io.bvh import BvhClip
 from marey.motion.io.convert import clip_from_bvh, resample_bvh
 from marey.motion.resample import resample
-from marey.motion.root_options import PLAIN, RestPose, RootOptions
 from marey.motion.units import Unit, Up
 
 
@@ -24,7 +24,7 @@ def convert(
     fps: float | None = None,
     unit: Unit = "cm",
     up: Up = "y",
-    root: RootOptions = PLAIN,
+    export: ExportOptions = PLAIN,
     source_unit: Unit = "cm",
     source_up: Up = "y",
     source_rest_pose: RestPose = "t",
@@ -36,7 +36,7 @@ def convert(
         source, target: files of installed formats, such as `.bvh` and `.npz`.
         fps: rate of the result, in frames a second; None = the source's.
         unit, up: of a result whose format leaves them open, such as BVH; npz is always metres and Y up.
-        root: root, rest pose and place of the motion in the result.
+        export: options of the result, such as a root bone.
         source_unit, source_up, source_rest_pose: of such a source.
         overwrite: replace an existing file.
 
@@ -51,7 +51,7 @@ def convert(
     """
     source, target = Path(source), Path(target)
     reader, writer = _exporter_for(source), _exporter_for(target)
-    check_options([writer], root)
+    check_options([writer], export)
     if target.exists() and not overwrite:
         raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
     clip = _decode(reader, source, Coordinates(source_unit, source_up, rest_pose=source_rest_pose))
@@ -62,7 +62,7 @@ def convert(
         clip = clip if writer is reader else clip_from_bvh(clip, source.name)
     elif fps is not None:
         clip = resample(clip, fps)
-    write_atomically(target, writer.write(clip, Coordinates.of(root, unit, up)))
+    write_atomically(target, writer.write(clip, Coordinates.of(export, unit, up)))
     return notes
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from marey.motion.root_options import RootOptions
+from marey.motion.export_options import ExportOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -18,21 +18,21 @@ Decoded = TypeVar("Decoded")
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
 _EXTENSION = re.compile(r"[a-z0-9]{1,9}")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
-_DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(RootOptions)}
+_DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(ExportOptions)}
 
 
 @dataclass(frozen=True)
-class Coordinates(RootOptions):
+class Coordinates(ExportOptions):
     """Coordinates of a file: unit of length and upward axis where the format does not state them, such as BVH (others
-    ignore them), and the options of root, rest pose and place, which a format has by its `Exporter.options`."""
+    ignore them), and the options of an export, which a format has by its `Exporter.options`."""
 
     unit: Unit = "cm"
     up: Up = "y"
 
     @classmethod
-    def of(cls, root: RootOptions, unit: Unit = "cm", up: Up = "y") -> Coordinates:
-        """Return coordinates with these options of root, rest pose and place."""
-        return cls(unit, up, **{name: getattr(root, name) for name in root.chosen})
+    def of(cls, export: ExportOptions, unit: Unit = "cm", up: Up = "y") -> Coordinates:
+        """Return coordinates with these options."""
+        return cls(unit, up, **{name: getattr(export, name) for name in export.chosen})
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Exporter(Generic[Decoded]):
             sha256.
         stored: workers write it for every motion, and `marey generate` where no format is named; False = it is made on
             request alone, by `generate`, `convert` and `fetch`, because it takes long or can be made at any time.
-        options: names of the `RootOptions` that `encode` heeds; the others of its coordinates have their defaults.
+        options: names of the `ExportOptions` that `encode` heeds; the others of its coordinates have their defaults.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
     """

@@ -18,7 +18,11 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.glb_write import format_glb
 
-    return format_glb(clip, coordinates)
+    if not coordinates.mesh:
+        return format_glb(clip, coordinates)
+    from marey.viz.mannequin import mannequin
+
+    return format_glb(clip, coordinates, mannequin(clip))
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> MotionClip:
@@ -39,5 +43,5 @@ EXPORTER = Exporter(
     holds_prompt=True,
     encode=encode,
     decode=decode,
-    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement"}),
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement", "mesh"}),
 )

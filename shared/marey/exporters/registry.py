@@ -9,7 +9,7 @@ from typing import Any
 
 from marey.core.errors import InvalidInput, PluginError
 from marey.exporters.exporter import Exporter
-from marey.motion.root_options import RootOptions
+from marey.motion.export_options import ExportOptions
 from marey.registry import PlugIns
 
 GROUP = "marey.exporters"
@@ -67,7 +67,7 @@ def extension_of(format: str) -> str:
     return format if found is None else found.extension
 
 
-def check_options(writers: Iterable[Exporter[Any]], options: RootOptions) -> None:
+def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> None:
     """Validate that each chosen option acts on the files of a format.
 
     Raises:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
-from marey.motion.root_options import PLAIN, RootOptions
+from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.rotations import IDENTITY, Array, about, conjugate, multiply, rotate, unroll
 from marey.motion.skeleton import Skeleton
 
@@ -58,7 +58,7 @@ class Arranged:
     removed: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
-def arrange(clip: Posed, options: RootOptions = PLAIN) -> Arranged:
+def arrange(clip: Posed, options: ExportOptions = PLAIN) -> Arranged:
     """Return the poses of a clip with these options.
 
     Raises:

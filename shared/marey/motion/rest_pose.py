@@ -13,9 +13,9 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
+from marey.motion.export_options import RestPose
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import forward_kinematics, global_rotations, local_rotations
-from marey.motion.root_options import RestPose
 from marey.motion.rotations import Array, between, length, multiply
 from marey.motion.skeleton import SNAPMOGEN, Skeleton, known_order
 

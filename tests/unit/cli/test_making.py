@@ -17,7 +17,7 @@ from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import Conflict
 from marey.exporters import Coordinates, exporter_of
-from marey.motion.root_options import PLAIN, RootOptions
+from marey.motion.export_options import PLAIN, ExportOptions
 from tests.support.walker import walker
 from tests.unit.cli.test_fetching import ITEM
 
@@ -60,9 +60,9 @@ def item() -> dict[str, Any]:
 
 
 def fetch(
-    client: Transport, folder: Path, formats: list[str] | None, root: RootOptions = PLAIN, *, overwrite: bool = False
+    client: Transport, folder: Path, formats: list[str] | None, root: ExportOptions = PLAIN, *, overwrite: bool = False
 ) -> dict[str, bytes]:
-    ((_, downloads),) = plan([item()], folder, formats, "a", root=root)
+    ((_, downloads),) = plan([item()], folder, formats, "a", export=root)
     download_all(client, downloads, overwrite=overwrite, done=lambda _: None)
     assert sorted(path.name for path in folder.iterdir()) == sorted(file.path.name for file in downloads)
     return {file.format: file.path.read_bytes() for file in downloads}
@@ -77,18 +77,18 @@ def test_a_format_that_the_server_does_not_have_is_made(client: Transport, tmp_p
 
 
 def test_files_that_have_the_option_are_made_and_others_fetched(client: Transport, tmp_path: Path) -> None:
-    made = fetch(client, tmp_path, None, RootOptions(root_bone=True))
+    made = fetch(client, tmp_path, None, ExportOptions(root_bone=True))
     assert made == {"npz": FILES["npz"], "bvh": exporter_of("bvh").encode(CLIP, Coordinates(root_bone=True))}
     assert Stored.served == ["npz", "npz"]
-    assert fetch(client, tmp_path, None, RootOptions(root_bone=True)) == made
+    assert fetch(client, tmp_path, None, ExportOptions(root_bone=True)) == made
 
 
 def test_a_made_file_replaces_another_only_on_request(client: Transport, tmp_path: Path) -> None:
     plain = fetch(client, tmp_path, ["bvh"])
     with pytest.raises(Conflict, match="holds something else"):
-        fetch(client, tmp_path, ["bvh"], RootOptions(tpose_frame=True))
+        fetch(client, tmp_path, ["bvh"], ExportOptions(tpose_frame=True))
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [plain["bvh"]]
-    assert fetch(client, tmp_path, ["bvh"], RootOptions(tpose_frame=True), overwrite=True) != plain
+    assert fetch(client, tmp_path, ["bvh"], ExportOptions(tpose_frame=True), overwrite=True) != plain
 
 
 def test_a_format_that_is_known_nowhere_is_refused(tmp_path: Path) -> None:
@@ -110,5 +110,5 @@ def replace_files(given: dict[str, Any], kept: str) -> dict[str, Any]:
 def test_a_clip_keeps_its_placement_on_request(client: Transport, tmp_path: Path, monkeypatch) -> None:
     moved = replace(CLIP, manifest={"placement": {"x": 1.0, "z": 2.0, "heading": 0.0}})
     monkeypatch.setitem(FILES, "npz", moved.to_npz())
-    kept = RootOptions(placement="keep")
+    kept = ExportOptions(placement="keep")
     assert fetch(client, tmp_path, ["bvh"], kept)["bvh"] == exporter_of("bvh").encode(moved, Coordinates.of(kept))

@@ -14,7 +14,7 @@ from marey.motion.clip import MotionClip, load_npz
 from marey.motion.io.bvh import write_bvh
 from marey.motion.io.glb_read import parse_glb, read_glb
 from marey.motion.io.glb_write import format_glb, write_glb
-from marey.motion.skeleton import KIT, SNAPMOGEN
+from marey.motion.skeleton import HUMANML3D, KIT, SNAPMOGEN, Skeleton
 from tests.support.exported import tumbling
 from tests.support.glb import Glb
 from tests.support.walker import walker
@@ -145,3 +145,35 @@ def test_a_broken_or_foreign_file_is_refused(name: str) -> None:
 def test_the_type_is_the_registered_one() -> None:
     assert exporter_of("glb").media_type == "model/gltf-binary"
     assert isinstance(parse_glb(format_glb(walker())), MotionClip)
+
+
+@pytest.mark.parametrize("root_bone", [False, True])
+@pytest.mark.parametrize("skeleton", [HUMANML3D, SNAPMOGEN], ids=["HumanML3D", "SnapMoGen"])
+def test_a_body_is_bound_at_rest_and_stands_on_the_floor(skeleton: Skeleton, root_bone: bool) -> None:
+    clip = walker() if skeleton is HUMANML3D else tumbling(skeleton, 30)
+    seen = Glb.read(exporter_of("glb").write(clip, Coordinates(mesh=True, root_bone=root_bone)))
+    (mesh,) = seen.document["meshes"]
+    (primitive,) = mesh["primitives"]
+    points, normals, weights = (
+        seen.accessor(primitive["attributes"][name]) for name in ("POSITION", "NORMAL", "WEIGHTS_0")
+    )
+    carriers = seen.accessor(primitive["attributes"]["JOINTS_0"])[:, 0]
+    triangles = seen.accessor(primitive["indices"]).reshape(-1, 3)
+    assert weights.tolist() == [[1, 0, 0, 0]] * len(points)
+    span = float(np.ptp(clip.skeleton.rest[:, 1]))
+    assert -0.03 * span < points[:, 1].min() < 0.02 * span, "its soles are on the floor"
+    assert 1.05 * span < np.ptp(points[:, 1]) < 1.25 * span
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1, atol=1e-5)
+    corners = points[triangles]
+    outside = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    solid = np.linalg.norm(outside, axis=-1) > 1e-9
+    assert (np.einsum("fk,fk->f", outside, normals[triangles].mean(axis=1))[solid] > 0).all(), "faces look inwards"
+    assert set(carriers) <= set(range(int(root_bone), len(seen.names) - 1))
+    distance = np.linalg.norm(points - seen.rest()[carriers], axis=-1)
+    assert distance.max() < 0.4 * span, "a limb goes with a joint far away"
+
+
+def test_a_glb_with_a_body_is_read_as_one_without() -> None:
+    clip = walker()
+    back = parse_glb(exporter_of("glb").write(clip, Coordinates(mesh=True)))
+    assert format_glb(back) == format_glb(clip)

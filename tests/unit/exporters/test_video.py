@@ -117,3 +117,10 @@ def test_a_motion_is_converted_to_a_film_and_not_back(tmp_path) -> None:
     assert animated((tmp_path / "a.webp").read_bytes())[1] == 500
     with pytest.raises(InvalidInput, match="can be written, but not read"):
         convert(tmp_path / "a.webp", tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize("name", ["gif", "mp4", "webp"])
+def test_a_single_pose_is_a_film_too(name: str) -> None:
+    if name == "mp4":
+        pytest.importorskip("av")
+    assert len(encode(name, walker(seconds=0))) > 500

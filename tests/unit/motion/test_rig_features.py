@@ -18,13 +18,13 @@ from marey.exporters.convert import convert
 from marey.generation.export import export_clip
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip, load_npz, parse_npz
+from marey.motion.export_options import ExportOptions
 from marey.motion.features import HUMANML3D_263, FeatureLayout, PosedLayout, layout
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
 from marey.motion.io.bvh import read_bvh
 from marey.motion.kinematics import bone_lengths, forward_kinematics, global_rotations, local_rotations
 from marey.motion.rig_features import SNAPMOGEN_296
-from marey.motion.root_options import RootOptions
 from marey.motion.rotations import about, angle_between, between, from_euler, multiply, rotate, to_euler
 from marey.motion.skeleton import SNAPMOGEN
 from marey.quality.clips import quality_of
@@ -326,7 +326,7 @@ def test_features_go_to_bvh_and_back(rest_pose, tmp_path):
         SNAPMOGEN_296.encode_pose(rotations, root), SNAPMOGEN_296, body=NamedBody("rig", SNAPMOGEN), clean=False
     )
     decoded.save_npz(tmp_path / "a.npz")
-    convert(tmp_path / "a.npz", tmp_path / "b.bvh", root=RootOptions(rest_pose=rest_pose))
+    convert(tmp_path / "a.npz", tmp_path / "b.bvh", export=ExportOptions(rest_pose=rest_pose))
     convert(tmp_path / "b.bvh", tmp_path / "c.npz", source_rest_pose=rest_pose)
     back = load_npz(tmp_path / "c.npz")
     assert back.skeleton.name == "snapmogen"

@@ -51,6 +51,7 @@ def convert(
     tpose_frame: options.TPoseFrame = False,
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
+    mesh: options.Mesh = False,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     from_rest_pose: Annotated[
@@ -72,7 +73,7 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
-        root=options.root_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement),
+        export=options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh),
         source_unit=from_unit.value,
         source_up=from_up.value,
         source_rest_pose=from_rest_pose.value,

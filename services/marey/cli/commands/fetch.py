@@ -12,7 +12,7 @@ import typer
 from marey.cli import console, options
 from marey.cli.references import FORMS, find_all
 from marey.client.names import check_template
-from marey.motion.root_options import PLAIN, RootOptions
+from marey.motion.export_options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,6 +39,7 @@ def fetch(
     tpose_frame: options.TPoseFrame = False,
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
+    mesh: options.Mesh = False,
     only: Annotated[FetchReviewOption | None, typer.Option("--only", help="Only motions with this review.")] = None,
     prune: Annotated[
         bool,
@@ -49,20 +50,20 @@ def fetch(
 ) -> None:
     """Fetch the motions of jobs: eight files at a time, resumed and verified, with a manifest.csv.
 
-    Of several jobs, each has its folder. Files with options of the root, and formats that the server does not have, are
+    Of several jobs, each has its folder. Files with options, and formats that the server does not have, are
     made here of the npz.
     """
     from marey.client import Client
 
     check_template(name_template)
-    root = options.root_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement)
+    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
     with Client() as client:
         found = find_all(client, "job", jobs)
         for job in found:
             folder = output if len(found) == 1 else output / job.id
             write_job(
                 client, job.id, folder, formats,
-                template=name_template, only=only, prune=prune, overwrite=overwrite, root=root, as_json=as_json,
+                template=name_template, only=only, prune=prune, overwrite=overwrite, export=export, as_json=as_json,
             )  # fmt: skip
 
 
@@ -76,12 +77,12 @@ def write_job(
     only: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
-    root: RootOptions = PLAIN,
+    export: ExportOptions = PLAIN,
     as_json: bool = False,
 ) -> None:
     """Fetch the files that a job has so far and print a line for each of its items, in input order."""
     lines = fetch_job(
-        client, job, folder, formats, template=template, only=only, prune=prune, overwrite=overwrite, root=root
+        client, job, folder, formats, template=template, only=only, prune=prune, overwrite=overwrite, export=export
     )
     for line in lines:
         if as_json:
@@ -106,14 +107,14 @@ def fetch_job(
     only: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
-    root: RootOptions = PLAIN,
+    export: ExportOptions = PLAIN,
 ) -> list[dict[str, Any]]:
     """Fetch the files that a job has so far, with a progress bar, and return the output lines of its items.
 
     Args:
         only: items whose motion has this review.
         prune: remove files that earlier manifests named for the job and this one does not.
-        root: options of the files.
+        export: options of the files.
     """
     from marey.client import FetchObserver
 
@@ -142,8 +143,8 @@ def fetch_job(
         fetched = client.jobs.fetch(
             job, folder,
             formats=formats or None, name_template=template, review=None if only is None else only.value, prune=prune,
-            overwrite=overwrite, on_progress=Observer(), bvh_root=root.bvh_root, root_bone=root.root_bone,
-            in_place=root.in_place, tpose_frame=root.tpose_frame, placement=root.placement,
+            overwrite=overwrite, on_progress=Observer(), bvh_root=export.bvh_root, root_bone=export.root_bone,
+            in_place=export.in_place, tpose_frame=export.tpose_frame, placement=export.placement, mesh=export.mesh,
         )  # fmt: skip
     for message in left:
         console.say(message)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
-    from marey.motion.root_options import RootOptions
+    from marey.motion.export_options import ExportOptions
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ def generate(
     tpose_frame: options.TPoseFrame = False,
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
+    mesh: options.Mesh = False,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
     overwrite: options.Overwrite = False,
@@ -76,8 +77,8 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
-    root = options.root_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement)
-    kinds = _exporters(formats, root)
+    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
+    kinds = _exporters(formats, export)
     defaults = row_defaults(
         sampling,
         model=model,
@@ -107,7 +108,7 @@ def generate(
         task = bar.add_task("generating", total=len(planned))
         made = studio.make([p.wanted for p in planned])
         for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
-            line = _write(plan, clip, elapsed, chosen, root, overwrite=overwrite)
+            line = _write(plan, clip, elapsed, chosen, export, overwrite=overwrite)
             bar.advance(task)
             _report_rewrite(clip)
             _report_quality(line)
@@ -247,11 +248,11 @@ def _one_model(items: Iterable[Item], default: str) -> str:
     return models[0]
 
 
-def _exporters(formats: list[str] | None, root: RootOptions) -> list[Exporter[Any]]:
+def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporter[Any]]:
     """Return the exporters of the formats, each once; by default all installed ones that are stored.
 
     Raises:
-        InvalidInput: there is none for a format, or none of them has an option of the root.
+        InvalidInput: there is none for a format, or none of them has an option of the export.
     """
     from marey.exporters import check_options, exporters
 
@@ -263,7 +264,7 @@ def _exporters(formats: list[str] | None, root: RootOptions) -> list[Exporter[An
             )
     stored = [name for name, exporter in known.items() if exporter.stored]
     kinds = [known[name] for name in dict.fromkeys(formats or stored)]
-    check_options(kinds, root)
+    check_options(kinds, export)
     return kinds
 
 
@@ -302,13 +303,13 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
 
 
 def _write(
-    plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, root: RootOptions, *, overwrite: bool
+    plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, export: ExportOptions, *, overwrite: bool
 ) -> dict[str, Any]:
     from marey.exporters import Coordinates, exporters
     from marey.motion.files import write_atomically
 
     paths = plan.paths
-    contents = {kind: exporters()[kind].write(clip, Coordinates.of(root)) for kind in paths}
+    contents = {kind: exporters()[kind].write(clip, Coordinates.of(export)) for kind in paths}
     changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
     for kind in changed:
         if paths[kind].exists() and not overwrite:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.arrange import Posed, arrange
+from marey.motion.export_options import PLAIN, BvhRoot, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
-from marey.motion.root_options import PLAIN, BvhRoot, InPlace, Placement, RootOptions
 from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
 from marey.motion.skeleton import Skeleton
 from marey.motion.units import METRES, Z_TO_Y, Unit, Up
@@ -40,19 +40,19 @@ def write_bvh(
         path: the file.
         clip: a MotionClip or a BvhClip.
         unit, up: of the file's numbers.
-        bvh_root, root_bone, in_place, tpose_frame, placement: see `RootOptions`.
+        bvh_root, root_bone, in_place, tpose_frame, placement: see `ExportOptions`.
 
     Raises:
         InvalidInput: joints of the clip change their distance, it holds numbers that are not finite, or two options
             contradict each other.
     """
-    options = RootOptions(
+    options = ExportOptions(
         bvh_root=bvh_root, root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement
     )
     write_atomically(Path(path), format_bvh(clip, unit=unit, up=up, options=options).encode())
 
 
-def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y", options: RootOptions = PLAIN) -> str:
+def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y", options: ExportOptions = PLAIN) -> str:
     """Return the text of the BVH file; see `write_bvh`."""
     posed = arrange(clip, options)
     moving = posed.positions.shape[1]

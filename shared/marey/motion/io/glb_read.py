@@ -70,12 +70,12 @@ def _chunks(data: bytes, where: str) -> tuple[dict[str, Any], bytes]:
 
 
 class _Document:
-    """The JSON of a file and its numbers."""
+    """The JSON of a file and its numbers. The first nodes are the joints; a body may come after them."""
 
     def __init__(self, document: Mapping[str, Any], data: bytes, where: str) -> None:
         self.document, self.data, self.where = document, data, where
         self.extras: Mapping[str, Any] = document["asset"]["extras"]
-        self.nodes: list[Mapping[str, Any]] = document["nodes"]
+        self.nodes: list[Mapping[str, Any]] = document["nodes"][: len(document["skins"][0]["joints"])]
 
     def values(self, accessor: int) -> NDArray[np.float32]:
         """Return the numbers (N, width) of an accessor."""

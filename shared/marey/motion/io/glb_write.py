@@ -1,7 +1,7 @@
 """Write glb files: glTF 2.0 in its binary form, a JSON chunk and a chunk of little-endian numbers.
 
 Section numbers are those of the specification (Khronos Group, glTF 2.0, ISO/IEC 12113:2022). Metres, Y up and +Z
-forward are the format's own; a file holds the skeleton as nodes with a skin, no mesh, and one animation.
+forward are the format's own; a file holds the skeleton as nodes with a skin, one animation, and on request a mesh.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,16 +19,37 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.arrange import Arranged, Posed, arrange
+from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
-from marey.motion.root_options import PLAIN, InPlace, Placement, RootOptions
 from marey.motion.rotations import unroll
 
 GENERATOR = "Marey"
 MAGIC, VERSION = b"glTF", 2
 JSON, BIN = b"JSON", b"BIN\0"
-FLOAT = 5126  # componentType of float32 (3.6.2.2)
+FLOAT, UNSIGNED_SHORT = 5126, 5123  # componentTypes (3.6.2.2)
+DTYPES = {FLOAT: "<f4", UNSIGNED_SHORT: "<u2"}
+VERTICES, INDICES = 34962, 34963  # targets of bufferViews
 FEET = ("L_ankle", "L_toe", "R_ankle", "R_toe")
 """Names of the columns of `MotionClip.contacts`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A body in the rest pose of a skeleton, each part fixed to one joint.
+
+    Attributes:
+        points: (V, 3) metres, from the joint that carries each, Y up.
+        normals: (V, 3) unit vectors.
+        joints: (V,) the joint that carries each point.
+        triangles: (F, 3) points, counter-clockwise from outside.
+        colour: of the material, linear RGB from 0 to 1.
+    """
+
+    points: NDArray[np.floating[Any]] = field(repr=False)
+    normals: NDArray[np.floating[Any]] = field(repr=False)
+    joints: NDArray[np.integer[Any]] = field(repr=False)
+    triangles: NDArray[np.integer[Any]] = field(repr=False)
+    colour: tuple[float, float, float] = (0.6, 0.58, 0.54)
 
 
 def write_glb(
@@ -44,27 +66,35 @@ def write_glb(
     Args:
         path: the file.
         clip: a MotionClip, whose manifest becomes `asset.extras`, or a BvhClip.
-        root_bone, in_place, tpose_frame, placement: see `RootOptions`.
+        root_bone, in_place, tpose_frame, placement: see `ExportOptions`.
 
     Raises:
         InvalidInput: options that contradict each other, bones that change their length, or numbers that are not
             finite.
     """
-    options = RootOptions(root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement)
+    options = ExportOptions(root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement)
     write_atomically(Path(path), format_glb(clip, options))
 
 
-def format_glb(clip: Posed, options: RootOptions = PLAIN) -> bytes:
-    """Return the bytes of the glb file; equal clips give equal bytes. See `write_glb`."""
+def format_glb(clip: Posed, options: ExportOptions = PLAIN, mesh: Mesh | None = None) -> bytes:
+    """Return the bytes of the glb file; equal clips give equal bytes. See `write_glb`.
+
+    Args:
+        mesh: a body of the clip's skeleton.
+    """
     posed = arrange(clip, options)
     if not (np.isfinite(posed.rotations).all() and np.isfinite(posed.positions).all()):
         raise InvalidInput("the clip holds NaN or infinite numbers", where=posed.skeleton.name)
     numbers = _Numbers()
-    document = {
+    count = len(posed.skeleton)
+    body = {} if mesh is None else _body(mesh, posed, count - len(clip.skeleton), numbers)
+    shown = [{"name": "body", "mesh": 0, "skin": 0}] if body else []
+    document: dict[str, Any] = {
+        **body,
         "asset": {"version": "2.0", "generator": GENERATOR, "extras": _extras(clip, posed, options)},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": _nodes(posed),
+        "scenes": [{"nodes": [0, count] if shown else [0]}],
+        "nodes": [*_nodes(posed), *shown],
         "skins": [_skin(posed, numbers)],
         "animations": [_animation(posed, numbers)],
         "accessors": numbers.accessors,
@@ -84,17 +114,29 @@ class _Numbers:
         self.views: list[dict[str, int]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add(self, kind: str, values: NDArray[np.floating[Any]], **bounds: Sequence[float]) -> int:
-        """Append float32 values and return the number of their accessor.
+    def add(
+        self,
+        kind: str,
+        values: NDArray[Any],
+        *,
+        component: int = FLOAT,
+        target: int | None = None,
+        **bounds: Sequence[float],
+    ) -> int:
+        """Append values and return the number of their accessor.
 
         Args:
             kind: the element's type, such as `VEC3`.
             values: (N, ...) one row an element.
+            component: type of the numbers, `FLOAT` or `UNSIGNED_SHORT`.
+            target: use of the numbers in a mesh, `VERTICES` or `INDICES`.
+            bounds: `min` and `max`, where the format asks for them.
         """
-        content = np.ascontiguousarray(values, "<f4").tobytes()
-        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)})
-        self.data += content
-        accessor = {"bufferView": len(self.views) - 1, "componentType": FLOAT, "count": len(values), "type": kind}
+        content = np.ascontiguousarray(values, DTYPES[component]).tobytes()
+        use = {} if target is None else {"target": target}
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), **use})
+        self.data += content + b"\0" * (-len(content) % 4)
+        accessor = {"bufferView": len(self.views) - 1, "componentType": component, "count": len(values), "type": kind}
         self.accessors.append({**accessor, **bounds})
         return len(self.accessors) - 1
 
@@ -118,6 +160,31 @@ def _skin(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
     return {"inverseBindMatrices": inverse, "joints": list(range(len(posed.skeleton))), "skeleton": 0}
 
 
+def _body(mesh: Mesh, posed: Arranged, added: int, numbers: _Numbers) -> dict[str, Any]:
+    """Return meshes and materials (3.7.2, 3.9).
+
+    Args:
+        added: joints before those of the clip: a root bone.
+    """
+    carriers = mesh.joints + added
+    points = (mesh.points + posed.skeleton.rest[carriers]).astype(np.float32)
+    joints, weights = np.zeros((len(points), 4), np.uint16), np.zeros((len(points), 4), np.float32)
+    joints[:, 0], weights[:, 0] = carriers, 1
+    bounds = {"min": _floats(points.min(axis=0)), "max": _floats(points.max(axis=0))}
+    attributes = {
+        "POSITION": numbers.add("VEC3", points, target=VERTICES, **bounds),
+        "NORMAL": numbers.add("VEC3", mesh.normals, target=VERTICES),
+        "JOINTS_0": numbers.add("VEC4", joints, component=UNSIGNED_SHORT, target=VERTICES),
+        "WEIGHTS_0": numbers.add("VEC4", weights, target=VERTICES),
+    }
+    indices = numbers.add("SCALAR", mesh.triangles.reshape(-1), component=UNSIGNED_SHORT, target=INDICES)
+    surface = {"baseColorFactor": [*mesh.colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9}
+    return {
+        "meshes": [{"name": "body", "primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
+        "materials": [{"name": "body", "pbrMetallicRoughness": surface}],
+    }
+
+
 def _animation(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
     """Return the animation: a rotation a joint, and positions of those that move (3.11)."""
     times = np.arange(len(posed.rotations)) / posed.fps
@@ -135,7 +202,7 @@ def _animation(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
     return {"name": "motion", "channels": channels, "samplers": samplers}
 
 
-def _extras(clip: Posed, posed: Arranged, options: RootOptions) -> dict[str, Any]:
+def _extras(clip: Posed, posed: Arranged, options: ExportOptions) -> dict[str, Any]:
     """Return what the format has no place for, of programs that want it: the exact rate, contacts, options, manifest.
 
     In `asset`, importers leave it alone: Blender would refuse some of it as properties of an object.

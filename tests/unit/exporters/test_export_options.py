@@ -13,11 +13,11 @@ from marey.exporters import Coordinates, Exporter, check_options, exporter_of
 from marey.exporters.convert import convert
 from marey.motion.arrange import arrange, headings, yaws
 from marey.motion.clip import MotionClip, load_npz
+from marey.motion.export_options import ExportOptions
 from marey.motion.io.bvh import parse_bvh, read_bvh, write_bvh
 from marey.motion.io.convert import clip_from_bvh
 from marey.motion.io.glb_read import parse_glb
 from marey.motion.io.glb_write import format_glb
-from marey.motion.root_options import RootOptions
 from marey.motion.rotations import about, multiply, rotate
 from marey.motion.skeleton import KIT, SNAPMOGEN
 from tests.support.exported import tumbling
@@ -179,7 +179,7 @@ def test_the_bvh_root_has_the_height_of_the_pelvis_on_request() -> None:
 )
 def test_a_glb_is_read_without_what_the_options_added(options: dict[str, Any]) -> None:
     clip = replace(WALK, manifest={"placement": {"x": 2.0, "z": -1.0, "heading": 0.5}})
-    back = parse_glb(format_glb(clip, RootOptions(**options)))
+    back = parse_glb(format_glb(clip, ExportOptions(**options)))
     np.testing.assert_allclose(back.joints, clip.joints, atol=1e-5)
     np.testing.assert_array_equal(back.contacts, clip.contacts)
     assert back.skeleton.joint_names == clip.skeleton.joint_names
@@ -217,8 +217,8 @@ def test_options_that_contradict_each_other_are_refused(options: dict[str, Any])
 )
 def test_an_option_of_none_of_the_formats_is_refused(formats: list[str], options: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
-        check_options(map(exporter_of, formats), RootOptions(**options))
-    check_options([exporter_of("bvh"), exporter_of("npz")], RootOptions(**options))
+        check_options(map(exporter_of, formats), ExportOptions(**options))
+    check_options([exporter_of("bvh"), exporter_of("npz")], ExportOptions(**options))
 
 
 def test_a_format_gets_only_the_options_that_it_has() -> None:
@@ -239,12 +239,12 @@ def test_a_format_gets_only_the_options_that_it_has() -> None:
 
 def test_files_are_converted_with_options(tmp_path) -> None:
     WALK.save_npz(tmp_path / "a.npz")
-    convert(tmp_path / "a.npz", tmp_path / "b.bvh", root=RootOptions(root_bone=True))
+    convert(tmp_path / "a.npz", tmp_path / "b.bvh", export=ExportOptions(root_bone=True))
     write_bvh(tmp_path / "c.bvh", WALK, root_bone=True)
     assert (tmp_path / "b.bvh").read_bytes() == (tmp_path / "c.bvh").read_bytes()
-    convert(tmp_path / "b.bvh", tmp_path / "d.bvh", root=RootOptions(in_place="travel"))
+    convert(tmp_path / "b.bvh", tmp_path / "d.bvh", export=ExportOptions(in_place="travel"))
     assert np.ptp(read_bvh(tmp_path / "d.bvh").root[:, [0, 2]], axis=0).max() < 1e-6
     convert(tmp_path / "b.bvh", tmp_path / "e.npz")
     np.testing.assert_allclose(load_npz(tmp_path / "e.npz").joints, WALK.joints, atol=1e-3)
     with pytest.raises(InvalidInput, match="npz files have no such option"):
-        convert(tmp_path / "b.bvh", tmp_path / "f.npz", root=RootOptions(tpose_frame=True))
+        convert(tmp_path / "b.bvh", tmp_path / "f.npz", export=ExportOptions(tpose_frame=True))

@@ -1,4 +1,4 @@
-"""Options of an export: its root, its rest pose and its place. Standard library only: the small client imports it."""
+"""Options of an export: root, rest pose, place and body. Standard library only: the small client imports it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RestPose = Literal["t", "a"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class RootOptions:
-    """Root, rest pose and place of the motion in a file.
+class ExportOptions:
+    """Root, rest pose, place and body of the motion in a file.
 
     Attributes:
         bvh_root: OFFSET of the root of a BVH file: `zero` is right for programs that add position channels to it
@@ -27,6 +27,7 @@ class RootOptions:
         tpose_frame: put the T-pose before the motion, which then begins in frame 1.
         rest_pose: T-pose, or the A-pose of a rig whose A-pose is known.
         placement: put the motion where its manifest says it was taken from (`keep`), or leave it at the origin.
+        mesh: add a neutral body of round limbs, which moves with the skeleton.
 
     Raises:
         InvalidInput: two options contradict each other.
@@ -38,6 +39,7 @@ class RootOptions:
     tpose_frame: bool = False
     rest_pose: RestPose = "t"
     placement: Placement = "origin"
+    mesh: bool = False
 
     def __post_init__(self) -> None:
         if self.root_bone and self.bvh_root == "offset":
@@ -65,9 +67,9 @@ class RootOptions:
     @property
     def chosen(self) -> tuple[str, ...]:
         """Names of the options that differ from the defaults."""
-        known = fields(RootOptions)
+        known = fields(ExportOptions)
         return tuple(each.name for each in known if getattr(self, each.name) != each.default)
 
 
-PLAIN = RootOptions()
+PLAIN = ExportOptions()
 """The options of stored files."""
