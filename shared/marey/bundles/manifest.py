@@ -5,7 +5,16 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidBundle
@@ -67,6 +76,16 @@ class TextSpec(_Frozen):
     in_order: bool = False
     """Ours: a prompt of several actions is read as its actions in order ("before bowing, she walks" as "she walks, and
     then a person is bowing")."""
+    split_actions: bool = True
+    """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
+
+    @model_serializer(mode="wrap")
+    def _serialize(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave the usual `split_actions` out: earlier releases refuse a field that they do not know."""
+        values: dict[str, Any] = handler(self)
+        if self.split_actions:
+            values.pop("split_actions", None)
+        return values
 
 
 class BundleManifest(_Frozen):

@@ -22,7 +22,8 @@ class MotionScore:
         index: index of the prompt.
         variant: number among the prompt's motions.
         obeyed: 1 if the motion passed its prompt check, else 0.
-        retrieved: R-precision of this motion, the share of its pools in which its prompt was found, 0 to 1.
+        retrieved: same-label R-precision of this motion, the share of its pools in which a motion of its prompt's label
+            was among the nearest, 0 to 1.
     """
 
     index: int

@@ -13,6 +13,16 @@ def token_losses(logits: Tensor, targets: Tensor) -> Tensor:
     return losses.view(targets.shape)
 
 
+def hits(logits: Tensor, targets: Tensor) -> Tensor:
+    """Return the chance that a target is the likeliest token, ties in random order: (…, K) and (…) to (…), float32.
+
+    In bfloat16, as under autocast, logits near 8 are 0.06 apart: several share the first place, and `argmax` would
+    count the lowest code alone.
+    """
+    first = logits == logits.amax(-1, keepdim=True)
+    return first.gather(-1, targets.clamp(min=0)[..., None]).squeeze(-1) / first.sum(-1)
+
+
 def ranking_loss(predicted: Tensor, losses: Tensor, masked: Tensor) -> Tensor:
     """Return eq. 5 as a mean over ordered pairs (ours: the sum would weigh a clip by the square of its masked tokens).
 

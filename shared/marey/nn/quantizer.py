@@ -179,7 +179,8 @@ class ResidualQuantizer(nn.Module):
         self.codebooks[level] = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
         if len(vectors) == 0 or bool(alive.all()):
             return
-        # A revived code starts as if just used often enough, so that it is not reset before vectors choose it.
+        # A revived code starts at the limit: it is reset again after the next batch unless vectors enough choose it
+        # there. So dead codes are drawn anew in every batch until they lie where vectors are.
         fresh = broadcast(_draw(vectors, self.codes))
         dead = ~alive
         self.codebooks[level][dead] = fresh[dead]

@@ -131,6 +131,8 @@ class ModelSpec:
         random_bundle: `(path) -> Bundle` with random weights, for tests and demos.
         live_adherence: `(generator, prompts, *, steers, walks) -> {title: sessions}`; see `marey eval adherence`.
         self_train: `(generator, pipeline, prepared, run, *, captions, seed, progress) -> number of kept motions`.
+        difficulty: `(bundle, motions, prompts) -> [marey.viz.difficulty.TokenDifficulty]`, of features (T, D) of each
+            motion; None = the model does not know which tokens are hard.
         ablations: comparisons for `marey train ablate`.
         imports: kinds of published weights that become its bundles by `marey models import`.
     """
@@ -152,6 +154,7 @@ class ModelSpec:
     live_examples: str | None = None
     live_adherence: str | None = None
     self_train: str | None = None
+    difficulty: str | None = None
     ablations: tuple[Ablation, ...] = ()
     imports: tuple[ImportKind, ...] = ()
 

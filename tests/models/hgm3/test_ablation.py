@@ -1,31 +1,52 @@
-"""The ablation trains what it names and leaves the rest alone; its table holds means and intervals."""
+"""The ablations train what they name and leave the rest alone, and decode as their rows say."""
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from marey.bundles import find_bundle
+from marey.bundles import Bundle, find_bundle
+from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
-from marey.models.hgm3.ablation import DECODINGS, table, train_variant
+from marey.generation.port import Request
+from marey.models.hgm3 import ablation
+from marey.models.hgm3.ablation import DECODINGS, FLAT, HIERARCHICAL, TRAININGS, train_variant
 from marey.models.hgm3.assembly import assemble
-from marey.models.hgm3.config import TINY
+from marey.models.hgm3.conditions import LEVELS
+from marey.models.hgm3.config import TINY, MiningConfig
+from marey.models.hgm3.generate import Generator
+from marey.models.hgm3.model import SeparateTransformers
+from marey.models.hgm3.spec import SPEC
 from marey.models.hgm3.train import train_stage
+from marey.registry import resolve
+from marey.training import ablation as shared
 from marey.training.budget import Budget
 from marey.training.motions import TokenData
 from marey.training.staging import TrainOptions
+from tests.support.prepared import text_features
+
+
+def options_of(prepared: PreparedData, run: Path) -> TrainOptions:
+    return TrainOptions(prepared.path, run, TINY, Budget(steps=2), device="cpu", bf16=False, quiet=True)
+
+
+@pytest.fixture(scope="module")
+def bundle(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    run = tmp_path_factory.mktemp("ablation") / "run"
+    for stage in ("tokenizer", "masked", "residual", "length"):
+        train_stage(stage, options_of(prepared, run))
+    return assemble(prepared.path, run, run.parent / "bundle", TINY)
 
 
 def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(
-    prepared: PreparedData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options = TrainOptions(prepared.path, tmp_path / "run", TINY, Budget(steps=2), device="cpu", bf16=False, quiet=True)
-    for stage in ("tokenizer", "masked", "residual", "length"):
-        train_stage(stage, options)
-    bundle = assemble(prepared.path, tmp_path / "run", tmp_path / "bundle", TINY)
+    options = options_of(prepared, tmp_path)
     random_masks = replace(TINY, mining=replace(TINY.mining, mask="random"))
     numbers = train_variant(prepared.path, str(bundle.path), tmp_path / "variant", random_masks, options)
     assert numbers["reconstruction/specific"] > 0
@@ -44,17 +65,71 @@ def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(
     train_variant(prepared.path, str(bundle.path), tmp_path / "second", TINY, options)
 
 
+def test_each_ablation_trains_its_networks_once_and_judges_every_row(
+    prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    two = evaluation_prompts()[:2]
+    monkeypatch.setattr(ablation, "evaluation_prompts", lambda: two)
+    monkeypatch.setattr(shared, "evaluation_prompts", lambda: two)
+    trained: list[str] = []
+
+    def train(*arguments: object) -> dict[str, float]:
+        trained.append(arguments[2].name)
+        return train_variant(*arguments)
+
+    monkeypatch.setattr(ablation, "train_variant", train)
+    expected = {
+        "conditions": ["specific.0", "motion.0", "action.0", "hard.0"],
+        "alphas": ["alpha-0-0.0", "alpha-0-0.5.0", "alpha-0-1.0", "alpha-1-1.0"],
+        "passes": [],  # of `hard.0`
+    }
+    rows = {"conditions": 4, "alphas": 4, "passes": 7}
+    for each in SPEC.ablations:
+        if each.name not in expected:
+            continue
+        run = resolve(each.run)
+        shown = run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1)
+        assert trained == expected[each.name]
+        assert len(shown.splitlines()) == 2 + rows[each.name]
+        assert (tmp_path / f"{each.name}.md").read_text() == shown
+        trained.clear()
+        assert run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1) == shown
+        assert not trained
+    assert (tmp_path / "networks" / "alpha-0-0.5.0" / "bundle" / "manifest.json").is_file()
+
+
+def test_the_settings_of_the_papers_tables() -> None:
+    conditions = {name: MiningConfig(**TRAININGS[name]).conditions for name in ("motion", "action", "specific", "hard")}
+    assert conditions == {"motion": "motion", "action": "action", "specific": "specific", "hard": "all"}
+    alphas = [MiningConfig(**TRAININGS[each.networks[0]]) for each in ablation.ALPHAS.values()]
+    assert [(each.alpha_start, each.alpha_end) for each in alphas] == [(0, 0), (0, 0.5), (0, 1), (1, 1)]
+    passes = [each.settings for each in ablation.PASSES.values()]
+    stages = [(s.steps, s.motion_steps, s.action_steps - s.motion_steps, s.steps - s.action_steps) for s in passes]
+    assert stages == [
+        (10, 10, 0, 0), (10, 0, 10, 0), (10, 0, 0, 10), (10, 5, 3, 2), (10, 2, 3, 5), (15, 3, 5, 7), (20, 4, 6, 10),
+    ]  # fmt: skip
+    assert [(each.networks, each.settings) for each in ablation.CONDITIONS.values()] == [
+        (("specific",), FLAT),
+        (("motion", "action", "specific"), HIERARCHICAL),
+        (("hard",), FLAT),
+        (("hard",), HIERARCHICAL),
+    ]
+
+
+def test_separate_networks_decode_their_own_level_alone(bundle: Bundle) -> None:
+    generator = Generator.load(bundle, device="cpu", threads=1, dtype=torch.float32)
+    requests = [Request(text_features(seed), seed, 196) for seed in range(2)]
+    wanted, flat = (generator.generate(requests, settings)[0] for settings in (HIERARCHICAL, FLAT))
+    assert wanted.decided[0] > 0, "the motion node decides some tokens"
+    copies = [copy.deepcopy(generator.networks.masked) for _ in range(LEVELS)]
+    generator.base = SeparateTransformers(copies)
+    assert np.array_equal(generator.generate(requests, HIERARCHICAL)[0].tokens, wanted.tokens)
+    copies[0].head.bias.data.copy_(5 * torch.randn_like(copies[0].head.bias))
+    assert np.array_equal(generator.generate(requests, FLAT)[0].tokens, flat.tokens)
+    assert not np.array_equal(generator.generate(requests, HIERARCHICAL)[0].tokens, wanted.tokens)
+
+
 def test_flat_decoding_has_all_its_passes_at_the_level_of_specifics() -> None:
     inference = DECODINGS["flat"].inference(TINY.inference)
     assert inference.motion_steps == inference.action_steps == 0
     assert inference.steps > 0
-
-
-def test_the_table_gives_the_mean_and_the_interval_of_each_variant() -> None:
-    rows = {"hard": [{"obeyed": 0.9}, {"obeyed": 0.8}, {"obeyed": 0.7}], "random": [{"obeyed": 0.5}, {"obeyed": 0.5}]}
-    lines = table(rows).splitlines()
-    assert lines[0] == "| variant | seeds | obeyed |"
-    mean, half = (float(x) for x in lines[2].split("|")[3].split("±"))
-    assert mean == pytest.approx(0.8)
-    assert half == pytest.approx(1.96 * 0.1 / 3**0.5, abs=1e-3)
-    assert lines[3] == "| random | 2 | 0.500 ± 0.000 |"

@@ -282,3 +282,32 @@ def test_configurations_survive_json() -> None:
 
 def test_the_stages_share_the_minutes_of_a_training() -> None:
     assert sum(RECIPE.shares.values()) == pytest.approx(1)
+
+
+def test_heads_start_at_the_frequencies_of_the_training_split_alone(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    tokens = stage.tokens
+    codes = TINY.tokenizer.codes
+    counted = tokens.log_shares(codes, stage.pairs.train)
+    held_out = [c for c, clip in enumerate(prepared.clips) if clip.split != "train"]
+    for clip in held_out:
+        tokens.tokens[tokens.starts[clip, 0] : tokens.starts[clip, 0] + tokens.lengths[clip, 0]] = 5
+    assert held_out
+    assert torch.equal(tokens.log_shares(codes, stage.pairs.train), counted)
+    clip = int(stage.pairs.train[0])
+    start, length = tokens.starts[clip], tokens.lengths[clip]
+    alone = torch.cat([tokens.tokens[s : s + n, 0] for s, n in zip(start.tolist(), length.tolist(), strict=True)])
+    expected = torch.bincount(alone, minlength=codes).float() + 1
+    torch.testing.assert_close(tokens.log_shares(codes, stage.pairs.train[:1])[0].exp(), expected / expected.sum())
+    torch.testing.assert_close(stage.module.masked.head.bias.detach(), counted[0])
+
+
+def test_difficulties_are_not_rounded_under_autocast(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    sample = stage.sample(stage.pairs.train[:8], np.random.default_rng(0))
+    with torch.autocast("cpu", dtype=torch.bfloat16), torch.no_grad():
+        nodes = stage.module.masked.text(sample.graphs)
+        found = stage._predict(stage.module.predictor, sample, nodes, sample.tokens >= 0)
+    found = found[sample.tokens >= 0]
+    assert found.dtype == torch.float32
+    assert (found != found.bfloat16().float()).float().mean() > 0.9

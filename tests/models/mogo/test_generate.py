@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -163,3 +164,25 @@ def test_a_random_bundle_names_the_encoder_of_its_width(tmp_path: Path, width: i
 
 def test_the_stages_share_the_minutes_of_a_training() -> None:
     assert sum(RECIPE.shares.values()) == pytest.approx(1)
+
+
+def test_a_prompt_is_split_into_actions_only_where_the_bundle_says_so(tmp_path: Path) -> None:
+    text = text_features(0)
+    rows = np.stack([text_features(k).nodes[0] for k in (1, 2)])
+    two = replace(text, actions=("a person walks", "a person waves"), action_rows=rows)
+    splits = Generator.load(random_bundle(tmp_path / "split"), device="cpu")
+    whole = Generator.load(random_bundle(tmp_path / "whole", replace(TINY, split_actions=False)), device="cpu")
+    assert splits.bundle.manifest.text.split_actions
+    assert len(splits.actions(two)[1]) == 2
+    assert not whole.bundle.manifest.text.split_actions
+    assert np.allclose(whole.actions(two)[0].numpy(), text.nodes[:1])
+    (first,), (second,) = (whole.generate([Request(each, 1, 20)]) for each in (two, text))
+    assert np.array_equal(first.tokens, second.tokens)
+
+
+def test_a_bundle_that_splits_says_nothing_of_it_and_can_be_read_by_earlier_releases(tmp_path: Path) -> None:
+    for name, config in (("split", TINY), ("whole", replace(TINY, split_actions=False))):
+        random_bundle(tmp_path / name, config)
+    said = [json.loads((tmp_path / name / "manifest.json").read_text())["text"] for name in ("split", "whole")]
+    assert "split_actions" not in said[0]
+    assert said[1]["split_actions"] is False

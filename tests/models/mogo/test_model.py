@@ -20,7 +20,7 @@ from marey.models.mogo.model import (
     in_force,
     next_targets,
 )
-from marey.models.mogo.packed_model import sessions_of_product
+from marey.models.mogo.packed_model import PackedModel, sessions_of_product
 from marey.models.mogo.plan import EARLIEST, NEVER, ActionPlan
 
 from .networks import columns, prompts, transformer
@@ -308,3 +308,21 @@ def test_an_action_may_end_some_time_after_it_began() -> None:
     assert plan.earliest == 100 + int(EARLIEST * 40) > 100
     plan.take(150)
     assert plan.earliest == 150
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_logits_of_a_large_head_are_rounded_only_in_bundles_of_earlier_releases(
+    exact: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("marey.nn.packed.SMALL", 1)
+    packed = PackedModel(transformer(replace(TINY, float_logits=exact)), dtype=torch.bfloat16)
+    logits = packed.network.head(torch.randn(1, 6, TINY.transformer.width))
+    assert logits.dtype == torch.float32
+    assert torch.equal(logits, logits.bfloat16().float()) is not exact
+
+
+def test_a_configuration_without_the_field_draws_as_before() -> None:
+    values = TINY.to_dict()
+    del values["float_logits"], values["split_actions"]
+    read = MOGOConfig.from_dict(values)
+    assert (read.float_logits, read.split_actions) == (False, True)

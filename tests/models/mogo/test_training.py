@@ -16,7 +16,7 @@ from marey.models.mogo.assembly import assemble, unpack
 from marey.models.mogo.config import TINY, MOGOConfig
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.rollouts import Rollouts
-from marey.models.mogo.samples import MIN_FRAMES, TokenSpan
+from marey.models.mogo.samples import MIN_FRAMES, Samples, TokenSpan
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.steers import LEAST_ENTERED, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
@@ -120,6 +120,20 @@ def test_stretches_are_acts_or_two_that_follow_each_other(stage: TransformerStag
         assert (stretch.skipped == 0) == (first == 0)
         seen.add((stretch.seam > 0, first >= seam, stretch.skipped > 1))
     assert seen >= {(False, False, False), (False, True, False), (True, False, False)}
+
+
+def test_a_model_that_does_not_split_prompts_learns_joined_clips_as_one_sample(stage: TransformerStage) -> None:
+    given = stage.samples
+    joined = next(i for i, c in enumerate(given.clips) if len(c.seams) == 1 and c.split == "train")
+    tokens = TokenData(given.tokens, torch.from_numpy(given._starts)[:, None], torch.from_numpy(given.lengths)[:, None])
+    samples = Samples(given.clips, tokens, given.captions, None, given.most, split=False)
+    first = int(given.captions.first[joined])
+    for seed in range(20):
+        span = samples.of_clip(joined, np.random.default_rng(seed))
+        assert not span.seam
+        assert first <= span.before == span.after < first + int(given.captions.authors[joined].sum())
+    _, frames = samples.captioned_actions(np.array([joined]))
+    assert set(frames.tolist()) == {int(given.lengths[joined])}
 
 
 def test_a_single_act_has_one_of_its_captions_and_is_sometimes_cut(stage: TransformerStage) -> None:

@@ -26,7 +26,7 @@ from marey.evaluator.measuring import (
 from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
-from marey.evaluator.scoring import REPEATS, label_ceilings
+from marey.evaluator.scoring import REPEATS, EmbeddedSet, label_ceilings, metrics_of, retrieval
 from marey.evaluator.tmr import TMREvaluator
 from marey.jobs import AssetDigest, FailureReason, ItemState, JobState
 from marey.measures.comparing import OBEYED, RETRIEVED
@@ -330,7 +330,24 @@ def test_the_ceiling_of_a_model_that_knows_labels_alone_stands_beside_retrieval(
     ceilings = label_ceilings(labels, 32, seed=0)
     assert f"it would have {ceilings[1]:.1f} % at 1, {ceilings[2]:.1f} % at 2" in truth["r_precision_1_of_32"].note
     assert 100 * len(set(labels.tolist())) / len(labels) - 20 < ceilings[1] < 100
+    assert truth["pair_precision_1_of_32"].note == truth["r_precision_1_of_32"].note
     assert "40" in truth["r_precision_1_of_100"].note  # clips, too few: that is what its note says
+
+
+def test_only_the_pair_is_a_hit_of_the_published_retrieval_and_a_motion_of_its_label_is_one_beside_it(
+    evaluator: TMREvaluator,
+) -> None:
+    vectors = np.random.default_rng(0).normal(size=(4, 8)).astype(np.float32)
+    labels = np.arange(40) % 4
+    sets = EmbeddedSet(vectors[labels], vectors[labels], labels.astype(np.int64), np.zeros(40, np.int64))
+    values = retrieval(sets, evaluator, 32, 0)
+    assert values["r_precision_1_of_32"].mean == 100
+    ceiling = label_ceilings(labels.astype(np.int64), 32, seed=0)[1]
+    assert values["pair_precision_1_of_32"].mean == pytest.approx(ceiling, abs=0.5), "a guess among eight or so"
+    assert 10 < ceiling < 15
+    assert {metric.title: metric.key for metric in metrics_of(evaluator, ["test"])}["R-precision 1 of 32"] == (
+        "pair_precision_1_of_32"
+    )
 
 
 def test_motions_of_another_feature_layout_are_refused(

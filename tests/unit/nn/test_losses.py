@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from marey.nn.losses import ranking_loss, token_losses
+from marey.nn.losses import hits, ranking_loss, token_losses
 
 
 def test_token_loss_is_the_negative_log_likelihood() -> None:
@@ -56,3 +56,9 @@ def test_unmasked_tokens_do_not_matter() -> None:
     a = ranking_loss(torch.tensor([[0.0, 1.0, 5.0]]), torch.tensor([[1.0, 2.0, 0.0]]), masked)
     b = ranking_loss(torch.tensor([[0.0, 1.0, -5.0]]), torch.tensor([[1.0, 2.0, 9.0]]), masked)
     assert torch.equal(a, b)
+
+
+def test_a_tie_counts_by_its_chance() -> None:
+    logits = torch.tensor([[0.0, 2.0, 2.0, 1.0], [3.0, 1.0, 1.0, 1.0], [5.0, 5.0, 5.0, 5.0]])
+    found = torch.stack([hits(logits, torch.full((3,), code)) for code in range(4)], 1)
+    torch.testing.assert_close(found, torch.tensor([[0, 0.5, 0.5, 0], [1, 0, 0, 0], [0.25, 0.25, 0.25, 0.25]]))

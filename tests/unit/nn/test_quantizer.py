@@ -111,3 +111,18 @@ def test_codes_drawn_from_too_few_vectors_differ_by_a_hundredth() -> None:
     torch.manual_seed(0)
     drawn = _draw(torch.ones(2, 64), 4000)
     assert 0.9 < float((drawn - 1).norm(dim=-1).mean() / 0.01) < 1.1
+
+
+def test_a_revived_code_is_reset_again_unless_the_next_batch_chooses_it() -> None:
+    q = quantizer(levels=1, codes=3, width=1, decay=0.5, revive=1.0)
+    q.codebooks.copy_(torch.tensor([[[0.0], [50.0], [90.0]]]))
+    q.sums.copy_(q.codebooks * 4)
+    q.counts.copy_(torch.tensor([[4.0, 1.0, 1.0]]))
+    q.train()(torch.zeros(1, 4, 1))
+    assert q.counts[0].tolist() == [4, 1, 1]
+    assert q.codebooks[0, 1:].abs().max() < 0.1, "both were far away, and are where the vectors are"
+    q.codebooks[0, 1] = q.sums[0, 1] = 7.0
+    q.codebooks[0, 2] = q.sums[0, 2] = 60.0
+    q(torch.tensor([[[0.0], [0.0], [7.0], [7.0]]]))
+    assert q.codebooks[0, 1] == 7, "chosen by two vectors"
+    assert q.codebooks[0, 2] < 8, "chosen by none"

@@ -31,8 +31,9 @@ trials sentences made of their short public descriptions.
 
 {metrics}
 
-`r1` to `r3`: R-precision in pools of 32 test clips, text to motion, where a motion of the text's own
-label is a hit; `distinct`: in pools where no label occurs twice. Median ranks are among all test
+`pair_r1` to `pair_r3`: R-precision in pools of 32 test clips, text to motion, where the pair alone is a
+hit; `label`: where a motion of the text's own label is one; `distinct`: in pools where no label occurs
+twice. Median ranks are among all test
 clips, where only the pair is a hit, text to motion and back. Captions and pools are drawn 20 times.
 A label is actions, sides and style (`workers/marey/evaluator/labels.py`).
 

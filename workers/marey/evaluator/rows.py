@@ -162,8 +162,8 @@ def _ceilings(labels: NDArray[np.int64], seed: int) -> dict[int, str]:
     fill."""
     return {
         pool: (
-            f"A motion of the prompt's own label counts as found, so a model that knows only the labels "
-            f"has 100 % in pools of {pool}. Were the clip of the prompt alone to count, it would have "
+            f"Where a motion of the prompt's own label counts as found, a model that knows only the labels "
+            f"has 100 % in pools of {pool}. Where the clip of the prompt alone counts, it would have "
             f"{', '.join(f'{ceiling:.1f} % at {k}' for k, ceiling in label_ceilings(labels, pool, seed).items())}."
         )
         for pool in POOLS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,9 +34,10 @@ class EmbeddedSplit:
 def retrieval_scores(split: EmbeddedSplit, distance: Distance) -> dict[str, float]:
     """Compute R-precision and median ranks, text to motion unless stated.
 
-    `r1` … `r3`: pools of 32, a motion of the text's own label is a hit. `distinct_r1` …: pools in which no label occurs
-    twice. `median_rank`, `median_rank_back`: among all N, only the pair is a hit (TMR's "all" protocol), and from
-    motion to text. Metrics that need a larger split are left out: 32 clips, 32 labels, 11 clips.
+    `pair_r1` … `pair_r3`: pools of 32, the pair alone is a hit, as in T2M. `label_r1` …: the same pools, a motion of
+    the text's own label is a hit. `distinct_r1` …: pools in which no label occurs twice. `median_rank`,
+    `median_rank_back`: among all N, only the pair is a hit (TMR's "all" protocol), and from motion to text. Metrics
+    that need a larger split are left out: 32 clips, 32 labels, 11 clips.
     """
     rng = np.random.default_rng(0)
     clips, labels = len(split.labels), split.labels
@@ -43,8 +45,9 @@ def retrieval_scores(split: EmbeddedSplit, distance: Distance) -> dict[str, floa
     for _ in range(REPEATS):
         text, each = split.drawn(rng), {}
         if clips >= POOL:
-            hits = r_precision(text, split.motion, pool=POOL, top=TOP, distance=distance, labels=labels, rng=rng)
-            each |= {f"r{k}": hits.at(k) for k in TOP}
+            for name, groups, same in (("pair", None, copy.deepcopy(rng)), ("label", labels, rng)):
+                hits = r_precision(text, split.motion, pool=POOL, top=TOP, distance=distance, labels=groups, rng=same)
+                each |= {f"{name}_r{k}": hits.at(k) for k in TOP}
         if len(np.unique(labels)) >= POOL:
             hits = r_precision(
                 text, split.motion, pool=POOL, top=TOP, distance=distance, labels=labels, distinct_pools=True, rng=rng

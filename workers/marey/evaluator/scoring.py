@@ -6,6 +6,7 @@ from the evaluation's seed: with R = 1 an interval shows the variance of the dra
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -44,6 +45,15 @@ QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 100
 
 
 @dataclass(frozen=True, eq=False)
+class PoolDraw:
+    """Retrieval of one repeat, twice in the same pools."""
+
+    rows: NDArray[np.int64]  # of the repeat, in the set
+    pair: RPrecision  # the prompt's own motion alone is a hit (Guo et al. 2022)
+    label: RPrecision  # every motion of the prompt's label is
+
+
+@dataclass(frozen=True, eq=False)
 class EmbeddedSet:
     """Embeddings of one row: N motions with their prompts, R repeats of each."""
 
@@ -52,8 +62,8 @@ class EmbeddedSet:
     labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
     variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
     progress: ProgressCallback = no_progress
-    _pools: dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]] = field(
-        default_factory=dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]], repr=False
+    _pools: dict[tuple[int, int], list[PoolDraw]] = field(
+        default_factory=dict[tuple[int, int], list[PoolDraw]], repr=False
     )
 
     def only(self, rows: NDArray[np.bool_]) -> EmbeddedSet:
@@ -67,21 +77,27 @@ class EmbeddedSet:
             yield np.flatnonzero(self.variants == number % generated), rng
             self.progress()
 
-    def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
-        """Return for each repeat its rows and the retrieval among them; drawn once and cached.
+    def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[PoolDraw]:
+        """Return for each repeat the retrieval among its rows; drawn once and cached.
 
         Raises:
             InvalidInput: fewer motions than a pool.
         """
         if (pool, seed) not in self._pools:
-            self._pools[pool, seed] = [
-                (rows, r_precision(
-                    self.text[rows], self.motion[rows], pool=pool, top=TOP, distance=evaluator.distance,
-                    labels=self.labels[rows], rng=rng,
-                ))
-                for rows, rng in self.repeats(seed)
-            ]  # fmt: skip
+            self._pools[pool, seed] = [self._retrieved(evaluator, pool, rows, rng) for rows, rng in self.repeats(seed)]
         return self._pools[pool, seed]
+
+    def _retrieved(
+        self, evaluator: Evaluator, pool: int, rows: NDArray[np.int64], rng: np.random.Generator
+    ) -> PoolDraw:
+        pair, label = (
+            r_precision(
+                self.text[rows], self.motion[rows], pool=pool, top=TOP, distance=evaluator.distance, labels=labels,
+                rng=same,
+            )
+            for labels, same in ((None, copy.deepcopy(rng)), (self.labels[rows], rng))
+        )  # fmt: skip
+        return PoolDraw(rows, pair, label)
 
 
 def repeats_of(variants: NDArray[np.int64]) -> int:
@@ -97,9 +113,13 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
         splits: splits whose real motions distances refer to.
     """
     by, those = evaluator.name, f"the real motions of the split {' and '.join(splits)}"
-    nearest = "How often a motion of the prompt's content is among the {} nearest of {}."
+    nearest = "How often {} is among the {} nearest of {}."
     pools = [
-        Metric(_key(pool, k), f"R-precision {k} of {pool}", "%", "higher", 1, nearest.format(k, pool), by)
+        Metric(key(pool, k), f"{title} {k} of {pool}", "%", "higher", 1, nearest.format(hit, k, pool), by)
+        for key, title, hit in (
+            (_pair_key, "R-precision", "the prompt's own motion"),
+            (_key, "Same-label R-precision", "a motion of the prompt's content"),
+        )
         for pool in POOLS
         for k in TOP
     ]
@@ -191,8 +211,8 @@ def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np
 
 
 def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
-    """Return the share (N,) of draws in which each motion was among the three nearest of its pool of 32; NaN = never
-    drawn, as for all motions if there are fewer than a pool.
+    """Return the share (N,) of draws in which a motion of its label was among the three nearest of its pool of 32; NaN
+    = never drawn, as for all motions if there are fewer than a pool.
 
     Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
     """
@@ -201,29 +221,32 @@ def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArr
         pools = embeddings.pools(evaluator, POOLS[0], seed)
     except InvalidInput:
         pools = []
-    for rows, found in pools:
-        hits[rows[found.clips]] += found.hits[:, TOP.index(3)]
-        drawn[rows[found.clips]] += 1
+    for each in pools:
+        hits[each.rows[each.label.clips]] += each.label.hits[:, TOP.index(3)]
+        drawn[each.rows[each.label.clips]] += 1
     return np.divide(hits, drawn, out=np.full(len(hits), np.nan), where=drawn > 0)
 
 
 def retrieval(
     embeddings: EmbeddedSet, evaluator: Evaluator, pool: int, seed: int, *, of: NDArray[np.bool_] | None = None
 ) -> dict[str, Value]:
-    """Return R-precision in pools of `pool`; with `of` (N,) that of some of the motions in pools of all.
+    """Return R-precision in pools of `pool`, by the pair alone and by labels; with `of` (N,) that of some of the
+    motions in pools of all.
 
     A split of few labels must be judged in pools with others: alone, any motion finds its label there.
     """
     try:
         pools = embeddings.pools(evaluator, pool, seed)
     except InvalidInput as error:
-        return {_key(pool, k): Value.missing(error.message) for k in TOP}
-    hits = [found.hits if of is None else found.hits[of[rows[found.clips]]] for rows, found in pools]
-    count = min(len(each) for each in hits)
+        return dict.fromkeys(keys_of(pool), Value.missing(error.message))
+    drawn = [slice(None) if of is None else of[each.rows[each.pair.clips]] for each in pools]
+    found = [(each.pair.hits[some], each.label.hits[some]) for each, some in zip(pools, drawn, strict=True)]
+    count = min(len(pair) for pair, _ in found)
     if count == 0:
-        return {_key(pool, k): Value.missing("no such motion was drawn into a pool") for k in TOP}
+        return dict.fromkeys(keys_of(pool), Value.missing("no such motion was drawn into a pool"))
     return {
-        _key(pool, k): _interval([100 * float(each[:, column].mean()) for each in hits], count)
+        key(pool, k): _interval([100 * float(each[kind][:, column].mean()) for each in found], count)
+        for kind, key in enumerate((_pair_key, _key))
         for column, k in enumerate(TOP)
     }
 
@@ -287,10 +310,15 @@ def label_ceilings(labels: NDArray[np.int64], pool: int, seed: int) -> dict[int,
 
 def keys_of(pool: int) -> tuple[str, ...]:
     """Return the metrics of R-precision in pools of `pool`."""
-    return tuple(_key(pool, k) for k in TOP)
+    return tuple(key(pool, k) for key in (_pair_key, _key) for k in TOP)
+
+
+def _pair_key(pool: int, k: int) -> str:
+    return f"pair_precision_{k}_of_{pool}"
 
 
 def _key(pool: int, k: int) -> str:
+    """Return the key of same-label R-precision: reports have always had it under this name."""
     return f"r_precision_{k}_of_{pool}"
 
 

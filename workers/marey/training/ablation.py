@@ -1,9 +1,12 @@
-"""Shared code of ablations: judge a variant, and tabulate variants and seeds."""
+"""Shared code of ablations: judge a variant, measure variants on several seeds, and tabulate them."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from statistics import mean, stdev
 
 from marey.checks.prompts import evaluation_prompts
@@ -11,6 +14,9 @@ from marey.checks.rates import mean_quality
 from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
 from marey.training.adherence import measure
+
+DECIDES = "all but kick, punch, slash, dance"
+"""Rate of `judge` that compares variants."""
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:
@@ -21,17 +27,69 @@ def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -
     return rates | {"foot skate": physical.skate, "jerk": physical.jerk}
 
 
+def compare(
+    variants: Sequence[str], measured: Callable[[str, int], Mapping[str, float]], output: Path, name: str, *, seeds: int
+) -> str:
+    """Measure every variant with every seed, and with one further seed those whose intervals touch another's.
+
+    Numbers are kept in the folder `output/<name>`: a second call measures what is missing. The table is written after
+    each measurement, as `output/<name>.md`, and the numbers of all as `output/<name>.json` at the end.
+
+    Args:
+        variants: their names, rows of the table.
+        measured: numbers of a variant trained with a seed.
+        output: folder.
+        name: of the ablation.
+        seeds: first seeds, from 0 on; with one there are no intervals.
+    """
+    results: dict[str, list[Mapping[str, float]]] = {}
+    (output / name).mkdir(parents=True, exist_ok=True)
+
+    def add(variant: str, seed: int) -> None:
+        file = output / name / f"{re.sub('[^a-z0-9]+', '-', variant.lower()).strip('-')}.{seed}.json"
+        if not file.is_file():
+            text = json.dumps(dict(measured(variant, seed)), indent=1)
+            temporary = file.with_suffix(".part")
+            temporary.write_text(text, encoding="utf-8")
+            temporary.replace(file)
+        results.setdefault(variant, []).append(json.loads(file.read_text(encoding="utf-8")))
+        (output / f"{name}.md").write_text(table(results), encoding="utf-8")
+
+    for seed in range(seeds):
+        for variant in variants:
+            add(variant, seed)
+    for variant in touching(results) if seeds > 1 else ():
+        add(variant, seeds)
+    (output / f"{name}.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
+    return table(results)
+
+
+def touching(results: Mapping[str, Sequence[Mapping[str, float]]], metric: str = DECIDES) -> list[str]:
+    """Return the variants whose interval of the deciding metric overlaps that of another one."""
+    found = {name: interval([row[metric] for row in rows]) for name, rows in results.items() if metric in rows[0]}
+    return [
+        name
+        for name, (middle, half) in found.items()
+        if any(abs(middle - other) <= half + wide for each, (other, wide) in found.items() if each != name)
+    ]
+
+
 def table(results: Mapping[str, Sequence[Mapping[str, float]]]) -> str:
     """Tabulate means over training seeds with 95 % intervals (normal, 1.96 s/√n) as Markdown; one row per variant,
     empty where a number was not measured."""
     names = list(dict.fromkeys(name for rows in results.values() for name in rows[0]))
     lines = ["| variant | seeds | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
     for variant, rows in results.items():
-        cells = [_interval([row[name] for row in rows]) if name in rows[0] else "" for name in names]
+        cells = [_shown([row[name] for row in rows]) if name in rows[0] else "" for name in names]
         lines.append(f"| {variant} | {len(rows)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _interval(values: Sequence[float]) -> str:
-    half = f" ± {1.96 * stdev(values) / math.sqrt(len(values)):.3f}" if len(values) > 1 else ""
-    return f"{mean(values):.3f}{half}"
+def interval(values: Sequence[float]) -> tuple[float, float]:
+    """Return the mean and half the width of its 95 % interval (normal, 1.96 s/√n), 0 for a single value."""
+    return mean(values), 1.96 * stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0
+
+
+def _shown(values: Sequence[float]) -> str:
+    middle, half = interval(values)
+    return f"{middle:.3f} ± {half:.3f}" if len(values) > 1 else f"{middle:.3f}"

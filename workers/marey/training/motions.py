@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
@@ -107,10 +108,16 @@ class TokenData:
         """Return P."""
         return self.starts.shape[1]
 
-    def log_shares(self, codes: int) -> Tensor:
-        """Return the logarithm of each code's frequency (V, K): initial biases of the heads."""
-        levels = self.tokens.shape[1]
-        counts = torch.stack([torch.bincount(self.tokens[:, v], minlength=codes) for v in range(levels)]).float() + 1
+    def log_shares(self, codes: int, clips: NDArray[np.int64]) -> Tensor:
+        """Return the logarithm of each code's frequency (V, K) in `clips`, those that are trained on, at all phases:
+        initial biases of the heads."""
+        chosen = torch.from_numpy(clips).to(self.starts.device)
+        sequences = torch.stack([self.starts[chosen].flatten(), self.lengths[chosen].flatten()])
+        starts, lengths = torch.unique(sequences, dim=1)  # phase 0 stands for those that a clip does not have
+        edges = torch.zeros(len(self.tokens) + 1, dtype=torch.long, device=self.tokens.device)
+        edges.index_add_(0, starts, torch.ones_like(starts)).index_add_(0, starts + lengths, -torch.ones_like(starts))
+        tokens = self.tokens[edges.cumsum(0)[:-1] > 0]
+        counts = torch.stack([torch.bincount(level, minlength=codes) for level in tokens.T]).float() + 1
         return (counts / counts.sum(1, keepdim=True)).log()
 
     def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:

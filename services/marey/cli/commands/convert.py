@@ -85,15 +85,30 @@ def convert(
 
 
 def render(
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Motion files, such as .bvh or .npz.")],
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="SOURCE…", help="Motion files, such as .bvh or .npz, or prepared folders with --clip."),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .png (contact sheet) or .html (3D player).")],
     columns: Annotated[int, typer.Option("--columns", help="Poses per motion on a contact sheet.")] = 8,
     title: Annotated[str | None, typer.Option("--title", help="A line at the top.")] = None,
     theme: Annotated[str, typer.Option("--theme", help="light or dark; auto is possible for a player.")] = "light",
+    clip: Annotated[
+        list[int] | None,
+        typer.Option("--clip", help="Number of a clip, from 0 on, of each prepared folder; repeatable."),
+    ] = None,
+    difficulty: Annotated[
+        str | None,
+        typer.Option(
+            "--difficulty",
+            metavar="BUNDLE",
+            help="Show how hard each token of a motion is for this bundle's model, over time.",
+        ),
+    ] = None,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
 ) -> None:
-    """Draw motions: a contact sheet as PNG, or a page with a 3D player."""
+    """Draw motions: a contact sheet as PNG, or a page with a 3D player; with --difficulty both show a heat map."""
     from marey.core.extras import needs_extra
 
     try:
@@ -101,16 +116,35 @@ def render(
         from marey.viz.render import contact_sheet
     except ImportError as error:
         raise needs_extra("motion", error) from error
-    clips = [_read(source, from_unit, from_up) for source in sources]
-    captions = [str(clip.manifest.get("prompt") or source.stem) for clip, source in zip(clips, sources, strict=True)]
+    named = [each for source in sources for each in _read_all(source, clip or [], from_unit, from_up)]
+    names, clips = [name for name, _ in named], [motion for _, motion in named]
+    captions = [str(motion.manifest.get("prompt") or Path(name).stem) for name, motion in named]
     ending = output.suffix.lower()
-    if ending == ".png":
+    if difficulty is not None and ending in (".png", ".html", ".htm"):
+        from marey.cli.roles.drawing import difficulties_of
+        from marey.viz.difficulty import difficulty_page, difficulty_sheet
+
+        found = difficulties_of(difficulty, clips, names)
+        draw = difficulty_sheet if ending == ".png" else difficulty_page
+        draw(clips, found, output, captions=captions, columns=columns, title=title, theme=theme)
+    elif ending == ".png":
         contact_sheet(clips, output, columns=columns, title=title, captions=captions, theme=theme)
     elif ending in (".html", ".htm"):
         html_player(clips, output, title=title, captions=captions, theme=theme)
     else:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .png or .html.")
     console.result(console.home_relative(output))
+
+
+def _read_all(source: Path, numbers: list[int], unit: Unit, up: Up) -> list[tuple[str, MotionClip]]:
+    """Read the motion of a file, or clips of a prepared folder by number; each with its name."""
+    if not source.is_dir():
+        return [(str(source), _read(source, unit, up))]
+    if not numbers:
+        raise InvalidInput("is a folder", where=str(source), hint="Name clips of a prepared folder by --clip NUMBER.")
+    from marey.cli.roles.drawing import prepared_clip
+
+    return [(f"{source}: clip {number}", prepared_clip(source, number)) for number in numbers]
 
 
 def _read(source: Path, unit: Unit, up: Up) -> MotionClip:

@@ -253,7 +253,12 @@ def ablate(
     ] = None,
     steps: Annotated[int, typer.Option("--steps", help="Optimiser steps of each variant.")] = 1500,
     batch: Annotated[int | None, typer.Option("--batch", help="Clips a step; none given = as configured.")] = None,
-    seeds: Annotated[int, typer.Option("--seeds", help="Training seeds of each variant.")] = 1,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            "--seeds", help="Training seeds of each variant; with two or more, one further where intervals touch."
+        ),
+    ] = 2,
     threads: Threads = 0,
 ) -> None:
     """Train variants of a model, and measure what each of its parts is worth. Called again, it goes on."""

@@ -1,39 +1,97 @@
-"""Ablation of hard token mining and of the hierarchy of conditions, on several training seeds.
+"""Ablations of HGM³ on several training seeds: masks, conditions (Tab. 3), α (Tab. 4), passes (App. D, Tab. 2).
 
-    marey train ablate data/prepared hgm3-starter --steps 1500 --seeds 3 -o report
+    marey train ablate data/prepared hgm3-starter --what alphas --steps 1500 -o report
 
-All networks but the masked transformer are the bundle's. The masked transformer is trained from scratch, once with hard
-and once with random masks per seed, for the same number of steps. Every result is then decoded hierarchically, flat,
-and with at least one token per pass, and judged on the evaluation prompts. Finished variants are kept: a second call
-continues.
+All networks but the masked transformer are the bundle's. The masked transformer is trained from scratch, for the same
+number of steps in every variant; a variant that decodes a network of another one does not train it again. Every result
+is judged on the evaluation prompts. Finished trainings and measurements are kept: a second call continues.
 """
 
 from __future__ import annotations
 
 import json
 import shutil
-from collections import defaultdict
-from dataclasses import replace
-from itertools import product
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from marey.bundles import find_bundle
 from marey.checks.prompts import evaluation_prompts
-from marey.core.errors import InvalidBundle
 from marey.models.hgm3.assembly import assemble, unpack
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.generate import Generator, SamplingSettings
+from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.train import train_stage
-from marey.text.pipeline import TextPipeline
-from marey.training.ablation import judge, table
+from marey.text.features import TextFeatures
+from marey.training.ablation import compare, judge
+from marey.training.adherence import pipeline_of
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 
+METRICS = "metrics.json"
+"""Validation metrics of a finished training; a folder without it is unfinished."""
+
+HIERARCHICAL = SamplingSettings(steps=10, motion_steps=2, action_steps=5)
+FLAT = SamplingSettings(steps=10, motion_steps=0, action_steps=0)
 DECODINGS = {
-    "hierarchical": SamplingSettings(motion_steps=2, action_steps=5),
-    "flat": SamplingSettings(motion_steps=0, action_steps=0),
-    "hierarchical, one token a pass at least": SamplingSettings(motion_steps=2, action_steps=5, min_progress=True),
+    "hierarchical": HIERARCHICAL,
+    "flat": FLAT,
+    "hierarchical, one token a pass at least": replace(HIERARCHICAL, min_progress=True),
+}
+
+
+@dataclass(frozen=True)
+class DecodedVariant:
+    """A row of an ablation."""
+
+    networks: tuple[str, ...]  # names in `TRAININGS`; three = one for each level of condition
+    settings: SamplingSettings = HIERARCHICAL
+
+
+TRAININGS: dict[str, dict[str, Any]] = {
+    "hard": {"mask": "hard"},
+    "random": {"mask": "random"},
+    "motion": {"conditions": "motion"},
+    "action": {"conditions": "action"},
+    "specific": {"conditions": "specific"},
+    "alpha-0-0": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 0.0},
+    "alpha-0-0.5": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 0.5},
+    "alpha-0-1": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 1.0},
+    "alpha-1-1": {"mask": "hard", "alpha_start": 1.0, "alpha_end": 1.0},
+}
+"""Trained masked transformers, by name: fields of `MiningConfig` that differ from the bundle's."""
+
+MASKS = {
+    f"{mask} masks, {name}": DecodedVariant((mask,), settings)
+    for mask in ("hard", "random")
+    for name, settings in DECODINGS.items()
+}
+
+CONDITIONS = {
+    # the network of the full condition is also what three networks, decoded flat, come to (second row of Tab. 3)
+    "full condition alone": DecodedVariant(("specific",), FLAT),
+    "three conditions, three networks": DecodedVariant(("motion", "action", "specific")),
+    "three conditions, one network, flat": DecodedVariant(("hard",), FLAT),
+    "three conditions, one network": DecodedVariant(("hard",)),
+}
+
+ALPHAS = {
+    "α 0, random": DecodedVariant(("alpha-0-0",)),
+    "α 0 to 0.5": DecodedVariant(("alpha-0-0.5",)),
+    "α 0 to 1": DecodedVariant(("alpha-0-1",)),
+    "α 1": DecodedVariant(("alpha-1-1",)),
+}
+
+SWEEP = ((10, 10, 10), (10, 0, 10), (10, 0, 0), (10, 5, 8), (10, 2, 5), (15, 3, 8), (20, 4, 10))
+"""L, L_M and L_A of App. D, Tab. 2."""
+PASSES = {
+    f"L {steps}, L_M {motion}, L_A {action}": DecodedVariant(
+        ("hard",), SamplingSettings(steps=steps, motion_steps=motion, action_steps=action)
+    )
+    for steps, motion, action in SWEEP
 }
 
 
@@ -49,38 +107,72 @@ def train_variant(
     found = train_stage("masked", replace(options, run=folder / "run", config=config))
     shutil.copy(folder / "run" / TOKENS, encoded)
     assemble(data, folder / "run", folder / "bundle", config)
+    (folder / METRICS).write_text(json.dumps(found, indent=1), encoding="utf-8")
     return found
 
 
-def ablate(data: Path, bundle: str, output: Path, *, steps: int, batch: int | None, seeds: int, threads: int) -> str:
-    """Train and judge all variants; write `results.json` and `results.md`, and return the table.
+def ablate_masks(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare hard and random masks, each decoded in three ways; see `ablate`."""
+    return ablate("masks", MASKS, data, bundle, output, **options)
+
+
+def ablate_conditions(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare the full condition alone, a network for each condition, and one for all (Tab. 3); see `ablate`."""
+    return ablate("conditions", CONDITIONS, data, bundle, output, **options)
+
+
+def ablate_alphas(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare the four settings of α (Tab. 4); see `ablate`."""
+    return ablate("alphas", ALPHAS, data, bundle, output, **options)
+
+
+def ablate_passes(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare numbers of passes under each condition (App. D); see `ablate`."""
+    return ablate("passes", PASSES, data, bundle, output, **options)
+
+
+def ablate(
+    name: str,
+    variants: Mapping[str, DecodedVariant],
+    data: Path,
+    bundle: str,
+    output: Path,
+    *,
+    steps: int,
+    batch: int | None,
+    seeds: int,
+    threads: int,
+) -> str:
+    """Train what variants decode, judge each, and return the table; see `marey.training.ablation.compare`.
 
     Raises:
         InvalidBundle: the bundle declares no text pipeline.
     """
-    given = find_bundle(bundle).manifest
-    config = HGM3Config.from_dict(given.parameters)
+    given = find_bundle(bundle)
+    config = HGM3Config.from_dict(given.manifest.parameters)
     if batch is not None:
         config = replace(config, train_masked=replace(config.train_masked, batch=batch))
-    if given.text is None:
-        raise InvalidBundle("the bundle declares no text pipeline", where=bundle)
-    texts = TextPipeline.load(given.text).features([p.text for p in evaluation_prompts()])
-    results: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for seed, mask in product(range(seeds), ("hard", "random")):
-        folder = output / f"{mask}-{seed}"
-        file = folder / "numbers.json"
-        if not file.is_file():
-            own = replace(config, mining=replace(config.mining, mask=mask))
+
+    @cache
+    def texts() -> list[TextFeatures]:
+        return pipeline_of(Generator.load(given, threads=threads)).features([p.text for p in evaluation_prompts()])
+
+    def trained(network: str, seed: int) -> Path:
+        folder = output / "networks" / f"{network}.{seed}"
+        if not (folder / METRICS).is_file():
+            own = replace(config, mining=replace(config.mining, **TRAININGS[network]))
             options = TrainOptions(data, folder, own, Budget(steps=steps), seed=seed, threads=threads)
-            validation = train_variant(data, bundle, folder, own, options)
-            generator = Generator.load(str(folder / "bundle"), threads=threads)
-            numbers = {
-                name: {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts, settings)
-                for name, settings in DECODINGS.items()
-            }
-            file.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
-        for name, numbers in json.loads(file.read_text(encoding="utf-8")).items():
-            results[f"{mask} masks, {name}"].append(numbers)
-        (output / "results.md").write_text(table(results), encoding="utf-8")
-    (output / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
-    return table(results)
+            train_variant(data, bundle, folder, own, options)
+        return folder
+
+    def measured(row: str, seed: int) -> dict[str, float]:
+        variant = variants[row]
+        folders = [trained(network, seed) for network in variant.networks]
+        generators = [Generator.load(str(folder / "bundle"), threads=threads) for folder in folders]
+        generator = generators[-1]
+        if len(generators) > 1:
+            generator.base = SeparateTransformers([each.networks.masked for each in generators])
+        validation = json.loads((folders[-1] / METRICS).read_text(encoding="utf-8"))
+        return {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts(), variant.settings)
+
+    return compare(list(variants), measured, output, name, seeds=seeds)

@@ -79,6 +79,8 @@ class MiningConfig:
     alpha_start: Share = 0.0  # α_0 of eq. 8
     alpha_end: Share = 0.5  # α_T of eq. 8
     momentum: Momentum = 0.999  # λ of eq. 6; the paper gives none
+    conditions: Literal["all", "motion", "action", "specific"] = "all"
+    """Levels of condition that are trained: all, or one alone for the ablation (Tab. 3); "specific" is the full one."""
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
     replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
     replace_mask: Share = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are

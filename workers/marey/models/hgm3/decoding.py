@@ -14,7 +14,7 @@ from torch import Tensor
 
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
-from marey.models.hgm3.model import MaskedTransformer, ResidualTransformer
+from marey.models.hgm3.model import MaskedTransformer, ResidualTransformer, SeparateTransformers
 from marey.nn.convolution import frame_mask
 from marey.nn.masking import remaining_masks
 from marey.nn.sampling import sample_top_k, uniform
@@ -61,7 +61,11 @@ def condition_level(step: int, config: InferenceConfig) -> int:
 
 
 def decode_base(
-    model: MaskedTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
+    model: MaskedTransformer | SeparateTransformers,
+    items: Items,
+    config: InferenceConfig,
+    options: DecodeOptions,
+    keep: KeepRows,
 ) -> Items:
     """Fill `tokens[..., 0]`: L passes; each keeps the most confident tokens and never masks them again."""
     base = torch.full_like(items.tokens[..., 0], model.mask_token)  # (B, n)
@@ -91,7 +95,7 @@ def decode_base(
 
 
 def _base_pass(
-    model: MaskedTransformer,
+    model: MaskedTransformer | SeparateTransformers,
     items: Items,
     base: Tensor,
     masked_left: Tensor,
@@ -117,7 +121,7 @@ def _base_pass(
 
 
 def _base_logits(
-    model: MaskedTransformer,
+    models: MaskedTransformer | SeparateTransformers,
     items: Items,
     base: Tensor,
     valid: Tensor,
@@ -126,14 +130,15 @@ def _base_logits(
     options: DecodeOptions,
 ) -> Tensor:
     """Return guided logits (B, n, K), from one forward pass of 2 B sequences."""
-    null = torch.cat([model.condition.null.expand_as(items.condition[:, :1]), items.condition[:, 1:]], 1)
+    model, condition = models.at_level(level, items.condition)
+    null = torch.cat([model.condition.null.expand_as(condition[:, :1]), condition[:, 1:]], 1)
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
     first[:, 0] = True
     return model(
         base.repeat(2, 1),
         valid.repeat(2, 1),
-        torch.cat([items.condition, null]),
+        torch.cat([condition, null]),
         torch.cat([visible, first]),
         (valid & (base == model.mask_token)).repeat(2, 1),
         trim=options.trim_slots,

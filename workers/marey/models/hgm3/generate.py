@@ -19,6 +19,7 @@ from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
 from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.sampling import uniform
@@ -97,6 +98,7 @@ class Generator:
         self.batch_threads = batch_threads
         self.config = config
         self.networks = networks
+        self.base: MaskedTransformer | SeparateTransformers = networks.masked
         self.device = device
         self.dtype = dtype
         self.layout: FeatureLayout = layout_of(bundle.manifest)
@@ -222,7 +224,7 @@ class Generator:
         if not rows:
             return
         items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
-        items = decode_base(self.networks.masked, items, inference, options, watcher.step)
+        items = decode_base(self.base, items, inference, options, watcher.step)
         items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
         if not watcher.rows:
             return
@@ -243,11 +245,11 @@ class Generator:
         device, levels = self.device, self.config.tokenizer.levels
         # One by one, once a batch: a float32 product of few rows rounds differently with their number.
         graphs = [graph_batch([r.text], self.config.condition, device) for r in requests]
-        masked, residual = self.networks.masked, self.networks.residual
+        base, residual = self.base, self.networks.residual
         return Items(
             lengths=torch.tensor(lengths, device=device),
             seeds=torch.tensor([r.seed for r in requests], device=device),
-            condition=torch.cat([masked.condition(masked.text(graph)) for graph in graphs]),
+            condition=torch.cat([base.read(graph) for graph in graphs]),
             present=torch.cat([graph.present for graph in graphs]),
             sentence=torch.cat([residual.sentence(graph.nodes[:, 0]) for graph in graphs]),
             tokens=torch.full((len(requests), bucket, levels), -1, device=device),

@@ -16,12 +16,13 @@ S = 1 + A + P condition slots: the motion node, A actions, P specifics; absent s
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from marey.models.hgm3.conditions import Condition, GraphEncoder, TextNormalizer
+from marey.models.hgm3.conditions import Condition, GraphBatch, GraphEncoder, TextNormalizer
 from marey.models.hgm3.config import HGM3Config, TransformerConfig
 from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import packed_gelu
@@ -152,6 +153,15 @@ class MaskedTransformer(nn.Module):
         self.sequence.transformer.prepare_inference(dtype, batch_threads)
         self.head.prepare_inference(dtype)
 
+    def read(self, graph: GraphBatch) -> Tensor:
+        """Return the condition tokens (B, S, w) of graphs, for all levels of condition."""
+        return self.condition(self.text(graph))
+
+    def at_level(self, level: int, condition: Tensor) -> tuple[MaskedTransformer, Tensor]:
+        """Return the network that predicts under a level of condition, and its part of what `read` gave: one network
+        for all."""
+        return self, condition
+
     def forward(
         self,
         tokens: Tensor,
@@ -174,6 +184,28 @@ class MaskedTransformer(nn.Module):
         return at_tokens(logits, index[: len(logits)], valid.shape[1])
 
 
+class SeparateTransformers(nn.Module):
+    """A transformer of its own for each level of condition, in place of one (the ablation of HGM³ Tab. 3)."""
+
+    def __init__(self, networks: Sequence[MaskedTransformer]) -> None:
+        super().__init__()
+        self.networks = nn.ModuleList(networks)
+        self.mask_token = networks[0].mask_token
+
+    def read(self, graph: GraphBatch) -> Tensor:
+        """Return the condition tokens (B, S, 3 w) of graphs: those of each network, side by side."""
+        return torch.cat([self._network(level).read(graph) for level in range(len(self.networks))], -1)
+
+    def at_level(self, level: int, condition: Tensor) -> tuple[MaskedTransformer, Tensor]:
+        """Return the network of a level, and its condition tokens (B, S, w)."""
+        return self._network(level), condition.chunk(len(self.networks), -1)[level]
+
+    def _network(self, level: int) -> MaskedTransformer:
+        network = self.networks[level]
+        assert isinstance(network, MaskedTransformer)
+        return network
+
+
 class LossPredictor(nn.Module):
     """G_φ: reads the UNMASKED base tokens and the condition, predicts which tokens are hard for F_θ (eq. 5)."""
 
@@ -189,7 +221,9 @@ class LossPredictor(nn.Module):
         """Difficulty (B, n), only its order is meaningful; zero where not `valid`."""
         embedded = self.embedding(tokens.masked_fill(~valid, 0))
         hidden, index = self.sequence(embedded, valid, condition, visible)
-        return at_tokens(self.head(hidden).float().squeeze(-1), index, valid.shape[1]) * valid
+        with torch.autocast(hidden.device.type, enabled=False):  # ties of bfloat16 would rank tokens by their position
+            difficulty = self.head(hidden.float()).squeeze(-1)
+        return at_tokens(difficulty, index, valid.shape[1]) * valid
 
 
 class ResidualTransformer(nn.Module):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from marey.registry import Ablation, Choice, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
 
+ABLATION = "marey.models.hgm3.ablation"
+
 SPEC = ModelSpec(
     name="hgm3",
     title="HGM³",
@@ -50,8 +52,12 @@ The same prompt, seed, settings and bundle give the same motion.""",
     tokenizer="marey.models.hgm3.tokenizer:build_tokenizer",
     bundles={"hgm3-open": "marey-bundles-open", "hgm3-starter": "marey-bundles-starter"},
     random_bundle="marey.models.hgm3.bundle:random_bundle",
+    difficulty="marey.models.hgm3.difficulty:token_difficulties",
     self_train="marey.models.hgm3.self_train:self_train_into",
     ablations=(
-        Ablation("masks", "Hard and random masks, each decoded in three ways.", "marey.models.hgm3.ablation:ablate"),
+        Ablation("masks", "Hard and random masks, each decoded in three ways.", f"{ABLATION}:ablate_masks"),
+        Ablation("conditions", "One condition or three, networks shared or not.", f"{ABLATION}:ablate_conditions"),
+        Ablation("alphas", "Share of hard tokens among the masked ones.", f"{ABLATION}:ablate_alphas"),
+        Ablation("passes", "Passes of decoding under each condition.", f"{ABLATION}:ablate_passes"),
     ),
 )

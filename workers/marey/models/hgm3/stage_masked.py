@@ -18,11 +18,14 @@ from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LossPredictor, MaskedTransformer
 from marey.nn.convolution import frame_mask
 from marey.nn.ema import update_average, warm_momentum
-from marey.nn.losses import ranking_loss, token_losses
+from marey.nn.losses import hits, ranking_loss, token_losses
 from marey.nn.masking import easy_to_hard_mask, mask_counts
 from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
+
+CONDITIONS = ("motion", "action", "specific")
+"""Names of the levels of condition, each with those before it."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class MaskedStage:
         normalizer.mean.copy_(mean)
         normalizer.std.copy_(std)
         with torch.no_grad():
-            self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes)[0])
+            self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return F (with the graph) and G as separate groups."""
@@ -97,8 +100,7 @@ class MaskedStage:
         alpha = 0.0
         if mining.mask == "hard":
             alpha = mining.alpha_start + context.fraction * (mining.alpha_end - mining.alpha_start)  # eq. 8
-        one = mining.levels_per_step == 1
-        samples = [sample] if one else [sample.at_level(level) for level in range(LEVELS)]
+        samples = self._conditioned(sample)
         rec = sample.noise.new_zeros(())
         pred = sample.noise.new_zeros(())
         counted = sample.noise.new_zeros(())
@@ -108,7 +110,7 @@ class MaskedStage:
             rec = rec + (losses * masked).sum()
             pred = pred + ranking.sum() / (self.optimisation.batch * len(samples))
             counted = counted + masked.sum()
-            correct = correct + (right & masked).sum()
+            correct = correct + (right * masked).sum()
         rec = rec / counted.clamp(min=1)
         logs = {
             "loss": (rec + pred).detach(),
@@ -118,6 +120,13 @@ class MaskedStage:
             "alpha": torch.tensor(alpha),
         }
         return rec + pred, logs
+
+    def _conditioned(self, sample: MaskedSample) -> list[MaskedSample]:
+        """Return the samples under each condition of a step: all, the drawn ones, or the one that is trained."""
+        mining = self.config.mining
+        if mining.conditions != "all":
+            return [sample.at_level(CONDITIONS.index(mining.conditions))]
+        return [sample] if mining.levels_per_step == 1 else [sample.at_level(level) for level in range(LEVELS)]
 
     def after_step(self, context: StepContext) -> None:
         """Update the teacher as the student's moving average (eq. 6)."""
@@ -164,7 +173,7 @@ class MaskedStage:
         logits = model(self._shown(targets, masked), valid, condition, visible, masked)
         losses = token_losses(logits, targets)
         predicted = self._predict(self.module.predictor, sample, nodes.detach(), valid)
-        return losses, masked, logits.argmax(-1) == targets, ranking_loss(predicted, losses, masked)
+        return losses, masked, hits(logits.detach(), targets), ranking_loss(predicted, losses, masked)
 
     def _predict(self, predictor: LossPredictor, sample: MaskedSample, nodes: Tensor, valid: Tensor) -> Tensor:
         condition = predictor.condition(nodes, sample.dropped)
@@ -196,13 +205,12 @@ class MaskedStage:
                     losses, masked, right, ranking = self._piece(piece, 0.0)
                     totals[level] += [
                         float((losses * masked).sum()),
-                        float((right & masked).sum()),
+                        float((right * masked).sum()),
                         float(masked.sum()),
                     ]
                     ranks += float(ranking.sum()) / (LEVELS * len(self.pairs.validation))
-        names = ("motion", "action", "specific")
-        loss = {f"reconstruction/{n}": float(t[0] / t[2]) for n, t in zip(names, totals, strict=True)}
-        accuracy = {f"accuracy/{n}": float(t[1] / t[2]) for n, t in zip(names, totals, strict=True)}
+        loss = {f"reconstruction/{n}": float(t[0] / t[2]) for n, t in zip(CONDITIONS, totals, strict=True)}
+        accuracy = {f"accuracy/{n}": float(t[1] / t[2]) for n, t in zip(CONDITIONS, totals, strict=True)}
         return loss | accuracy | {"ranking": ranks}
 
 

@@ -15,7 +15,7 @@ from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LengthEstimator, ResidualTransformer
 from marey.nn.convolution import frame_mask
-from marey.nn.losses import token_losses
+from marey.nn.losses import hits, token_losses
 from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
@@ -44,7 +44,7 @@ class ResidualStage:
         self.module.normalizer.mean.copy_(mean)
         self.module.normalizer.std.copy_(std)
         with torch.no_grad():
-            self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes)[1:])
+            self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
@@ -101,8 +101,8 @@ class ResidualStage:
         logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sentences, dropped))
         targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
         losses = token_losses(logits, targets) * valid
-        right = (logits.argmax(-1) == targets) & valid
-        return losses.sum(1), right.sum(1).float(), valid.sum(1).float()
+        right = hits(logits.detach(), targets) * valid
+        return losses.sum(1), right.sum(1), valid.sum(1).float()
 
 
 class LengthStage:

@@ -11,12 +11,9 @@ generate with a variant. Finished variants are kept: a second call continues.
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +28,7 @@ from marey.models.mogo.generate import Generator
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
-from marey.training.ablation import judge, table
+from marey.training.ablation import compare, judge
 from marey.training.adherence import pipeline_of
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions, finish, use_threads
@@ -146,7 +143,7 @@ def _ablate(
     seeds: int,
     threads: int,
 ) -> str:
-    """Train and measure each variant with each seed; write the table as `<about>.md`, and return it."""
+    """Train and measure each variant with each seed, and return the table; see `marey.training.ablation.compare`."""
     use_threads(threads)
     config = MOGOConfig.from_dict(find_bundle(bundle).manifest.parameters)
     if batch is not None:
@@ -155,19 +152,15 @@ def _ablate(
             train_tokenizer=replace(config.train_tokenizer, batch=batch),
             train_transformer=replace(config.train_transformer, batch=batch),
         )
-    results: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for seed, (number, name) in product(range(seeds), enumerate(names)):
-        run = output / f"{about}-{number}-{seed}"
-        file = run / "numbers.json"
-        if not file.is_file():
-            shutil.rmtree(run, ignore_errors=True)
-            run.mkdir(parents=True)
-            options = TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads)
-            if name in SCALES:
-                numbers = train_tokenizer(SCALES[name], options)
-            else:
-                numbers = train_transformer(bundle, VARIANTS[name], options)
-            file.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
-        results[name].append(json.loads(file.read_text(encoding="utf-8")))
-        (output / f"{about}.md").write_text(table(results), encoding="utf-8")
-    return table(results)
+    variants = list(names)
+
+    def measured(name: str, seed: int) -> dict[str, float]:
+        run = output / f"{about}-{variants.index(name)}-{seed}"
+        shutil.rmtree(run, ignore_errors=True)
+        run.mkdir(parents=True)
+        options = TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads)
+        if name in SCALES:
+            return train_tokenizer(SCALES[name], options)
+        return train_transformer(bundle, VARIANTS[name], options)
+
+    return compare(variants, measured, output, about, seeds=seeds)

@@ -33,9 +33,10 @@ def assemble(
     gathered = gather(prepared, run, RECIPE, config)
     states = {name: dict(part.state) for name, part in gathered.parts.items()}
     statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
+    text = gathered.text.model_copy(update={"split_actions": config.split_actions})
     return write_generator(
         bundle, MODEL, config, states, statistics,
-        text=gathered.text, card=card, overwrite=overwrite, **gathered.manifest,
+        text=text, card=card, overwrite=overwrite, **gathered.manifest,
     )  # fmt: skip
 
 

@@ -111,6 +111,11 @@ class MOGOConfig(ModelConfig):
     rollouts: Whole = (
         0  # further ones that start from the model's own motions, where training starts from a finished one
     )
+    split_actions: bool = True
+    """Ours: each action of a prompt is drawn by itself, one after another (`TextSpec.split_actions`); else the sentence
+    is the prompt of all frames, as published."""
+    float_logits: bool = False
+    """The last matrix stays in float32 where matrices are in bfloat16, in which codes tie; earlier bundles drew so."""
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
@@ -139,10 +144,11 @@ class MOGOConfig(ModelConfig):
             )
 
 
-PAPER = MOGOConfig()
+PAPER = MOGOConfig(split_actions=False, float_logits=True)
 
 STARTER = MOGOConfig(
     name="starter",
+    float_logits=True,
     corruption=1.0,  # with .5 the last frame predicts the next so well that the model ignores prompts
     first_level=5.0,  # level 0 decides the action; the others its details
     ahead=(5, 12, 24),
@@ -165,6 +171,7 @@ STARTER = MOGOConfig(
 
 TINY = MOGOConfig(
     name="tiny",
+    float_logits=True,
     max_frames=24,
     ahead=(3,),
     steers=6,

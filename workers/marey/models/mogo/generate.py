@@ -131,8 +131,13 @@ class Generator:
         return 1
 
     def actions(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
-        """Return the action vectors of a prompt (A, W), and the usual frames of each (A,)."""
-        actions = torch.from_numpy(text.action_vectors.astype(np.float32)).to(self.device)
+        """Return the action vectors of a prompt (A, W), and the usual frames of each (A,).
+
+        Where the bundle's text pipeline does not split prompts, the sentence is the one action.
+        """
+        spec = self.bundle.manifest.text
+        vectors = text.action_vectors if spec is None or spec.split_actions else text.nodes[:1]
+        actions = torch.from_numpy(vectors.astype(np.float32)).to(self.device)
         return actions, self.transformer.natural_frames(actions)
 
     def streams(self, count: int, inference: InferenceConfig) -> StreamBatch:

@@ -11,6 +11,7 @@ from torch import Tensor
 from marey.models.mogo.config import TokenizerConfig
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer
 from marey.models.mogo.tokenizer import Tokenizer
+from marey.nn.losses import hits
 
 
 def scale_penalty(model: Tokenizer, config: TokenizerConfig) -> Tensor:
@@ -23,7 +24,7 @@ class LevelSums:
     """Sums over all predicted codes, per level: all (V,)."""
 
     losses: Tensor  # cross-entropies
-    right: Tensor  # codes predicted correctly
+    right: Tensor  # codes predicted correctly, a tie by its chance
     asked: Tensor  # codes predicted
 
     def __add__(self, other: LevelSums) -> LevelSums:
@@ -93,5 +94,5 @@ def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Te
 def _sums(logits: Tensor, codes: Tensor) -> LevelSums:
     """Sum over logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
     losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), reduction="none").view(codes.shape).sum(0)
-    right = (logits.detach().argmax(-1) == codes).sum(0)
+    right = hits(logits.detach(), codes).sum(0)
     return LevelSums(losses, right, right.new_full(right.shape, len(codes)))

@@ -11,7 +11,7 @@ import torch.nn.functional as F
 from marey.models.mogo.depth import DepthStep
 from marey.models.mogo.model import RQHCTransformer, TrunkStep
 from marey.nn.compiled import Module, compiled
-from marey.nn.packed import cast_linears, is_small, pack_linears
+from marey.nn.packed import GroupedLinear, can_pack, cast_linears, is_small, pack_linears
 
 MOST_GROUPED = 8
 """Sessions of one product: 48 rows. Beyond them the product takes the time, not reading the weights."""
@@ -43,11 +43,14 @@ class PackedModel:
         # the last row, for `UNKNOWN_TIME`, is zero
         self.times = None if clock is None else F.pad(clock(frames), (0, 0, 0, 1))
         on_cpu = self.device.type == "cpu"
+        head = self.network.head
         self.kept = torch.float32 if on_cpu else dtype  # type of keys and values
         if on_cpu:
             pack_linears(self.network, dtype, group=group)
         else:
             cast_linears(self.network, dtype)
+        if self.network.config.float_logits:
+            self.network.add_module("head", GroupedLinear(head, group=group) if on_cpu and can_pack(head) else head)
         # elsewhere calls are recorded and replayed, and an active compiler would be recorded too
         made = compiled if on_cpu else _as_it_is
         self.steps = [made(TrunkStep(block)) for block in self.blocks]

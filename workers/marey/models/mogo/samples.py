@@ -88,7 +88,14 @@ class Samples:
     """Source of spans of clips and of steered motions."""
 
     def __init__(
-        self, clips: Sequence[Clip], tokens: TokenData, captions: SentenceData, steers: Steers | None, most: int
+        self,
+        clips: Sequence[Clip],
+        tokens: TokenData,
+        captions: SentenceData,
+        steers: Steers | None,
+        most: int,
+        *,
+        split: bool = True,
     ) -> None:
         """Collect the sources.
 
@@ -98,7 +105,9 @@ class Samples:
             captions: captions of the clips.
             steers: motions that are steered at any moment.
             most: frames of the longest sample.
+            split: the actions of joined clips are samples of their own; else a clip is one with the whole caption.
         """
+        self.seams = [clip.seams if split else () for clip in clips]
         self.clips, self.captions, self.most, self.steers = clips, captions, most, steers
         self.lengths = tokens.lengths[:, 0].cpu().numpy()
         self._starts = tokens.starts[:, 0].cpu().numpy()
@@ -143,7 +152,7 @@ class Samples:
         said: list[tuple[int, int]] = []
         for clip in clips.tolist():
             first, count = int(self.captions.first[clip]), int(self.captions.authors[clip].sum())
-            edges = [0, *self.clips[clip].seams, int(self.lengths[clip])]
+            edges = [0, *self.seams[clip], int(self.lengths[clip])]
             actions = np.diff(edges).tolist()
             if len(actions) > 1:
                 said += [(first + count + action, frames) for action, frames in enumerate(actions)]
@@ -168,11 +177,11 @@ class Samples:
 
     def _actions(self, clip: int, rng: np.random.Generator) -> tuple[list[int], list[int]]:
         """Return the edges of a clip's actions, and a caption of each."""
-        about, length = self.clips[clip], int(self.lengths[clip])
-        if not about.seams:
+        seams, length = self.seams[clip], int(self.lengths[clip])
+        if not seams:
             return [0, length], [self._caption(clip, rng)]
         own = int(self.captions.first[clip] + self.captions.authors[clip].sum())
-        return [0, *about.seams, length], [own + action for action in range(len(about.seams) + 1)]
+        return [0, *seams, length], [own + action for action in range(len(seams) + 1)]
 
     def _caption(self, clip: int, rng: np.random.Generator) -> int:
         authors = self.captions.authors[clip]

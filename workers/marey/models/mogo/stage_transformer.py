@@ -40,7 +40,7 @@ class TransformerStage:
         self.optimisation = config.train_transformer
         self.module = network(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
-        self.samples = Samples(clips, tokens, captions, steers, config.max_frames)
+        self.samples = Samples(clips, tokens, captions, steers, config.max_frames, split=config.split_actions)
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]
         mean, std = text_statistics(captions.strings, spoken)
         self.module.prompt.mean.copy_(mean)
@@ -48,7 +48,8 @@ class TransformerStage:
         actions, frames = self.samples.captioned_actions(self.pairs.train)
         self.module.pace.fit(self.module.prompt.standardised(captions.sentences(actions)), frames)
         with torch.no_grad():  # the head starts at the codes' frequencies
-            self.module.head.bias[: self.module.codes] = tokens.log_shares(self.module.codes).logsumexp(0)
+            shares = tokens.log_shares(self.module.codes, self.pairs.train)
+            self.module.head.bias[: self.module.codes] = shares.logsumexp(0)
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
