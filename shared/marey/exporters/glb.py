@@ -44,4 +44,5 @@ EXPORTER = Exporter(
     encode=encode,
     decode=decode,
     options=frozenset({"root_bone", "in_place", "tpose_frame", "placement", "mesh"}),
+    stored=False,
 )

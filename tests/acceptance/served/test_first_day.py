@@ -35,7 +35,7 @@ def test_the_tutorial_runs_as_it_stands(marey: Marey, tmp_path: Path) -> None:
             check=False,
         )
         assert done.returncode == 0, f"{step.page}:{step.line}\n{done.stdout}\n{done.stderr}"
-    assert {path.suffix for path in (tmp_path / "first").iterdir()} == {".bvh", ".glb", ".npz"}
+    assert {path.suffix for path in (tmp_path / "first").iterdir()} == {".bvh", ".npz"}
     assert len(list((tmp_path / "clips").glob("*.npz"))) == 4
     with (tmp_path / "final" / "manifest.csv").open(encoding="utf-8", newline="") as file:
         kept = [row for row in csv.DictReader(file) if row["npz"]]

@@ -90,7 +90,7 @@ def test_fetching_again_changes_nothing_and_a_foreign_file_is_not_touched(marey:
     job = marey.submit("a person bows", "--seed", 3, "--seconds", 2, "--name", "bow")
     marey("jobs", "wait", job).ok()
     paths = [Path(path) for path in marey("fetch", job, "-o", tmp_path / "a").ok().out.splitlines()]
-    assert sorted(path.suffix for path in paths) == [".bvh", ".glb", ".npz"]
+    assert sorted(path.suffix for path in paths) == [".bvh", ".npz"]
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a").iterdir()}
     marey("fetch", job, "-o", tmp_path / "a").ok()
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a").iterdir()} == before

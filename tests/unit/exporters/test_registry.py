@@ -43,7 +43,7 @@ def test_formats_of_marey_are_installed() -> None:
 
 
 def test_films_are_made_on_request_alone() -> None:
-    assert [name for name, exporter in exporters().items() if exporter.stored] == ["bvh", "glb", "npz"]
+    assert [name for name, exporter in exporters().items() if exporter.stored] == ["bvh", "npz"]
 
 
 def test_the_registry_needs_the_standard_library_only() -> None:
