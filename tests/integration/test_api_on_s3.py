@@ -12,7 +12,7 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from marey.client.fetching import ATTEMPTS, Download, download_all
+from marey.client.fetching import ATTEMPTS, FileToFetch, download_all
 from marey.core.errors import Unreachable
 from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction
@@ -62,7 +62,7 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
         assert f"00000_a-person-walks_{motion['seed']}.npz" in sent.headers["content-disposition"]
         assert httpx2.get(signed[:-4] + "0000").status_code == 403
         digest = next(file for file in motion["files"] if file["format"] == "npz")
-        target = Download(path, digest["sha256"], digest["size"], tmp_path / "x.npz")
+        target = FileToFetch(path, digest["sha256"], digest["size"], tmp_path / "x.npz")
         (tmp_path / "x.npz.part").write_bytes(content[:1000])
         download_all(client, [target], overwrite=False, done=lambda _: None)
     assert sha256_of(tmp_path / "x.npz") == digest["sha256"]
@@ -92,7 +92,7 @@ def test_signed_urls_that_expired_are_asked_for_anew(
         api.work(content)
         (motion,) = client.pages(f"/v1/jobs/{job['id']}/motions")
         digest = hashlib.sha256(content).hexdigest()
-        target = Download(f"/v1/motions/{motion['id']}/files/npz", digest, len(content), tmp_path / "x.npz")
+        target = FileToFetch(f"/v1/motions/{motion['id']}/files/npz", digest, len(content), tmp_path / "x.npz")
         download_all(client, [target], overwrite=False, done=lambda _: None)
         assert (tmp_path / "x.npz").read_bytes() == content
         assert len(given) == ATTEMPTS

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal, Unpack, get_args
 
 from marey.client.evaluation_requests import EvaluationOptions, naming_lines, request_body
-from marey.client.fetching import Download, check_folder, download_all
+from marey.client.fetching import FileToFetch, check_folder, download_all
 from marey.client.resources import Resource, identifier
 from marey.client.types.common import File
 from marey.client.types.evaluations import Comparison, Evaluation, EvaluationDetail
@@ -133,7 +133,7 @@ class Evaluations(Resource):
         found = self.get(evaluation)
         file = _report(found, file_format)
         check_folder(path.parent)
-        download = Download(f"{_path(found)}/report/{file_format}", file.sha256, file.size, path)
+        download = FileToFetch(f"{_path(found)}/report/{file_format}", file.sha256, file.size, path)
         download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
         return path
 

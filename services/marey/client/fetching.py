@@ -28,7 +28,7 @@ FORMAT = re.compile(r"[a-z0-9]{1,16}")
 
 
 @dataclass(frozen=True)
-class Download:
+class FileToFetch:
     """One file to fetch."""
 
     url: str
@@ -43,7 +43,7 @@ class Download:
         return self.url.rpartition("/")[2]
 
 
-Planned = list[tuple[dict[str, Any], list[Download]]]
+Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
 """Items of the API, in input order, each with its files."""
 
 
@@ -102,7 +102,7 @@ def fetch_job(
     wanted = [file for _, files in planned for file in files]
     done: set[Path] = set()
 
-    def note(download: Download) -> None:
+    def note(download: FileToFetch) -> None:
         done.add(download.path)
         observer.fetched(download.path)
 
@@ -190,14 +190,14 @@ def plan(
     planned: Planned = []
     names = FileNames(template)
     for item in items:
-        downloads: list[Download] = []
+        downloads: list[FileToFetch] = []
         motion = item["motion"]
         for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
             name = names.of(item["id"], naming(item), extension_of(file["format"]))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
-            downloads.append(Download(url, file["sha256"], file["size"], folder / name))
+            downloads.append(FileToFetch(url, file["sha256"], file["size"], folder / name))
         planned.append((item, downloads))
     return planned
 
@@ -218,7 +218,7 @@ def naming(item: dict[str, Any]) -> Naming:
 
 
 def download_all(
-    client: Transport, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
+    client: Transport, downloads: Sequence[FileToFetch], *, overwrite: bool, done: Callable[[FileToFetch], None]
 ) -> None:
     """Fetch files, eight at a time, after a check of the existing ones.
 
@@ -230,14 +230,14 @@ def download_all(
         Conflict: a file exists with other content; nothing is fetched then.
         InvalidFile: the data that arrived has another sha256, or cannot be written.
     """
-    missing: list[Download] = []
+    missing: list[FileToFetch] = []
     for download in downloads:
         if _is_there(download, overwrite):
             done(download)
         else:
             missing.append(download)
 
-    def fetch(download: Download) -> None:
+    def fetch(download: FileToFetch) -> None:
         done(_download(client, download))
 
     with ThreadPoolExecutor(PARALLEL) as pool:
@@ -260,7 +260,7 @@ def _wanted(files: list[dict[str, Any]], formats: Sequence[str] | None, item: st
         yield by_format[name]
 
 
-def _is_there(download: Download, overwrite: bool) -> bool:
+def _is_there(download: FileToFetch, overwrite: bool) -> bool:
     try:
         if download.path.stat().st_size == download.size and sha256_of(download.path) == download.sha256:
             return True
@@ -276,7 +276,7 @@ def _is_there(download: Download, overwrite: bool) -> bool:
     return False
 
 
-def _download(client: Transport, download: Download) -> Download:
+def _download(client: Transport, download: FileToFetch) -> FileToFetch:
     part = download.path.with_name(download.path.name + ".part")
     for attempt in range(1, ATTEMPTS + 1):
         try:
@@ -298,7 +298,7 @@ def _download(client: Transport, download: Download) -> Download:
     )
 
 
-def _continue(client: Transport, download: Download, part: Path) -> None:
+def _continue(client: Transport, download: FileToFetch, part: Path) -> None:
     have = part.stat().st_size if part.exists() else 0
     if have >= download.size:
         have = 0

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from marey.client.fetching import FORMAT, Download, check_folder, download_all
+from marey.client.fetching import FORMAT, FileToFetch, check_folder, download_all
 from marey.client.resources import Resource, identifier, identifiers
 from marey.client.types.jobs import Job
 from marey.client.types.motions import Motion, MotionDetail, Reroll
@@ -162,7 +162,7 @@ class Motions(Resource):
                 raise
 
 
-def _download(motion: Motion, wanted: str, path: Path) -> Download:
+def _download(motion: Motion, wanted: str, path: Path) -> FileToFetch:
     """Return the download of a file of a motion.
 
     Args:
@@ -177,7 +177,7 @@ def _download(motion: Motion, wanted: str, path: Path) -> Download:
         hint = f"It has {formats}." if formats else "If its prompt is being erased, wait a moment."
         raise NotFound(f"has no {wanted or 'such'} file", where=f"motion {motion.id}", hint=hint)
     url = f"/v1/motions/{identifier(motion)}/files/{file.format}"
-    return Download(url, file.sha256, file.size, path)
+    return FileToFetch(url, file.sha256, file.size, path)
 
 
 def list_or_none(values: Sequence[str] | None) -> Sequence[str] | None:

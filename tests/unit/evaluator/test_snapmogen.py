@@ -12,19 +12,26 @@ import torch
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.core.errors import Conflict, InvalidFile, MareyError, NotFound
+from marey.core.errors import Conflict, InvalidBundle, InvalidFile, MareyError, NotFound
 from marey.core.settings import settings
-from marey.evaluator.config import NetworkConfig
+from marey.data.prepared import PreparedData
+from marey.evaluator.assembly import renew_reference
+from marey.evaluator.bundle import write_bundle
+from marey.evaluator.config import EvaluatorConfig, NetworkConfig
 from marey.evaluator.loading import load_evaluator
+from marey.evaluator.reference import RealClips
+from marey.evaluator.snapmogen import SnapMoGenEvaluator
 from marey.evaluator.snapmogen_import import import_snapmogen
 from marey.evaluator.snapmogen_model import (
+    MODEL,
     PUBLIC,
     SnapMoGenMotionEncoder,
     SnapMoGenSentenceEncoder,
     published_name,
 )
-from marey.importing import ImportRequest
+from marey.importing import ImportRequest, spec_of
 from marey.text.encoders import weights_sha256
+from tests.support.prepared import write_prepared
 from tests.support.tiny_encoders import write_tiny_t5
 from tests.unit.evaluator.published import encoder_shapes, inputs, state_of
 
@@ -120,6 +127,7 @@ def test_the_imported_evaluator_reads_motions_and_sentences(download: Path, mode
     assert bundle.manifest.text is not None
     assert bundle.manifest.text.encoder_sha256 == weights_sha256(t5)
     evaluator = load_evaluator("snap-eval", device="cpu")
+    assert isinstance(evaluator, SnapMoGenEvaluator)
     assert (evaluator.layout, evaluator.fps, evaluator.distance) == ("snapmogen-296", 30, "cosine")
     motion = np.random.default_rng(1).normal(size=(40, 296)).astype(np.float32)
     mean, std = (np.load(download / "meta_data" / f"{name}.npy").astype(np.float32) for name in ("mean", "std"))
@@ -129,10 +137,11 @@ def test_the_imported_evaluator_reads_motions_and_sentences(download: Path, mode
     network.load_state_dict({name: state[published_name(name)] for name in own}, strict=False)
     expected = network.embed(torch.from_numpy((motion - mean) / std)[None], torch.tensor([40]))
     np.testing.assert_allclose(evaluator.embed_motion([motion]), expected.detach().numpy(), atol=1e-5)
-    long = " ".join(["a person walks forward"] * 60)
+    long = " ".join(["a person walks forward"] * 45)
     embedded = evaluator.embed_text(["a person waves", long])
     assert embedded.shape == (2, 16)
     assert np.isfinite(embedded).all()
+    assert evaluator._states([long])[0].shape == (120, 768)
     card = (models / "snap-eval" / "README.md").read_text(encoding="utf-8")
     assert "snapmogen/evaluator/eval_klde-5_late-5_nlayer6_norm/model/net_best_top1.tar" in card
 
@@ -206,3 +215,29 @@ def test_an_evaluator_is_not_imported_without_its_text_encoder_or_twice(download
     with pytest.raises(Conflict):
         run(download, models / "snap-eval", None)
     assert run(download, models / "snap-eval", None, overwrite=True).manifest.model == "snapmogen"
+
+
+def test_a_reference_of_real_clips_is_added_to_an_imported_evaluator(tmp_path: Path) -> None:
+    config = EvaluatorConfig(name="small", network=SMALL.network)  # of the layout that the prepared clips have
+    torch.manual_seed(0)
+    motion, text = SnapMoGenMotionEncoder(config).eval(), SnapMoGenSentenceEncoder(config)
+    states = {"motion": motion.state_dict(), "text": text.state_dict()}
+    statistics = np.zeros(263, np.float32), np.ones(263, np.float32)
+    spec = spec_of("t5-v1_1-base", "0" * 64)
+    imported = write_bundle(
+        tmp_path / "a", config, states, statistics, None, text=spec, card="", model=MODEL, dtype=np.float32,
+        licence="MIT",
+    )  # fmt: skip
+    with pytest.raises(InvalidBundle):
+        RealClips.of(imported)
+    prepared = write_prepared(tmp_path / "prepared")
+    made = renew_reference(imported, prepared, tmp_path / "b")
+    assert (made.manifest.model, made.manifest.text) == (MODEL, spec)
+    for part in states:
+        for name, value in made.tensors(part, dtype=None).items():
+            np.testing.assert_array_equal(value, states[part][name].numpy())
+    data = PreparedData.open(prepared)
+    clips = [clip for clip in data.split("test") if clip.captions]
+    features = torch.from_numpy(np.array(data.features(clips[0])))[None]
+    expected = motion.embed(features, torch.tensor([features.shape[1]])).detach().numpy()
+    np.testing.assert_allclose(RealClips.of(made).split("test").motion[:1], expected, atol=2e-3)

@@ -188,7 +188,7 @@ def test_what_stands_under_a_key_must_be_tensors(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="holds int as 'a'"):
         checkpoint.section("model")
     for key in ("other", "none"):
-        with pytest.raises(InvalidFile, match="is no table of tensors"):
+        with pytest.raises(InvalidFile, match="does not hold tensors by name"):
             checkpoint.section(key)
 
 

@@ -167,7 +167,7 @@ def test_broken_and_incomplete_folders_are_refused_and_leave_nothing(
     said = {
         "truncated": "cannot be read",
         "no weights": r"there is no model\.safetensors or pytorch_model\.bin",
-        "no tokenizer": r"has no tokenizer\.json",
+        "no tokenizer": r"there is no tokenizer\.json, spiece\.model or vocab\.json with merges\.txt",
         "pickled code": "holds code or objects of Python",
     }[change]
     with pytest.raises((InvalidFile, NotFound), match=said) as caught:
@@ -175,6 +175,35 @@ def test_broken_and_incomplete_folders_are_refused_and_leave_nothing(
     assert caught.value.where
     assert caught.value.hint
     assert not models.exists() or not list(models.iterdir())
+
+
+def test_vocabularies_in_their_first_formats_are_converted(
+    folders: dict[str, Path], models: Path, tmp_path: Path
+) -> None:
+    t5, clip = tmp_path / "t5", tmp_path / "clip"
+    shutil.copytree(folders["t5-v1_1-base"], t5)
+    shutil.copytree(folders["clip-vit-b32"], clip)
+    pieces = json.loads((t5 / "tokenizer.json").read_text(encoding="utf-8"))["model"]["vocab"]
+    for folder in (t5, clip):
+        (folder / "tokenizer.json").unlink()
+    write_sentencepiece(t5 / "spiece.model", pieces)
+    for name, folder in (("t5-v1_1-base", t5), ("clip-vit-b32", clip)):
+        write_encoder(name, folder, models / name)
+        mine, theirs = load_encoder(name).encode(TEXT), load_encoder(name, folders[name]).encode(TEXT)
+        np.testing.assert_allclose(mine.tokens, theirs.tokens, atol=1e-6)
+
+
+def write_sentencepiece(file: Path, pieces: list[list]) -> None:
+    from transformers.utils import sentencepiece_model_pb2_new as format
+
+    model = format.ModelProto()
+    kinds = {"<unk>": 2, "<pad>": 3, "</s>": 3}
+    for piece, score in pieces:
+        model.pieces.add(piece=piece, score=score, type=kinds.get(piece, 1))
+    model.trainer_spec.model_type = 1
+    model.trainer_spec.unk_id, model.trainer_spec.eos_id, model.trainer_spec.pad_id = 2, 1, 0
+    model.trainer_spec.bos_id = -1
+    file.write_bytes(model.SerializeToString())
 
 
 # -- the encoder that other weights were trained with ------------------------------------------------------------------

@@ -48,7 +48,7 @@ def test_the_licence_is_the_kind_s_unless_one_is_given_and_is_needed(tmp_path: P
     with pytest.raises(InvalidInput, match="states no licence") as caught:
         run_import("unlicensed", tmp_path, tmp_path / "out")
     assert caught.value.argument == "licence"
-    with pytest.raises(InvalidInput, match="is no identifier"):
+    with pytest.raises(InvalidInput, match="invalid licence 'do what you want'"):
         run_import("plain", tmp_path, tmp_path / "out", licence="do what you want")
 
 

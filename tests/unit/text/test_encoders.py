@@ -18,6 +18,7 @@ from marey.text.minilm import MiniLM
 from marey.text.minilm_bundle import LAYERS, WIDTH, load_tokenizer, load_weights
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
+from marey.text.truncation import truncated_tokens
 
 TEXT = "a person walks, and waves his left hand"
 LONG = " ".join(["a person walks forward and then turns left slowly"] * 20)
@@ -139,6 +140,19 @@ def test_t5_reads_prompts_past_77_tokens(tiny_t5: tuple[str, Path]) -> None:
     encoding = load_encoder(*tiny_t5).encode(LONG)
     assert len(encoding.tokens) > 77
     assert encoding.span(len(LONG) - 6, len(LONG)) is not None
+
+
+def test_states_of_fewer_tokens_are_those_of_a_tokenizer_that_truncates(tiny_t5: tuple[str, Path]) -> None:
+    from transformers import AutoTokenizer, T5EncoderModel
+
+    name, folder = tiny_t5
+    found = truncated_tokens(load_encoder(name, folder), ["a person waves", LONG], 20)
+    inputs = AutoTokenizer.from_pretrained(folder)(LONG, truncation=True, max_length=20, return_tensors="pt")
+    with torch.inference_mode():
+        expected = T5EncoderModel.from_pretrained(folder).eval()(inputs.input_ids).last_hidden_state[0].numpy()
+    assert found[1].shape == (20, 768)
+    np.testing.assert_allclose(found[1], expected, atol=1e-5)
+    np.testing.assert_array_equal(found[0], load_encoder(name, folder).encode("a person waves").tokens)
 
 
 def test_the_two_t5_of_one_width_are_not_taken_for_each_other(tiny_t5: tuple[str, Path]) -> None:

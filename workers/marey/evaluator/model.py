@@ -90,11 +90,11 @@ class MotionEncoder(nn.Module):
         longest = -(-config.max_frames // self.frames)
         self.encoder = DistributionEncoder(self.inputs * self.frames, longest, config.network)
 
-    def forward(self, features: Tensor, lengths: Tensor) -> Gaussian:
+    def forward(self, features: Tensor, lengths: Tensor, /) -> Gaussian:
         """Encode raw features (B, T, D or at least I) with frames (B,); frames beyond a motion's end are not read."""
         return self.encoder(*self._tokens(features, lengths))
 
-    def embed(self, features: Tensor, lengths: Tensor) -> Tensor:
+    def embed(self, features: Tensor, lengths: Tensor, /) -> Tensor:
         """Return mean vectors (B, E) of `forward`'s input."""
         return self.encoder.mean(*self._tokens(features, lengths))
 
@@ -124,11 +124,11 @@ class SentenceEncoder(nn.Module):
         self.register_buffer("text_std", torch.ones(config.text_width))
         self.encoder = DistributionEncoder(config.text_width, MAX_TEXT_TOKENS, config.network)
 
-    def forward(self, states: Tensor, lengths: Tensor) -> Gaussian:
+    def forward(self, states: Tensor, lengths: Tensor, /) -> Gaussian:
         """Encode token states (B, S, W) of which (B,) exist."""
         return self.encoder(*self._tokens(states, lengths))
 
-    def embed(self, states: Tensor, lengths: Tensor) -> Tensor:
+    def embed(self, states: Tensor, lengths: Tensor, /) -> Tensor:
         """Return mean vectors (B, E) of `forward`'s input."""
         return self.encoder.mean(*self._tokens(states, lengths))
 

@@ -65,12 +65,12 @@ class _Head(nn.Module):
     def _add_head(self, width: int) -> None:
         self.head = nn.Linear(width, width)
 
-    def forward(self, x: Tensor, lengths: Tensor) -> Gaussian:
+    def forward(self, x: Tensor, lengths: Tensor, /) -> Gaussian:
         """Encode features or token states (B, T or S, numbers) of which (B,) exist as Gaussians."""
         raw = self.encoder(*self._tokens(x, lengths))
         return Gaussian(self.head(raw.mean), self.head(raw.log_variance))
 
-    def embed(self, x: Tensor, lengths: Tensor) -> Tensor:
+    def embed(self, x: Tensor, lengths: Tensor, /) -> Tensor:
         """Return mean vectors (B, E) of `forward`'s input, which retrieval compares."""
         return self.head(self.raw(x, lengths))
 

@@ -62,7 +62,7 @@ def import_allennlp(request: ImportRequest) -> Bundle:
         Conflict: the bundle already exists.
     """
     bert = _read_bert(request)
-    with _unpacked(request.folder) as folder:
+    with _unpacked(request.folder, request.output.parent) as folder:
         named = _bert_name(folder / CONFIG)
         labels = _lines(folder / LABELS)
         tensors, account = _read_weights(folder / WEIGHTS, bert, len(labels))
@@ -145,8 +145,8 @@ def _lines(file: Path) -> list[str]:
 
 
 @contextmanager
-def _unpacked(archive: Path) -> Generator[Path]:
-    """Give the folder of the archive's three files, in a temporary place where it is packed."""
+def _unpacked(archive: Path, beside: Path) -> Generator[Path]:
+    """Give the folder of the archive's three files; where it is packed, a temporary one in the folder `beside`."""
     if archive.is_dir():
         for name in (CONFIG, WEIGHTS, LABELS):
             if not (archive / name).is_file():
@@ -155,7 +155,8 @@ def _unpacked(archive: Path) -> Generator[Path]:
         return
     if not archive.exists():
         raise NotFound("there is no such file or folder", where=str(archive))
-    with tempfile.TemporaryDirectory() as temporary:
+    beside.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".", dir=beside) as temporary:
         _unpack(archive, Path(temporary))
         yield Path(temporary)
 

@@ -154,7 +154,7 @@ class Section:
         if value is None:
             return f"lacks the tensor {name}"
         if shape is not None and not _fits(value.shape, shape):
-            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+            wanted = tuple("any" if n is None else n for n in shape)
             return f"{name} has shape {tuple(value.shape)}, not {wanted}"
         if not value.is_floating_point() or value.layout is not torch.strided or value.is_quantized:
             return f"{name} holds {value.dtype}, not floating numbers"
@@ -258,7 +258,7 @@ class Checkpoint:
 def _table(value: object, file: Path, key: str | None) -> Mapping[str, Tensor]:
     where = str(file) if key is None else f"{file}: {key}"
     if not isinstance(value, Mapping) or not value:
-        raise InvalidFile("is no table of tensors", where=where, hint="Download the file again.")
+        raise InvalidFile("does not hold tensors by name", where=where, hint="Download the file again.")
     for name, each in value.items():
         if not isinstance(name, str) or not isinstance(each, Tensor):
             raise InvalidFile(f"holds {type(each).__name__} as {name!r}, not a tensor", where=where)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -29,13 +31,17 @@ from marey.text.t5_encoder import check_t5
 WEIGHTS, PICKLED = "model.safetensors", "pytorch_model.bin"
 TOKENIZER = "tokenizer.json"
 TOKENIZER_FILES = (TOKENIZER, "tokenizer_config.json", "special_tokens_map.json")
-SENTENCE = "a person walks forward and waves"
+SENTENCEPIECE, PAIRS = "spiece.model", ("vocab.json", "merges.txt")
+"""Vocabularies of T5 and CLIP in their first formats."""
+EXTRA_IDS = 100
+"""Marks of T5's training that stand behind its vocabulary."""
+SENTENCES = ("a person walks forward", "a person sits quietly")
 """Encoded once to check that weights and tokenizer work together."""
 
 
 @dataclass(frozen=True)
 class Published:
-    """What is known of a published text encoder.
+    """Facts of a published text encoder, by which its files are checked.
 
     Attributes:
         licence, credit: of the weights.
@@ -106,8 +112,14 @@ def write_encoder(
     known = PUBLISHED[name]
     if not source.is_dir():
         raise NotFound("there is no such folder", where=str(source), hint=f"It should hold the files of {HUB[name]}.")
-    check_t5(name, source) if name.startswith("t5") else check_clip(source)
-    with TemporaryDirectory() as temporary, BundleWriter(output, overwrite=overwrite) as writer:
+    if name.startswith("t5"):
+        check_t5(name, source)
+    else:
+        check_clip(source)
+    with (
+        BundleWriter(output, overwrite=overwrite) as writer,
+        TemporaryDirectory(prefix=".", dir=output.parent) as temporary,  # /tmp may not have room for a gigabyte
+    ):
         weights, account = _weights(name, source, Path(temporary))
         writer.add_json("config.json", read_config(source))
         for file, content in _tokenizer(name, source, Path(temporary)).items():
@@ -208,31 +220,58 @@ def _check_finite(name: str, value: Tensor, file: Path) -> None:
 
 
 def _tokenizer(name: str, source: Path, temporary: Path) -> dict[str, Any]:
-    """Return the JSON files of the tokenizer; others, such as `spiece.model`, are converted by `transformers`."""
-    folder = source
-    if not (source / TOKENIZER).is_file():
-        from transformers import AutoTokenizer
+    """Return the JSON files of the tokenizer, made of older files where the folder has no `tokenizer.json`."""
+    found = {file: read_json(source / file) for file in TOKENIZER_FILES if (source / file).is_file()}
+    if TOKENIZER in found:
+        return found
+    try:
+        if (source / SENTENCEPIECE).is_file():
+            return {**found, TOKENIZER: _of_sentencepiece(source / SENTENCEPIECE)}
+        if all((source / file).is_file() for file in PAIRS):
+            return _of_pairs(source, temporary / "tokenizer")
+    except Exception as error:  # the libraries raise everything from OSError to bare Exception
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
+        raise InvalidFile(
+            f"has no {TOKENIZER}, and its tokenizer cannot be converted: {reason}",
+            where=str(source),
+            hint=f"Take all files from {HUB[name]}.",
+        ) from None
+    raise NotFound(
+        f"the tokenizer is missing: there is no {TOKENIZER}, {SENTENCEPIECE} or {' with '.join(PAIRS)}",
+        where=str(source),
+        hint=f"Take all files from {HUB[name]}.",
+    )
 
-        folder = temporary / "tokenizer"
-        try:
-            AutoTokenizer.from_pretrained(source, local_files_only=True).save_pretrained(folder)
-        except Exception as error:  # the libraries raise everything from OSError to bare Exception
-            raise InvalidFile(
-                f"has no {TOKENIZER}, and its tokenizer cannot be converted: {str(error).splitlines()[0][:200]}",
-                where=str(source),
-                hint=f"Add a {TOKENIZER} of {HUB[name]}.",
-            ) from None
+
+def _of_sentencepiece(file: Path) -> Any:
+    """Return the `tokenizer.json` of T5's vocabulary in the format of SentencePiece, whose library is not needed."""
+    from transformers.convert_slow_tokenizer import T5Converter
+
+    known = SimpleNamespace(vocab_file=str(file), _extra_ids=EXTRA_IDS)
+    converter: Any = T5Converter(known)
+    known.convert_tokens_to_ids = [piece.piece for piece in converter.proto.pieces].index
+    return json.loads(converter.converted().to_str())
+
+
+def _of_pairs(source: Path, folder: Path) -> dict[str, Any]:
+    """Return the JSON files of a tokenizer of byte pairs."""
+    from transformers import CLIPTokenizer
+
+    CLIPTokenizer.from_pretrained(source, local_files_only=True).save_pretrained(folder)
     return {file: read_json(folder / file) for file in TOKENIZER_FILES if (folder / file).is_file()}
 
 
 def _try(name: str, folder: Path, source: Path) -> None:
-    """Load the written encoder and encode a sentence."""
+    """Load the written encoder and encode sentences, which an empty vocabulary does not tell apart."""
     try:
-        encoding = load_encoder(name, folder).encode(SENTENCE)
+        encoder = load_encoder(name, folder)
+        first, other = (encoder.encode(sentence).tokens for sentence in SENTENCES)
     except InvalidFile as error:
         raise InvalidFile(error.message, where=str(source), hint=error.hint) from error
-    if not np.isfinite(encoding.tokens).all() or len(encoding.tokens) < 2:
-        raise InvalidFile("encodes no sentence", where=str(source), hint=f"Take all files from {HUB[name]}.")
+    if not np.isfinite(first).all() or (first.shape == other.shape and np.allclose(first, other)):
+        raise InvalidFile(
+            "its tokenizer and weights encode no sentence", where=str(source), hint=f"Take all files from {HUB[name]}."
+        )
 
 
 CARD = """# Text encoder {name}

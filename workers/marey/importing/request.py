@@ -18,7 +18,7 @@ LICENCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9.+-]{0,99}")
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """What an import kind's `run` is given.
+    """The argument of an import kind's `run`.
 
     Attributes:
         kind: of the weights.
@@ -106,5 +106,7 @@ def _licence(kind: ImportKind, given: str | None) -> str:
             argument="licence",
         )
     if not LICENCE.fullmatch(licence):
-        raise InvalidInput(f"{licence!r} is no identifier of a licence", where="licence", argument="licence")
+        raise InvalidInput(
+            f"invalid licence {licence!r}", where="licence", hint="Name it by its SPDX identifier.", argument="licence"
+        )
     return licence
