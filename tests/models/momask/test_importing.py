@@ -240,6 +240,7 @@ def test_full_size_checkpoints_become_motions_by_the_command_line(
     marey = Marey(tmp_path / "home", tmp_path / "models")
     bundle = marey.models / "mine"
     marey("models", "import", "momask", folder, "-o", bundle, "--text-encoder", clip).ok()
-    marey("generate", "a person walks", "--model", bundle, "-o", tmp_path / "out", "--seed", 1).ok()
+    asked = ("--bundle", bundle, "--seed", 1, "--format", "bvh")
+    marey("generate", "a person walks", *asked, "-o", tmp_path / "out").ok()
     (file,) = (tmp_path / "out").rglob("*.bvh")
     assert len(read_bvh(file).joints()) > 10
