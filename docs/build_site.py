@@ -150,7 +150,7 @@ def _configuration(name: str, training: Any) -> str:
 
 
 def _value(value: Any) -> str:
-    return _code(str(list(value) if isinstance(value, tuple) else value))
+    return _code(json.dumps(value))  # nearly as in the file: a tuple is a list
 
 
 # --- routes ---

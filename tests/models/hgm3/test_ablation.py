@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,7 +120,8 @@ def test_separate_networks_decode_their_own_level_alone(bundle: Bundle) -> None:
     requests = [Request(text_features(seed), seed, 196) for seed in range(2)]
     wanted, flat = (generator.generate(requests, settings)[0] for settings in (HIERARCHICAL, FLAT))
     assert wanted.decided[0] > 0, "the motion node decides some tokens"
-    copies = [copy.deepcopy(generator.networks.masked) for _ in range(LEVELS)]
+    alike = [Generator.load(bundle, device="cpu", threads=1, dtype=torch.float32) for _ in range(LEVELS)]
+    copies = [each.networks.masked for each in alike]
     generator.base = SeparateTransformers(copies)
     assert np.array_equal(generator.generate(requests, HIERARCHICAL)[0].tokens, wanted.tokens)
     copies[0].head.bias.data.copy_(5 * torch.randn_like(copies[0].head.bias))

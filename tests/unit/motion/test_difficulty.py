@@ -42,10 +42,11 @@ def test_the_hardest_token_is_the_darkest_place_of_the_track_under_its_own_time(
         _, columns = np.nonzero((pixels == HARD).all(-1))
         found[hardest] = (columns.min() - MARGIN, columns.max() - MARGIN)
         assert (pixels == THEMES["light"].floor).all(-1).any()
-    span = 4 * CELL[0]
+    frame = 4 * CELL[0] / (clip.frames - 1)  # pixels; the first and the last pose stand over the track's ends
+    token = seconds * clip.fps * frame
     for hardest, (left, right) in found.items():
-        assert left == pytest.approx(CELL[0] / 2 + span * hardest / 10, abs=8)
-        assert right == pytest.approx(CELL[0] / 2 + span * (hardest + 1) / 10, abs=12)
+        assert left == pytest.approx(CELL[0] / 2 + token * hardest, abs=2)
+        assert right == pytest.approx(CELL[0] / 2 + token * (hardest + 1), abs=3)
 
 
 def test_the_sheet_is_the_contact_sheet_with_one_more_track(tmp_path: Path) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from marey.core.configs import ModelConfig, named
+from marey.core.configs import Count, ModelConfig, Positive, Share, Weight, named
 from marey.core.errors import InvalidInput
 from marey.motion.features import layout
+from marey.training.config_checks import check_heads
 from marey.training.optimisation import StageConfig
 
 
@@ -15,40 +16,40 @@ from marey.training.optimisation import StageConfig
 class NetworkConfig:
     """Each of the three transformers: motion encoder, text encoder, motion decoder."""
 
-    layers: int = 6
-    heads: int = 4
-    width: int = 256  # of the embeddings as well
-    feedforward: int = 1024
-    dropout: float = 0.1
+    layers: Count = 6
+    heads: Count = 4  # of attention; they divide the width
+    width: Count = 256  # of the embeddings as well
+    feedforward: Count = 1024  # width of the hidden layer
+    dropout: Share = 0.1  # after attention and the hidden layer
 
 
 @dataclass(frozen=True)
 class LossConfig:
     """Weights of the losses beside the reconstruction's 1 (SnapMoGen App. B.2)."""
 
-    divergence: float = 1e-5  # λ_KL
-    latent: float = 1e-5  # λ_E
-    contrast: float = 0.1  # λ_NCE
-    temperature: float = 0.1  # of InfoNCE: TMR's, the appendix does not give one
+    divergence: Weight = 1e-5  # λ_KL
+    latent: Weight = 1e-5  # λ_E
+    contrast: Weight = 0.1  # λ_NCE
+    temperature: Positive = 0.1  # of InfoNCE: TMR's, the appendix does not give one
 
 
 @dataclass(frozen=True)
 class EvaluatorConfig(ModelConfig):
     """Configuration of one bundle."""
 
-    name: str = "paper"
-    layout: str = "humanml3d-263"
-    features: int = 263  # D
-    fps: float = 20.0
-    inputs: int = 67
+    name: str = "paper"  # as manifests show it
+    layout: str = "humanml3d-263"  # of the prepared data's features
+    features: Count = 263  # D, numbers of a frame
+    fps: Positive = 20.0
+    inputs: Count = 67
     """I, the first numbers of a frame that the network reads: root and joint positions. The 6-D block behind them is
     not a local rotation in this layout, and velocities follow from positions."""
-    min_frames: int = 16
-    max_frames: int = 196
-    frames_per_token: int = 1
+    min_frames: Count = 16  # shortest motion
+    max_frames: Count = 196  # longest motion
+    frames_per_token: Count = 1
     """Frames that are concatenated to one token of the motion encoder (ours; 1 is the paper's). No number is dropped,
     and the transformers, which are nearly all of the work, read that many times fewer tokens."""
-    text_width: int = 768  # W, of T5-base in the paper
+    text_width: Count = 768  # W, of T5-base in the paper
     network: NetworkConfig = NetworkConfig()
     loss: LossConfig = LossConfig()
     train_tmr: StageConfig = StageConfig(batch=64, learning_rate=1e-4)  # the batch is App. B.2's, the rate TMR's
@@ -58,6 +59,12 @@ class EvaluatorConfig(ModelConfig):
         known = layout(self.layout)
         if (known.dim, known.fps) != (self.features, self.fps) or not 0 < self.inputs <= self.features:
             raise InvalidInput(f"does not fit {self.layout}: {known.dim} numbers at {known.fps:g} fps", where="layout")
+
+    def check(self) -> None:
+        """Check sizes against each other; see `ModelConfig.check`."""
+        check_heads("network", self.network.heads, self.network.width)
+        if self.min_frames > self.max_frames:
+            raise InvalidInput(f"{self.min_frames} is over max_frames, {self.max_frames}", where="min_frames")
 
     @property
     def width(self) -> int:

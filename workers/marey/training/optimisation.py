@@ -17,9 +17,9 @@ class StageConfig:
 
     batch: Count  # samples a step
     learning_rate: Part = 2e-4  # of AdamW
-    warmup_steps: Count = 2000
-    warmup_share: Part = 0.05  # of the budget; warm-up = the smaller of the two
-    decay: Literal["constant", "cosine"] = "constant"
+    warmup_steps: Count = 2000  # of a linear warm-up
+    warmup_share: Part = 0.05  # of the budget; the warm-up is the smaller of the two
+    decay: Literal["constant", "cosine"] = "constant"  # of the learning rate behind the warm-up
     final: Share = 0.02  # end of the cosine, as a share of the learning rate
     weight_decay: Weight = 1e-5  # of matrices; biases and norms have none
     betas: tuple[Momentum, Momentum] = (0.9, 0.99)  # of AdamW
