@@ -31,7 +31,7 @@ CREDIT = "Guo et al. 2025, SnapMoGen: Human Motion Generation from Expressive Te
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedSet:
     """One of the published sets.
 
     Attributes:
@@ -50,14 +50,14 @@ class Published:
 
 
 SETS = (
-    Published(
+    PublishedSet(
         "snapmogen",
         RELEASED_SNAPMOGEN,
         ("meta_data", "../meta_data", "../../meta_data", "../../../meta_data"),
         "SnapMoGen",
         "Mean and deviation of the data set's `meta_data`, all 296 features.",
     ),
-    Published(
+    PublishedSet(
         "humanml3d",
         RELEASED_HUMANML3D,
         ("Comp_v6_KLD005/meta",),
@@ -67,7 +67,7 @@ SETS = (
 )
 
 
-def import_momaskpp(request: ImportRequest, sets: Sequence[Published] = SETS) -> Bundle:
+def import_momaskpp(request: ImportRequest, sets: Sequence[PublishedSet] = SETS) -> Bundle:
     """Import one set of weights.
 
     Args:
@@ -105,7 +105,7 @@ def import_momaskpp(request: ImportRequest, sets: Sequence[Published] = SETS) ->
         )
 
 
-def _set_of(download: Download, sets: Sequence[Published]) -> tuple[Published, Path]:
+def _set_of(download: Download, sets: Sequence[PublishedSet]) -> tuple[PublishedSet, Path]:
     """Return the set that a folder holds, or is, and its folder."""
     root = download.root
     found = [(each, root / each.name) for each in sets if (root / each.name / "vq").is_dir()]
@@ -142,7 +142,7 @@ def _transformer(folder: Path) -> Path:
 
 
 def _networks(
-    download: Download, published: Published, folder: Path, transformer: Path
+    download: Download, published: PublishedSet, folder: Path, transformer: Path
 ) -> tuple[MoMaskPPConfig, ScaleNetworks]:
     """Read all networks of a set, with the configuration that they have."""
     yaml = download.find("vq/*/residual_vqvae*.yaml", what="the configuration of the tokenizer", within=folder)
