@@ -170,9 +170,9 @@ def _body(mesh: Mesh, posed: Arranged, added: int, numbers: _Numbers) -> dict[st
     points = (mesh.points + posed.skeleton.rest[carriers]).astype(np.float32)
     joints, weights = np.zeros((len(points), 4), np.uint16), np.zeros((len(points), 4), np.float32)
     joints[:, 0], weights[:, 0] = carriers, 1
-    bounds = {"min": _floats(points.min(axis=0)), "max": _floats(points.max(axis=0))}
+    low, high = _floats(points.min(axis=0)), _floats(points.max(axis=0))
     attributes = {
-        "POSITION": numbers.add("VEC3", points, target=VERTICES, **bounds),
+        "POSITION": numbers.add("VEC3", points, target=VERTICES, min=low, max=high),
         "NORMAL": numbers.add("VEC3", mesh.normals, target=VERTICES),
         "JOINTS_0": numbers.add("VEC4", joints, component=UNSIGNED_SHORT, target=VERTICES),
         "WEIGHTS_0": numbers.add("VEC4", weights, target=VERTICES),
