@@ -345,7 +345,7 @@ def test_only_the_pair_is_a_hit_of_the_published_retrieval_and_a_motion_of_its_l
     ceiling = label_ceilings(labels.astype(np.int64), 32, seed=0)[1]
     assert values["pair_precision_1_of_32"].mean == pytest.approx(ceiling, abs=0.5), "a guess among eight or so"
     assert 10 < ceiling < 15
-    assert {metric.title: metric.key for metric in metrics_of(evaluator, ["test"])}["R-precision 1 of 32"] == (
+    assert {metric.label: metric.key for metric in metrics_of(evaluator, ["test"])}["R-precision 1 of 32"] == (
         "pair_precision_1_of_32"
     )
 
