@@ -42,12 +42,13 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     tokenizer="marey.models.momaskpp.tokenizer:build_tokenizer",
     random_bundle="marey.models.momaskpp.bundle:random_bundle",
-)
-
-IMPORT = ImportKind(
-    name="momaskpp",
-    help="MoMask++ (Guo et al. 2025): checkpoint_dir/snapmogen, with the data set's meta_data, or /humanml3d.",
-    run="marey.models.momaskpp.importing:import_momaskpp",
-    licence="LicenseRef-Snap-NC",
-    text_encoder=True,
+    imports=(
+        ImportKind(
+            name="momaskpp",
+            help="MoMask++ (Guo et al. 2025): checkpoint_dir/snapmogen, with the data set's meta_data, or /humanml3d.",
+            run="marey.models.momaskpp.importing:import_momaskpp",
+            licence="LicenseRef-Snap-NC",
+            text_encoder=True,
+        ),
+    ),
 )
