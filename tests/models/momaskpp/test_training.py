@@ -157,6 +157,17 @@ def test_tokens_of_all_scales_come_back_in_their_places(prepared: PreparedData, 
         assert torch.equal(tokens, expected[..., 0])
 
 
+def test_codes_are_counted_over_the_tokens_of_all_scales_of_training_clips(stage: ScaleStage) -> None:
+    tokens, clips, codes = stage.tokens, stage.pairs.train, stage.config.tokenizer.codes
+    rows = [tokens.rows(torch.from_numpy(clips), torch.full((len(clips),), phase))[0] for phase in range(tokens.phases)]
+    distinct = torch.unique(torch.cat(rows), dim=0)
+    counted = torch.bincount(distinct[distinct >= 0], minlength=codes).float() + 1
+    shares = tokens.log_shares(codes, clips)
+    assert shares.shape == (1, codes)
+    torch.testing.assert_close(shares[0].exp(), counted / counted.sum(), atol=0.01, rtol=0)
+    assert not torch.equal(shares, tokens.log_shares(codes, clips[:1]))
+
+
 def test_masks_are_counted_on_the_tokens_a_clip_has_or_as_published_on_all() -> None:
     torch.manual_seed(0)
     own, padded = Scales((8, 4, 2, 1), "own", 49), Scales((8, 4, 2, 1), "padded", 49)

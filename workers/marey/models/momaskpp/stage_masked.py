@@ -70,7 +70,7 @@ class ScaleStage:
         self.module.words.normalizer.mean.copy_(mean)
         self.module.words.normalizer.std.copy_(std)
         with torch.no_grad():
-            self.module.codes.bias.copy_(tokens.log_shares(config.tokenizer.codes)[0])
+            self.module.codes.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""

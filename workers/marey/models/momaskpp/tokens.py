@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.models.momaskpp.scales import Scales
@@ -28,6 +30,11 @@ class ScaleTokens(TokenData):
         index = self.starts[clips, phases][:, None] + valid.long().cumsum(1) - 1
         tokens = self.tokens[index.clamp(0, len(self.tokens) - 1), 0]
         return tokens.masked_fill(~valid, NO_TOKEN), lengths
+
+    def log_shares(self, codes: int, clips: NDArray[np.int64]) -> Tensor:
+        """As of `TokenData`, (1, K): over the tokens of all scales."""
+        sizes = self.scales.valid(self.lengths.flatten()).sum(1).view_as(self.lengths)
+        return TokenData(self.tokens, self.starts, sizes).log_shares(codes, clips)
 
 
 def load_scale_tokens(run: Path, tokenizer: Tokenizer, data: MotionData) -> ScaleTokens:
