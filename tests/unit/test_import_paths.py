@@ -18,6 +18,8 @@ OLD = re.compile(rf"(?<![\w./*-])({'|'.join(PORTIONS)})[./](?!marey\b)[a-z_]\w*"
 """A path of the time when each of these folders was a package of its own."""
 NEW = re.compile(r"(?<![\w./@-])marey((?:\.(?!__)[A-Za-z_]\w*)+)")
 STORED = {
+    "tests/unit/importing/test_encoders.py": "T5's names of tensors",
+    "workers/marey/importing/encoder_files.py": "T5's names of tensors",
     "CHANGELOG.md": "says what a user replaces",
     "docs/decisions/0015-one-package-by-noun.md": "describes the layout before",
     "tests/unit/test_import_paths.py": "names them to find them",
