@@ -6,7 +6,7 @@ import threading
 import time
 from pathlib import Path
 
-from marey.client.fetching import Download, download_all
+from marey.client.fetching import FileToFetch, download_all
 from marey.client.link import Link
 from marey.client.place import Server
 from marey.client.transport import Transport
@@ -29,7 +29,7 @@ def submit_watch_and_fetch(url: str, api: LiveApi, folder: Path) -> list[float]:
         motion = next(client.pages(f"/v1/jobs/{job['id']}/motions"))
         file = next(file for file in motion["files"] if file["format"] == "npz")
         path = folder / "fetched.npz"
-        target = Download(f"/v1/motions/{motion['id']}/files/npz", file["sha256"], file["size"], path)
+        target = FileToFetch(f"/v1/motions/{motion['id']}/files/npz", file["sha256"], file["size"], path)
         download_all(client, [target], overwrite=False, done=lambda _: None)
         assert sha256_of(path) == file["sha256"]
     return times

@@ -60,9 +60,7 @@ def main() -> int:
         console.say("make demo: interrupted")
         return INTERRUPTED
     failed = sum(line["state"] != "succeeded" for line in lines)
-    console.say(
-        f"{len(lines) - failed} motions (.bvh, .glb, .npz, .png) in {OUT}/ after {time.monotonic() - began:.0f} s."
-    )
+    console.say(f"{len(lines) - failed} motions (.bvh, .npz, .png) in {OUT}/ after {time.monotonic() - began:.0f} s.")
     console.say("Open a .bvh in Blender (File, Import, Motion Capture), or a .png in any viewer.")
     return 6 if failed else 0
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, Self, TypeVar, cast, get_type_hints
 
 from marey.core.errors import InvalidInput
@@ -43,13 +44,17 @@ Momentum = Annotated[float, Between(0, 0.99999)]
 """Share of the old value in a moving average; at 1 nothing would move."""
 
 
+ADDED = MappingProxyType({"added": True})
+"""Metadata of a field that earlier releases do not know: at its default it is left out, so that they read bundles."""
+
+
 @dataclass(frozen=True)
 class ModelConfig:
     """Base class of configurations that decide a model's shapes and training."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values, for manifests and checkpoints."""
-        return asdict(self)
+        return _plain(self)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -66,6 +71,17 @@ class ModelConfig:
         Raises:
             InvalidInput: they contradict each other; `where` is the field to change.
         """
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        own = {each.name: getattr(value, each.name) for each in fields(value) if not _is_left_out(value, each)}
+        return {name: _plain(inner) for name, inner in own.items()}
+    return value
+
+
+def _is_left_out(value: Any, each: Field[Any]) -> bool:
+    return each.metadata == ADDED and getattr(value, each.name) == each.default
 
 
 def named(configs: Mapping[str, T], name: str) -> T:

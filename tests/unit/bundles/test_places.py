@@ -90,7 +90,7 @@ def test_a_wheel_has_no_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert checkout.checkout() == tmp_path
 
 
-@pytest.mark.parametrize("name", [*model_names(), *GENERATORS])
+@pytest.mark.parametrize("name", [*(name for name in model_names() if get_model(name).bundles), *GENERATORS])
 def test_without_a_bundle_its_distribution_is_named(tmp_path: Path, name: str) -> None:
     config = Settings(home=tmp_path, models=tmp_path)
     with pytest.raises(NotFound) as refused:

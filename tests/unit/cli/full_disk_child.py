@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from marey.client.fetching import Download, download_all
+from marey.client.fetching import FileToFetch, download_all
 from marey.client.lines import Lines
 from marey.client.manifest import COLUMNS, write_manifest
 from marey.client.place import Server
@@ -77,7 +77,7 @@ class Files(BaseHTTPRequestHandler):
 
 
 def fetch(folder: Path, port: int) -> None:
-    wanted = Download("/file", hashlib.sha256(BIG).hexdigest(), len(BIG), folder / "clip.npz")
+    wanted = FileToFetch("/file", hashlib.sha256(BIG).hexdigest(), len(BIG), folder / "clip.npz")
     with Transport(Server(f"http://127.0.0.1:{port}", "key")) as client:
         download_all(client, [wanted], overwrite=False, done=lambda _: None)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from marey.client.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
+from marey.client.fetching import ATTEMPTS, BLOCK, FileToFetch, download_all, plan
 from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
@@ -64,7 +64,7 @@ def endless() -> Iterator[str]:
 
 
 def test_no_more_is_read_than_the_size_that_was_told(tmp_path: Path, endless: str) -> None:
-    wanted = Download("/file", "0" * 64, 1000, tmp_path / "a.npz")
+    wanted = FileToFetch("/file", "0" * 64, 1000, tmp_path / "a.npz")
     with Transport(Server(endless, "key")) as client, pytest.raises(InvalidFile, match="another sha256"):
         download_all(client, [wanted], overwrite=False, done=lambda _: None)
     assert list(tmp_path.iterdir()) == []

@@ -86,7 +86,10 @@ def test_the_stage_leaves_its_part_with_losses_and_retrieval_of_validation_and_t
     part = load_part(run / "tmr" / "part")
     assert EvaluatorConfig.from_dict(part.config) == TINY
     terms = {"loss", "reconstruction", "divergence", "latent", "contrast"}
-    retrieval = {f"{kind}r{k}" for kind in ("", "distinct_") for k in (1, 2, 3)} | {"median_rank", "median_rank_back"}
+    retrieval = {f"{kind}r{k}" for kind in ("pair_", "label_", "distinct_") for k in (1, 2, 3)} | {
+        "median_rank",
+        "median_rank_back",
+    }
     assert set(part.metrics) == terms | retrieval | {f"test/{name}" for name in retrieval}
     assert all(np.isfinite(value) for value in part.metrics.values())
 

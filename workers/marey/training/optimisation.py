@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
-from marey.core.configs import Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole
+from marey.core.configs import ADDED, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole
 from marey.core.errors import InvalidInput
 
 C = TypeVar("C", bound=ModelConfig)
@@ -25,7 +25,7 @@ class StageConfig:
     betas: tuple[Momentum, Momentum] = (0.9, 0.99)  # of AdamW
     clip: Positive = 1.0  # largest norm of the gradient
     ema: Momentum = 0.999  # of the weights that are validated and shipped; 0 = the last weights
-    epochs: Whole = 0  # budget where neither steps nor minutes are given; an epoch has as many samples as clips
+    epochs: Whole = field(default=0, metadata=ADDED)  # budget where neither steps nor minutes are given
 
 
 def with_learning_rate(config: C, stage: str, rate: float | None) -> C:

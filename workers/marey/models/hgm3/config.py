@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
-from marey.core.configs import Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
+from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
 from marey.core.errors import InvalidInput
 from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
@@ -79,7 +79,7 @@ class MiningConfig:
     alpha_start: Share = 0.0  # α_0 of eq. 8
     alpha_end: Share = 0.5  # α_T of eq. 8
     momentum: Momentum = 0.999  # λ of eq. 6; the paper gives none
-    conditions: Literal["all", "motion", "action", "specific"] = "all"
+    conditions: Literal["all", "motion", "action", "specific"] = field(default="all", metadata=ADDED)
     """Levels of condition that are trained: all, or one alone for the ablation (Tab. 3); "specific" is the full one."""
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
     replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]

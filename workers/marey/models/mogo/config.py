@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from marey.core.configs import Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
+from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
 from marey.core.errors import InvalidInput
 from marey.nn.scaled_quantizer import Scale
 from marey.training.config_checks import check_body, check_heads, check_windows
@@ -111,10 +111,10 @@ class MOGOConfig(ModelConfig):
     rollouts: Whole = (
         0  # further ones that start from the model's own motions, where training starts from a finished one
     )
-    split_actions: bool = True
+    split_actions: bool = field(default=True, metadata=ADDED)
     """Ours: each action of a prompt is drawn by itself, one after another (`TextSpec.split_actions`); else the sentence
     is the prompt of all frames, as published."""
-    float_logits: bool = False
+    float_logits: bool = field(default=False, metadata=ADDED)
     """The last matrix stays in float32 where matrices are in bfloat16, in which codes tie; earlier bundles drew so."""
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()

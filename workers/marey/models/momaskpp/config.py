@@ -30,9 +30,9 @@ class TokenizerConfig:
     layout: Layout = "own"
     """`own`: scale s of n tokens has max(1, n // s), spread over the clip (eq. 5). `padded`, as published weights need
     it: scales are spread over the longest clip, whatever the clip's length; n // s of them are read."""
-    codes: int = 512
-    code_width: int = 512
-    decay: float = 0.99
+    codes: int = 512  # K
+    code_width: int = 512  # d
+    decay: float = 0.99  # of the moving averages that codes are
     gumbel: float = 0.5  # temperature of the draw of codes in training; 0 = the nearest code
     commitment: float = 0.2  # of the mean over clips, tokens and channels: published 0.02 · 512 / T, T padded tokens
     feature_bias: float = 5.0  # divides the std of root and contacts (MoMask), which gives them more weight
@@ -70,14 +70,14 @@ class TransformerConfig:
     """The masked transformer over the tokens of all scales."""
 
     conditioning: Conditioning = "cross-attention"
-    layers: int = 8
-    heads: int = 6
-    width: int = 384
-    feedforward: int = 1024
+    layers: int = 8  # blocks
+    heads: int = 6  # of attention
+    width: int = 384  # w
+    feedforward: int = 1024  # width between the two matrices of a block
     embedding: int = 512  # width of the table of tokens, before its projection
     dropout: float = 0.2
     attention_dropout: float = 0.2
-    norm_first: bool = False
+    norm_first: bool = False  # norms before attention and feed-forward, not behind the residuals
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class RefinerConfig:
     """Root refiner, which predicts the root's velocity from everything else; width 0 = none."""
 
     width: int = 0
-    depth: int = 3
+    depth: int = 3  # residual blocks
     dropout: float = 0.2
     window: int = 120  # frames, in training
     noise: float = 0.1  # std of the noise on its input in training, times one uniform number a batch
@@ -106,8 +106,8 @@ class InferenceConfig:
     """Decoding (Sec. 4.2.2)."""
 
     steps: int = 18  # L
-    guidance: float = 4.0
-    temperature: float = 1.0
+    guidance: float = 4.0  # weight of the text; 1 = none
+    temperature: float = 1.0  # of the draws; 0 = the likeliest token
     top_k: float = 0.1  # share of the codes that may be drawn
 
 
