@@ -54,7 +54,8 @@ def handler_of(model: str) -> GeneratorHandler[Any]:
 def small_bundle(model: str, path: Path, seed: int = 0) -> Bundle:
     """A bundle of the smallest configuration that makes motions of every length."""
     training = get_model(model).training
-    assert training is not None
+    if training is None:  # it runs imported weights alone
+        return random_bundle(model, path, seed=seed)
     config = replace(resolve(training.config)("tiny"), max_frames=196)
     return random_bundle(model, path, config=config, seed=seed)
 
@@ -122,8 +123,9 @@ def test_every_item_is_in_one_bucket_and_one_of_hgm3_has_one_padded_length(handl
     batch = make_batch(handler, *(make_item("a person walks", n, s) for n, s in enumerate(seconds)))
     buckets = handler.buckets(batch)
     assert sorted(item.seed for bucket in buckets for item in bucket) == list(range(6))
-    together = [[0, 2, 5], [1, 4], [3]] if handler.queue == "hgm3" else [[0, 1, 2, 3, 4, 5]]
-    assert sorted(sorted(item.seed for item in bucket) for bucket in buckets) == together
+    found = sorted(sorted(item.seed for item in bucket) for bucket in buckets)
+    by_length, together = [[0, 2, 5], [1, 4], [3]], [[0, 1, 2, 3, 4, 5]]
+    assert found == by_length if handler.queue == "hgm3" else found in (by_length, together)
 
 
 def test_the_files_hold_the_motion_and_where_it_comes_from(handler: GeneratorHandler[Any], bundle: str) -> None:
