@@ -62,6 +62,18 @@ def sample_top_k(logits: Tensor, noise: Tensor, *, temperature: float, share: fl
     return index.gather(-1, drawn).squeeze(-1)
 
 
+def draw_class(logits: Tensor, seed: int, stream: int, *, middle: bool = False) -> int:
+    """Draw one class by inverting the distribution function of softmax(logits) (1, N), with the number of `seed`.
+
+    Args:
+        middle: draw from the middle third of the distribution: seeds differ, without extremes.
+    """
+    share = torch.softmax(logits.float(), -1).cumsum(-1)  # (1, N)
+    seeds = torch.tensor([seed], device=logits.device)
+    draw = uniform(seeds, stream, 0, torch.zeros(1, dtype=torch.long, device=logits.device))
+    return int((share < ((1 + draw) / 3 if middle else draw) * share[:, -1:]).sum())
+
+
 def _hash(value: Tensor) -> Tensor:
     """Apply SplitMix64's finaliser to int64 (overflow wraps)."""
     value = (value ^ _shift(value, 30)) * _MIX_1

@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from marey.core.errors import InvalidBundle, InvalidInput
+from marey.generation.groups import group_rows
 from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
@@ -230,7 +231,7 @@ def test_one_pass_is_enough(generator: Generator) -> None:
 
 def test_the_longest_motions_come_first(generator: Generator) -> None:
     frames = [20, 196, 60, 190]
-    (longest, *_, shortest) = generator._groups(frames)
+    (longest, *_, shortest) = group_rows([generator._bucket(count) for count in frames], generator.batch_threads.count)
     assert (1 in longest, 0 in shortest) == (True, True)
 
 

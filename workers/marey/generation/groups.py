@@ -11,9 +11,14 @@ from torch import Tensor
 
 from marey.generation.port import GenerationControl
 
+MAX_ROWS = 32
+"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
 
-def group_rows(buckets: Sequence[int], most: int) -> list[list[int]]:
-    """Group the rows of equal buckets, at most `most` in a group; the largest buckets come first."""
+
+def group_rows(buckets: Sequence[int], threads: int) -> list[list[int]]:
+    """Group the rows of equal buckets, at most MAX_ROWS and no more than a thread's share; the largest buckets come
+    first."""
+    most = min(MAX_ROWS, -(-len(buckets) // threads))
     rows: dict[int, list[int]] = defaultdict(list)
     for row, bucket in enumerate(buckets):
         rows[bucket].append(row)

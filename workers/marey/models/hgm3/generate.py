@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.groups import RowWatcher, StepCounter, group_rows
+from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
@@ -22,12 +22,10 @@ from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, deco
 from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
-from marey.nn.sampling import uniform
+from marey.nn.sampling import draw_class
 
 BUCKET = 8
 """Tokens; an item is padded to a multiple of this, not to the longest of its batch."""
-MAX_ROWS = 32
-"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ class Generator:
         options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress)
         frames = [self.frames(request) for request in requests]
         results: list[Generated | None] = [None] * len(requests)
-        groups = self._groups(frames)
+        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
         steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
 
         def make(rows: list[int]) -> None:
@@ -199,17 +197,9 @@ class Generator:
     def _estimate(self, request: Request) -> int:
         """Draw frames from the middle third of the estimated distribution (ours): seeds differ, without extremes."""
         sentence = torch.from_numpy(request.text.nodes[:1].astype(np.float32)).to(self.device)
-        share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
-        seeds = torch.tensor([request.seed], device=self.device)
-        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
-        tokens = int((share < (1 + draw) / 3 * share[:, -1:]).sum()) + 1
+        tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
         frames = tokens * self.frames_per_token
         return min(max(frames, self.config.min_frames), self.config.max_frames)
-
-    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Group rows by bucket, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
-        most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
-        return group_rows([self._bucket(count) for count in frames], most)
 
     def _group(
         self,

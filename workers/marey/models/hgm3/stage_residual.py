@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
@@ -16,6 +15,7 @@ from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LengthEstimator, ResidualTransformer
 from marey.nn.convolution import frame_mask
 from marey.nn.losses import hits, token_losses
+from marey.training.length import LengthStage
 from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
@@ -105,49 +105,11 @@ class ResidualStage:
         return losses.sum(1), right.sum(1), valid.sum(1).float()
 
 
-class LengthStage:
-    """Training stage of the length: number of tokens from the sentence, on clips of natural length. Looped and held
-    clips have drawn lengths, and a hand that stays up for long looks like a wave.
-    """
-
-    name = "length"
-
-    def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
-        self.config = config
-        self.optimisation = config.train_length
-        self.captions = captions
-        self.pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
-        self.lengths = tokens.lengths[:, 0].clamp(max=config.max_tokens)
-        self.module = LengthEstimator(config).to(tokens.tokens.device)
-        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
-        self.module.normalizer.mean.copy_(mean)
-        self.module.normalizer.std.copy_(std)
-
-    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """Return one group."""
-        return [list(self.module.parameters())]
-
-    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the cross-entropy of the length class."""
-        clips = self.pairs.draw(context.rng, self.optimisation.batch)
-        loss, error = self._batch(clips, context.rng)
-        return loss, {"loss": loss.detach(), "error_tokens": error}
-
-    def after_step(self, context: StepContext) -> None:
-        """Do nothing: the stage has no state to update."""
-
-    @torch.no_grad()
-    def validate(self) -> Mapping[str, float]:
-        """Return cross-entropy and mean absolute error of the expected length, in tokens."""
-        rng = np.random.default_rng(0)
-        found = [self._batch(clips, rng) for clips in self.pairs.validation_batches(self.optimisation.batch)]
-        return {
-            "loss": float(np.mean([float(loss) for loss, _ in found])),
-            "error_tokens": float(np.mean([float(error) for _, error in found])),
-        }
-
-    def _batch(self, clips: NDArray[np.int64], rng: np.random.Generator) -> tuple[Tensor, Tensor]:
-        lengths = self.lengths[torch.from_numpy(clips).to(self.lengths.device)]
-        logits = self.module(self.captions.sentences(self.captions.choose(clips, rng))).float()
-        expected = (torch.softmax(logits, -1) * torch.arange(1, logits.shape[1] + 1, device=logits.device)).sum(-1)
-        return F.cross_entropy(logits, lengths - 1), (expected - lengths).abs().mean().detach()
+def length_stage(config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> LengthStage:
+    """Return the training stage of the length estimator."""
+    pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
+    module = LengthEstimator(config).to(tokens.tokens.device)
+    mean, std = captions.statistics(pairs.train.tolist(), config.condition)
+    module.normalizer.mean.copy_(mean)
+    module.normalizer.std.copy_(std)
+    return LengthStage(module, config.train_length, pairs, captions, tokens.lengths[:, 0].clamp(max=config.max_tokens))

@@ -10,7 +10,7 @@ from marey.models.hgm3.assembly import RECIPE
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.stage_masked import MaskedStage
-from marey.models.hgm3.stage_residual import LengthStage, ResidualStage
+from marey.models.hgm3.stage_residual import ResidualStage, length_stage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.nn.devices import choose_device
 from marey.training.drawn import load_drawn
@@ -54,7 +54,7 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     elif name == "residual":
         stage = ResidualStage(options.config, clips, tokens, captions, codebooks)
     else:
-        stage = LengthStage(options.config, clips, tokens, captions)
+        stage = length_stage(options.config, clips, tokens, captions)
     metrics = RECIPE.train(stage, options)
     finish(stage.module, options, name, metrics, data.prepared.sha256)
     return metrics

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
-from marey.generation.groups import RowWatcher, StepCounter, group_rows
+from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.momask.bundle import Networks, load_networks
 from marey.models.momask.config import InferenceConfig, MoMaskConfig
@@ -22,12 +22,10 @@ from marey.models.momask.spec import SPEC
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
-from marey.nn.sampling import uniform
+from marey.nn.sampling import draw_class
 
 BUCKET = 8
 """Tokens; an item is padded to a multiple of this, not to the longest of its batch."""
-MAX_ROWS = 32
-"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,7 @@ class Generator:
         inference = (settings or SamplingSettings()).inference(self.config.inference)
         frames = [self.frames(request) for request in requests]
         results: list[Generated | None] = [None] * len(requests)
-        groups = self._groups(frames)
+        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
         steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
 
         def make(rows: list[int]) -> None:
@@ -179,20 +177,13 @@ class Generator:
     @torch.inference_mode()
     def _estimate(self, request: Request) -> int:
         """Draw frames from the estimated distribution, as the public code does, and keep them within the limits."""
-        share = torch.softmax(self.networks.length(self._sentence(request)).float(), -1).cumsum(-1)  # (1, classes)
-        seeds = torch.tensor([request.seed], device=self.device)
-        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
-        frames = int((share < draw * share[:, -1:]).sum()) * self.frames_per_token
+        tokens = draw_class(self.networks.length(self._sentence(request)), request.seed, LENGTH_STREAM)
+        frames = tokens * self.frames_per_token
         return min(max(frames, self.config.min_frames), self.config.max_frames)
 
     def _sentence(self, request: Request) -> Tensor:
         """Return the sentence feature (1, W)."""
         return torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
-
-    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Group rows by bucket, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
-        most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
-        return group_rows([self._bucket(count) for count in frames], most)
 
     def _group(
         self,

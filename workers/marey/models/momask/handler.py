@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from marey.core.settings import settings as configuration
+from marey.generation.groups import MAX_ROWS
 from marey.generation.handler import GeneratorHandler
 from marey.models.momask.bundle import MODEL
-from marey.models.momask.generate import MAX_ROWS, Generator, SamplingSettings
+from marey.models.momask.generate import Generator, SamplingSettings
 
 
 def create_handler() -> GeneratorHandler[SamplingSettings]:

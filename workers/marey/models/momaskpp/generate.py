@@ -14,7 +14,7 @@ from torch import Tensor
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.groups import RowWatcher, StepCounter, group_rows
+from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
@@ -24,10 +24,7 @@ from marey.models.momaskpp.words import WordReader, pad_states
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
-from marey.nn.sampling import uniform
-
-MAX_ROWS = 32
-"""Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
+from marey.nn.sampling import draw_class, uniform
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,7 @@ class Generator:
         frames = [self.frames(request) for request in requests]
         words = self.reader.states([request.text.rewritten for request in requests])
         results: list[Generated | None] = [None] * len(requests)
-        groups = self._groups(frames)
+        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
         steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + 1))
 
         def make(rows: list[int]) -> None:
@@ -184,16 +181,15 @@ class Generator:
         self.limits.check(request)
         if request.frames is not None:
             return request.frames
-        seeds = torch.tensor([request.seed], device=self.device)
-        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
         if self.networks.length is None:
+            seeds = torch.tensor([request.seed], device=self.device)
+            draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
             choices = self.config.open_frames
             return choices[min(int(draw * len(choices)), len(choices) - 1)]
         # From the middle third of the estimated distribution (ours): seeds differ, without extremes.
         sentence = torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
         with torch.inference_mode():
-            share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
-        tokens = int((share < (1 + draw) / 3 * share[:, -1:]).sum()) + 1
+            tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
         return min(max(tokens * self.frames_per_token, self.config.min_frames), self.config.max_frames)
 
     def bucket(self, request: Request) -> int:
@@ -205,11 +201,6 @@ class Generator:
 
     def _tokens(self, frames: int) -> int:
         return -(-frames // self.frames_per_token)
-
-    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Group rows by bucket, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
-        most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
-        return group_rows([self._bucket(count) for count in frames], most)
 
     def _items(
         self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]

@@ -17,6 +17,7 @@ from marey.models.momaskpp.config import MoMaskPPConfig
 from marey.models.momaskpp.model import ROOT_VELOCITY, LengthHead, RootRefiner, inputs_of
 from marey.models.momaskpp.tokens import ScaleTokens
 from marey.nn.motion_tokenizer import biased_std
+from marey.training.length import LengthStage
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.pairs import Pairs
@@ -71,48 +72,11 @@ class RefinerStage:
         return F.smooth_l1_loss(self.module(noisy).float(), features[..., ROOT_VELOCITY])
 
 
-class LengthHeadStage:
-    """Training stage of the length: number of tokens from the sentence, on clips of natural length."""
-
-    name = "length"
-
-    def __init__(self, config: MoMaskPPConfig, clips: Sequence[Clip], tokens: ScaleTokens, words: WordData) -> None:
-        """Train on these clips and captions."""
-        self.config = config
-        self.optimisation = config.train_length
-        self.sentences = words.sentences
-        self.pairs = Pairs(clips, tokens, words.sentences, config.min_tokens, natural=True)
-        self.lengths = tokens.lengths[:, 0]
-        self.module = LengthHead(config).to(tokens.tokens.device)
-        mean, std = words.sentence_statistics(self.pairs.train.tolist())
-        self.module.normalizer.mean.copy_(mean)
-        self.module.normalizer.std.copy_(std)
-
-    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """Return one group."""
-        return [list(self.module.parameters())]
-
-    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the cross-entropy of the length class."""
-        clips = self.pairs.draw(context.rng, self.optimisation.batch)
-        loss, error = self._batch(clips, context.rng)
-        return loss, {"loss": loss.detach(), "error_tokens": error}
-
-    def after_step(self, context: StepContext) -> None:
-        """Do nothing: the stage has no state to update."""
-
-    @torch.no_grad()
-    def validate(self) -> Mapping[str, float]:
-        """Return cross-entropy and mean absolute error of the expected length, in tokens."""
-        rng = np.random.default_rng(0)
-        found = [self._batch(clips, rng) for clips in self.pairs.validation_batches(self.optimisation.batch)]
-        return {
-            "loss": float(np.mean([float(loss) for loss, _ in found])),
-            "error_tokens": float(np.mean([float(error) for _, error in found])),
-        }
-
-    def _batch(self, clips: NDArray[np.int64], rng: np.random.Generator) -> tuple[Tensor, Tensor]:
-        lengths = self.lengths[torch.from_numpy(clips).to(self.lengths.device)]
-        logits = self.module(self.sentences.sentences(self.sentences.choose(clips, rng))).float()
-        expected = (torch.softmax(logits, -1) * torch.arange(1, logits.shape[1] + 1, device=logits.device)).sum(-1)
-        return F.cross_entropy(logits, lengths - 1), (expected - lengths).abs().mean().detach()
+def length_stage(config: MoMaskPPConfig, clips: Sequence[Clip], tokens: ScaleTokens, words: WordData) -> LengthStage:
+    """Return the training stage of the length estimator."""
+    pairs = Pairs(clips, tokens, words.sentences, config.min_tokens, natural=True)
+    module = LengthHead(config).to(tokens.tokens.device)
+    mean, std = words.sentence_statistics(pairs.train.tolist())
+    module.normalizer.mean.copy_(mean)
+    module.normalizer.std.copy_(std)
+    return LengthStage(module, config.train_length, pairs, words.sentences, tokens.lengths[:, 0])

@@ -9,7 +9,7 @@ from marey.models.momaskpp.assembly import recipe_of
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
 from marey.models.momaskpp.stage_masked import ScaleStage
-from marey.models.momaskpp.stage_refiner import LengthHeadStage, RefinerStage
+from marey.models.momaskpp.stage_refiner import RefinerStage, length_stage
 from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import load_scale_tokens
@@ -53,7 +53,7 @@ def _stage(name: str, options: TrainOptions[MoMaskPPConfig], data: MotionData) -
     words = WordData.load(data.prepared, config.text, data.features.device)
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
-    kind = ScaleStage if name == "masked" else LengthHeadStage
+    kind = ScaleStage if name == "masked" else length_stage
     return kind(config, clips, tokens, words)
 
 
