@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
 from marey.nn.devices import fast_bf16
+from marey.nn.growing import grow
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, StepContext, train
 from marey.training.motions import MotionData, TokenData
@@ -311,3 +313,38 @@ def test_difficulties_are_not_rounded_under_autocast(prepared: PreparedData) -> 
     found = found[sample.tokens >= 0]
     assert found.dtype == torch.float32
     assert (found != found.bfloat16().float()).float().mean() > 0.9
+
+
+def test_a_larger_transformer_starts_from_a_smaller_one(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
+    """It computes the same before its first step, and the bundle's networks must still be those of its configuration."""
+    shutil.copytree(run, tmp_path / "run")
+    large = replace(TINY, masked=replace(TINY.masked, layers=4, feedforward=96))
+    trained, stage = load_part(run / "masked" / "part"), masked_stage(prepared, large)
+    module = stage.module.eval()
+    module.load_state_dict(grow(trained.state, module.state_dict()))
+    small = masked_stage(prepared).module.eval()
+    small.load_state_dict(trained.state)
+    sample = stage.sample(stage.pairs.train[:4], np.random.default_rng(0))
+    valid = sample.tokens >= 0
+    logits = [
+        each.masked(sample.tokens.clamp(min=0), valid, each.masked.read(sample.graphs), sample.graphs.present, valid)
+        for each in (small, module)
+    ]
+    torch.testing.assert_close(*logits, rtol=0, atol=1e-5)
+    with pytest.raises(InvalidInput, match="another masked"):
+        RECIPE.part("masked", large, tmp_path / "run")
+    train_stage("masked", replace(options(prepared, tmp_path / "run", 2, large), warm=True))
+    assert RECIPE.part("masked", large, tmp_path / "run").config["masked"]["layers"] == 4
+
+
+def test_a_transformer_does_not_shrink(prepared: PreparedData, run: Path) -> None:
+    state = load_part(run / "masked" / "part").state
+    small = masked_stage(prepared, replace(TINY, masked=replace(TINY.masked, layers=1))).module.state_dict()
+    with pytest.raises(InvalidInput, match="can only grow"):
+        grow(state, small)
+
+
+def test_levels_of_condition_are_drawn_by_their_shares(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, level_shares=(0.0, 1.0, 3.0))))
+    drawn = stage.sample(np.repeat(stage.pairs.train[:1], 400), np.random.default_rng(0)).level
+    assert torch.bincount(drawn, minlength=3).tolist() == pytest.approx([0, 100, 300], abs=40)

@@ -8,7 +8,7 @@ run/{stage}/part          the finished part
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
@@ -20,6 +20,7 @@ from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix
 from marey.data.prepared import PreparedData, read_manifest
 from marey.nn import distributed
+from marey.nn.growing import grow
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, TrainingStage, train
 from marey.training.optimisation import StageConfig
@@ -82,12 +83,14 @@ class TrainingRecipe(Generic[C]):
             stages were optimised may differ.
         shares: shares of the stages in the minutes of a whole training.
         most_steps: upper limits of steps for stages that overfit beyond them.
+        grows: for stages whose transformer may be larger than in the part of a warm start, its field.
     """
 
     read: Callable[[Mapping[str, Any]], C]
     built_from: Mapping[str, tuple[str, ...]]
     shares: Mapping[str, float]
     most_steps: Mapping[str, int] = field(default_factory=dict[str, int])
+    grows: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -106,9 +109,12 @@ class TrainingRecipe(Generic[C]):
             NotFound: not trained yet.
             InvalidInput: its networks were built from other values than `config`'s.
         """
+        return self._part(name, config, run, self.built_from[name])
+
+    def _part(self, name: str, config: C, run: Path, fields: Sequence[str]) -> TrainedPart:
         part = load_part(run / name / "part")
         theirs = self.read(part.config)
-        differ = [f for f in self.built_from[name] if getattr(theirs, f) != getattr(config, f)]
+        differ = [f for f in fields if getattr(theirs, f) != getattr(config, f)]
         if differ:
             raise InvalidInput(
                 f"was trained with another {differ[0]}",
@@ -118,14 +124,17 @@ class TrainingRecipe(Generic[C]):
         return part
 
     def train(self, stage: TrainingStage, options: TrainOptions[C]) -> dict[str, float]:
-        """Train one stage; with `warm` from its finished part. See `part` for what is raised then.
+        """Train one stage; with `warm` from its finished part, whose transformer may have been smaller. See `part` for
+        what is raised then.
 
         Raises:
             InvalidInput: the licences of the data and of what it is trained upon exclude each other.
         """
         ancestors(options, stage.name)
         if options.warm:
-            stage.module.load_state_dict(self.part(stage.name, options.config, options.run).state)
+            own = [field for field in self.built_from[stage.name] if field != self.grows.get(stage.name)]
+            part = self._part(stage.name, options.config, options.run, own)
+            stage.module.load_state_dict(grow(part.state, stage.module.state_dict()))
         return train(stage, options.options(stage.name), options.config.to_dict())
 
 

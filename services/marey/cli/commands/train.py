@@ -44,7 +44,7 @@ Config = Annotated[
     str,
     typer.Option(
         "--config",
-        help="starter, paper or tiny, or a .toml file that changes one; `config` prints it with every field.",
+        help="A preset, or a .toml file that changes one; `config` prints it with every field.",
     ),
 ]
 Steps = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]

@@ -14,13 +14,12 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from marey.core.errors import InvalidInput
-from marey.models.hgm3.config import ConditionConfig
+from marey.models.hgm3.config import LEVELS, ConditionConfig
 from marey.text.features import TextFeatures
 
 EDGE_TYPES = 12
 MOTION, ACTION, SPECIFIC = 0, 1, 2
 """Levels of condition: C^m, [C^m; C^a], [C^m; C^a; C^s]."""
-LEVELS = 3
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Configurations of HGM³: `paper` (its published sizes), `starter` (trains on two CPU cores), `tiny` (tests)."""
+"""Configurations of HGM³: `paper` (its published sizes), `starter` and `open` (train on two CPU cores), `tiny` (tests)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from marey.core.errors import InvalidInput
 from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
 
+LEVELS = 3
+"""Levels of condition: motion, action, specific."""
 Levels = Annotated[int, Between(2)]  # the residual transformer predicts all but the first
 Steps = Annotated[int, Between(1, 100)]
 Scale = Annotated[float, Between(0, 100)]
@@ -82,6 +84,8 @@ class MiningConfig:
     conditions: Literal["all", "motion", "action", "specific"] = field(default="all", metadata=ADDED)
     """Levels of condition that are trained: all, or one alone for the ablation (Tab. 3); "specific" is the full one."""
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
+    level_shares: tuple[Weight, ...] = field(default=(1.0, 1.0, 1.0), metadata=ADDED)
+    """Ours: how often each level of condition (motion, action, specific) is drawn, where one is drawn per sample."""
     replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
     replace_mask: Share = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
 
@@ -147,6 +151,8 @@ class HGM3Config(ModelConfig):
         check_windows(self.windows, self.tokenizer.frames_per_token)
         for name in ("masked", "predictor", "residual"):
             check_heads(name, getattr(self, name).heads, getattr(self, name).width)
+        if len(self.mining.level_shares) != LEVELS or not sum(self.mining.level_shares):
+            raise InvalidInput("must be three shares, not all 0", where="mining.level_shares")
         inference = self.inference
         if not inference.motion_steps <= inference.action_steps <= inference.steps:
             raise InvalidInput(
@@ -193,6 +199,16 @@ STARTER = HGM3Config(
     train_length=StageConfig(batch=256, learning_rate=1e-3, decay="cosine", ema=0.99),
 )
 
+OPEN = replace(
+    STARTER,
+    name="open",
+    # 81 actions, most of them with one to five takes, must be known by heart: more capacity than for ten.
+    masked=replace(STARTER.masked, layers=8, feedforward=1024),
+    residual=replace(STARTER.residual, layers=6, feedforward=768),
+    # Decoding reads the whole condition from the first pass on.
+    mining=replace(STARTER.mining, level_shares=(1.0, 1.0, 4.0)),
+)
+
 TINY = HGM3Config(
     name="tiny",
     tokenizer=TokenizerConfig(
@@ -225,7 +241,7 @@ TINY = HGM3Config(
     train_length=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),
 )
 
-CONFIGS: dict[str, HGM3Config] = {c.name: c for c in (PAPER, STARTER, TINY)}
+CONFIGS: dict[str, HGM3Config] = {c.name: c for c in (PAPER, STARTER, OPEN, TINY)}
 
 
 def named_config(name: str, *, mask: Literal["hard", "random"] | None = None) -> HGM3Config:

@@ -146,8 +146,13 @@ class MaskedStage:
             torch.from_numpy(rng.random(len(clips), np.float32)).to(device),
             torch.from_numpy(rng.random(tokens.shape[:2], np.float32)).to(device),
             torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop).to(device),
-            torch.from_numpy(rng.integers(LEVELS, size=len(clips))).to(device),
+            torch.from_numpy(self._levels(rng, len(clips))).to(device),
         )
+
+    def _levels(self, rng: np.random.Generator, count: int) -> NDArray[np.int64]:
+        """Draw a level of condition for each sample (B,)."""
+        shares = np.array(self.config.mining.level_shares)
+        return rng.choice(LEVELS, size=count, p=shares / shares.sum())
 
     def masks(self, sample: MaskedSample, nodes: Tensor, alpha: float) -> Tensor:
         """Return the tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at

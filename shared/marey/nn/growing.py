@@ -1,0 +1,54 @@
+"""Weights of a smaller transformer in a larger one that computes the same: a start for training on with more capacity.
+
+New blocks and new columns of hidden layers write nothing at first, so the outputs stay as they were (the deepening and
+widening of Chen et al. 2016, "Net2Net", for stacks whose norms come first).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor
+
+from marey.core.errors import InvalidInput
+
+_WRITES = ("attention.out.weight", "attention.out.bias", "narrow.weight", "narrow.bias")
+"""Matrices by which a block adds to its input; without them it passes the input on."""
+
+
+def grow(small: Mapping[str, Tensor], large: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Return weights for the larger network.
+
+    Args:
+        small: state dict of a trained network.
+        large: state dict of a new network, which has more blocks or wider hidden layers in its blocks; its norms come
+            before attention and hidden layer (`norm_first`).
+
+    Raises:
+        InvalidInput: the networks differ in something else, or the larger has fewer blocks.
+    """
+    if lost := sorted(small.keys() - large.keys()):
+        raise InvalidInput(f"has no place for {lost[0]}", hint="A transformer can only grow.")
+    return {name: _grown(name, small.get(name), new) for name, new in large.items()}
+
+
+def _grown(name: str, old: Tensor | None, new: Tensor) -> Tensor:
+    if old is None:
+        if ".blocks." not in name:
+            raise InvalidInput(f"{name} is not among the weights to grow from")
+        return torch.zeros_like(new) if name.endswith(_WRITES) else new.clone()
+    if old.shape == new.shape:
+        return old.clone()
+    grown = new.clone()
+    if name.endswith(("wide.weight", "wide.bias")) and old.shape[1:] == new.shape[1:] and len(old) < len(new):
+        grown[: len(old)] = old
+        return grown
+    if name.endswith("narrow.weight") and len(old) == len(new) and old.shape[1] < new.shape[1]:
+        grown.zero_()
+        grown[:, : old.shape[1]] = old
+        return grown
+    raise InvalidInput(
+        f"{name} has the shape {tuple(new.shape)}, and {tuple(old.shape)} where it would grow from",
+        hint="Only the number of blocks and the width of their hidden layers can grow.",
+    )
