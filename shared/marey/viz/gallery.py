@@ -50,6 +50,7 @@ def html_gallery(
     count: str = "",
     earlier: str | None = None,
     later: str | None = None,
+    columns: int = 1,
 ) -> Path:
     """Write a page of motions.
 
@@ -57,6 +58,7 @@ def html_gallery(
         path: the `.html` to write.
         count: number of this page and of all pages.
         earlier, later: names of the pages beside it.
+        columns: motions that belong side by side; 1 = as many as the window has room for.
 
     Returns:
         The path written.
@@ -72,6 +74,7 @@ def html_gallery(
     document = {
         "title": one_line(title),
         "count": count,
+        "columns": columns,
         "earlier": None if earlier is None else f"./{quote(earlier)}",
         "later": None if later is None else f"./{quote(later)}",
         "cards": [

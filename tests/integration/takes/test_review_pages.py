@@ -66,6 +66,22 @@ def test_every_motion_is_on_one_of_the_pages_in_input_order(marey: Command, job:
     assert embedded(tmp_path / "kept.html", "cards")["count"] == "1 to 1 of 1"
 
 
+def test_several_jobs_stand_side_by_side_prompt_by_prompt(
+    api: LiveApi, marey: Command, job: str, tmp_path: Path
+) -> None:
+    with api.client() as client:
+        prompts = [{"prompt": f"a person walks {k}", "seed": 9} for k in (3, 1)]
+        other = client.submit([*prompts, {"prompt": "a person sits", "seed": 9}])["id"]
+        api.work(walker(seconds=0.5).to_npz())
+    marey("review", job, other, "-o", tmp_path / "r.html").ok()
+    page = embedded(tmp_path / "r.html", "cards")
+    shown = [(card["prompt"][-1], card["facts"].split("seed ")[1][0]) for card in page["cards"]]
+    assert shown == [("%", "0"), ("1", "1"), ("1", "9"), ("2", "2"), ("3", "3"), ("3", "9"), ("4", "4"), ("s", "9")]
+    assert page["columns"] == 2
+    marey("review", job, other, "-o", tmp_path / "p.html", "--per-page", 3).ok()
+    assert len(embedded(tmp_path / "p-1.html", "cards")["cards"]) == 2
+
+
 def test_a_contact_sheet_has_a_row_for_each_and_the_rest_is_announced(marey: Command, job: str, tmp_path: Path) -> None:
     ran = marey("review", job, "-o", tmp_path / "r.png", "--limit", 2, "--skip", 1, "--tag", "shot=010").ok()
     assert [Path(line).name for line in ran.out.splitlines()] == ["r.png"]

@@ -316,7 +316,7 @@ def test_difficulties_are_not_rounded_under_autocast(prepared: PreparedData) -> 
 
 
 def test_a_larger_transformer_starts_from_a_smaller_one(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
-    """It computes the same before its first step, and the bundle's networks must still be those of its configuration."""
+    """It computes the same before its first step; other stages and the bundle ask for parts of its own size."""
     shutil.copytree(run, tmp_path / "run")
     large = replace(TINY, masked=replace(TINY.masked, layers=4, feedforward=96))
     trained, stage = load_part(run / "masked" / "part"), masked_stage(prepared, large)

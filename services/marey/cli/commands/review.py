@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
@@ -35,7 +36,12 @@ CONTINUED = re.compile(r"-from-\d+$")
 
 
 def review(
-    job: Annotated[str, typer.Argument(metavar="JOB", help=f"The job: {FORMS}.")],
+    jobs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="JOB…", help=f"The job: {FORMS}. Several are compared: motions of one prompt side by side."
+        ),
+    ],
     output: Annotated[
         Path,
         typer.Option("-o", "--output", help="A .html (3D players) or .png (contact sheet); several get -1, -2, …"),
@@ -53,6 +59,8 @@ def review(
 ) -> None:
     """Draw the motions of a job, in input order, on pages to choose from or on contact sheets.
 
+    Several jobs of the same prompts, such as one of each model, stand side by side, prompt by prompt.
+
     A .png of up to 24 motions shows a row of each; one of more shows tiles.
     """
     from marey.cli.drawing import Drawers
@@ -66,9 +74,10 @@ def review(
     if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .html or .png.")
     with Client() as client:
-        job = find(client, "job", job).id
-        found, more = _motions(client, job, reviews, tags, skip, limit)
-        name = client.jobs.get(job).name or f"Job {job}"
+        ids = list(dict.fromkeys(find(client, "job", job).id for job in jobs))
+        found, more = _motions(client, ids, reviews, tags, skip, limit)
+        name = " and ".join(client.jobs.get(job).name or f"Job {job}" for job in ids)
+        per_page = max(per_page // len(ids), 1) * len(ids)  # a page holds all motions of its last prompt
         pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]
         paths = _paths(output, len(pages))
         _check_free(paths, overwrite=overwrite)
@@ -83,7 +92,7 @@ def review(
                         _sheet(page, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task))
                     else:
                         beside = [None, *(path.name for path in paths), None]
-                        _page(page, files, drafts[number], name, count, beside[number], beside[number + 2])
+                        _page(page, files, drafts[number], (name, count), beside[number : number + 3 : 2], len(ids))
                         bar.advance(task, len(page))
     for path in paths:
         console.result(console.home_relative(path))
@@ -138,24 +147,41 @@ def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
 
 
 def _motions(
-    client: Client, job: str, reviews: list[ReviewOption] | None, tags: list[str] | None, skip: int, limit: int
-) -> tuple[list[Motion], bool]:
-    """Return the motions to show, in the order of the job's items, and True if there are more.
+    client: Client, jobs: Sequence[str], reviews: list[ReviewOption] | None, tags: list[str] | None,
+    skip: int, limit: int,
+) -> tuple[list[Motion], bool]:  # fmt: skip
+    """Return the motions to show, in the order of the items, and True if there are more.
 
     Raises:
         NotFound: none.
     """
     wanted, of_each = {review.value for review in reviews or ReviewOption}, set(tags or ())
-    motions = (item.motion for item in client.jobs.items(job, state="succeeded") if item.motion)
-    chosen = (motion for motion in motions if of_each <= set(motion.tags) and _verdict(motion) in wanted)
-    found = list(islice(chosen, skip, skip + limit + 1))
+
+    def chosen(job: str) -> list[Motion]:
+        motions = (item.motion for item in client.jobs.items(job, state="succeeded") if item.motion)
+        fitting = (motion for motion in motions if of_each <= set(motion.tags) and _verdict(motion) in wanted)
+        return list(islice(fitting, skip + limit + 1))
+
+    found = _side_by_side([chosen(job) for job in jobs])[skip : skip + limit + 1]
     if not found:
         raise NotFound(
-            "no motion of this job fits",
-            where=f"job {job}",
-            hint=f"`marey motions list --job {job}` lists its motions.",
+            "no motion of this job fits" if len(jobs) == 1 else "no motion of these jobs fits",
+            where=f"job {', '.join(jobs)}",
+            hint=f"`marey motions list --job {jobs[0]}` lists its motions.",
         )
     return found[:limit], len(found) > limit
+
+
+def _side_by_side(of_jobs: Sequence[Sequence[Motion]]) -> list[Motion]:
+    """Put the motions of each prompt together, in the order of the prompts; a prompt that a job has several times is
+    paired in order."""
+    groups: dict[tuple[str, int], list[Motion]] = {}
+    for motions in of_jobs:
+        seen = Counter[str]()
+        for motion in motions:
+            groups.setdefault((motion.prompt, seen[motion.prompt]), []).append(motion)
+            seen[motion.prompt] += 1
+    return [motion for group in groups.values() for motion in group]
 
 
 def _sheet(
@@ -172,7 +198,7 @@ def _sheet(
     from marey.viz.render import COLUMNS, save_png, stack_rows
 
     columns = COLUMNS if len(motions) <= ROWS else None
-    captions = [f"{_facts(motion)}  ·  {motion.prompt}" for motion in motions]
+    captions = [f"{facts}  ·  {motion.prompt}" for facts, motion in zip(_facts(motions), motions, strict=True)]
     drawings = [Drawing(file, caption, columns) for file, caption in zip(files, captions, strict=True)]
 
     def images() -> Iterator[Image]:
@@ -191,10 +217,9 @@ def _page(
     motions: Sequence[Motion],
     files: Sequence[Path],
     path: Path,
-    title: str,
-    count: str,
-    earlier: str | None,
-    later: str | None,
+    heading: tuple[str, str],
+    beside: Sequence[str | None],
+    columns: int,
 ) -> None:
     from marey.motion.clip import load_npz
     from marey.viz.gallery import Card, html_gallery
@@ -204,24 +229,32 @@ def _page(
             motion.id,
             load_npz(file),
             motion.prompt,
-            _facts(motion),
+            facts,
             motion.tags,
             _review_text(motion),
             motion.quality.flags if motion.quality else (),
         )
-        for motion, file in zip(motions, files, strict=True)
+        for motion, file, facts in zip(motions, files, _facts(motions), strict=True)
     ]
-    html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later)
+    (title, count), (earlier, later) = heading, beside
+    html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later, columns=columns)
 
 
-def _facts(motion: Motion) -> str:
+def _facts(motions: Sequence[Motion]) -> list[str]:
+    """Describe each motion in a line, with its bundle where they are of several."""
+    several = len({motion.bundle for motion in motions}) > 1
+    return [_fact(motion, motion.bundle.partition("@")[0] if several else None) for motion in motions]
+
+
+def _fact(motion: Motion, bundle: str | None) -> str:
     take = ["take of another"] if motion.replaces else []
     name = [motion.name] if motion.name else []
     match = motion.quality.match if motion.quality else None
     shown = [f"match {match.value:g}"] if match and match.value is not None else []
     chosen = motion.selection
     of = [f"candidate {chosen.chosen} of {len(chosen.candidates)}"] if chosen else []
-    place = [f"{motion.index:05}", *name, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
+    made_by = [bundle] if bundle else []
+    place = [f"{motion.index:05}", *name, *made_by, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
     return "  ·  ".join([*place, *of, *shown, *take])
 
 

@@ -2,7 +2,7 @@
 // The cards of a gallery, one a motion, and the commands that say what was thought of them. small_players.js, which comes
 // after this, plays what is in them.
 (() => {
-  const { title, count, earlier, later, cards } = JSON.parse(document.getElementById("cards").textContent);
+  const { title, count, columns, earlier, later, cards } = JSON.parse(document.getElementById("cards").textContent);
   const WISHES = ["keep", "reject", "reroll"];
   const wished = new Map(); // id of a motion -> one of WISHES
 
@@ -68,7 +68,14 @@
   for (const [name, href] of Object.entries({ earlier, later })) {
     if (href) Object.assign(document.getElementById(name), { href, hidden: false });
   }
-  document.getElementById("clips").append(...cards.map(draw));
+  const clips = document.getElementById("clips");
+  clips.append(...cards.map(draw));
+  if (columns > 1) {
+    clips.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
+    cards.forEach((card, index) => {
+      if (index && card.prompt !== cards[index - 1].prompt) clips.children[index].style.gridColumnStart = 1;
+    });
+  }
   document.getElementById("commands").onfocus = (event) => event.target.select();
   document.getElementById("theme").onclick = () => {
     const { dataset } = document.documentElement;

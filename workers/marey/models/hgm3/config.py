@@ -1,4 +1,4 @@
-"""Configurations of HGM³: `paper` (its published sizes), `starter` and `open` (train on two CPU cores), `tiny` (tests)."""
+"""Configurations of HGM³: `paper` (its published sizes), `starter` and `open` (two CPU cores), `tiny` (tests)."""
 
 from __future__ import annotations
 
