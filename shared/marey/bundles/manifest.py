@@ -79,12 +79,18 @@ class TextSpec(_Frozen):
     split_actions: bool = True
     """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
 
+    wording: Literal["caption", "description"] = "caption"
+    """Texts that the model was trained on, in whose wording the rewriter `openai` writes: captions of one sentence, or
+    descriptions of about 60 words (SnapMoGen)."""
+
     @model_serializer(mode="wrap")
     def _serialize(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave the usual `split_actions` out: earlier releases refuse a field that they do not know."""
+        """Leave fields out that have the usual value: earlier releases refuse a field that they do not know."""
         values: dict[str, Any] = handler(self)
         if self.split_actions:
             values.pop("split_actions", None)
+        if self.wording == "caption":
+            values.pop("wording", None)
         return values
 
 

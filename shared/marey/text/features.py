@@ -31,6 +31,7 @@ class TextFeatures:
     not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
     actions: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
     action_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
+    seconds: float | None = None  # length of the motion that the rewriter proposes
 
     @property
     def sentence(self) -> NDArray[np.float16]:
@@ -52,6 +53,8 @@ class TextFeatures:
         }
         if self.not_rewritten is not None:
             about["not_rewritten"] = self.not_rewritten
+        if self.seconds is not None:
+            about["seconds"] = self.seconds
         # one entry: safetensors writes several in random order, and equal features should be equal bytes
         rows = self.nodes
         if self.action_rows is not None:
@@ -78,8 +81,9 @@ class TextFeatures:
                 raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {count} nodes and {len(actions)} actions")
             rows = nodes[count:] if actions else None
             return cls(
-                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), actions, rows
-            )
+                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), actions, rows,
+                about.get("seconds"),
+            )  # fmt: skip
         except (InvalidFile, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",

@@ -1,4 +1,4 @@
-"""Guard against rewrites that change the meaning: verbs, sides, directions and counts must stay."""
+"""Guards against rewrites that change the meaning: verbs, sides, directions and counts must stay."""
 
 from __future__ import annotations
 
@@ -29,6 +29,22 @@ def changed_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
     for what, was, now in checks:
         if was != now:
             return f"it changes {what}: {_list(was)} became {_list(now)}"
+    return None
+
+
+def lost_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
+    """Name what a description no longer says of a prompt: a side, a direction or a count; None if all are kept.
+
+    A description tells in other verbs how the body moves, and names sides and directions that the prompt left open.
+    """
+    checks = (
+        ("a side", _bag(before, SIDES), _bag(after, SIDES)),
+        ("a direction", _bag(before, DIRECTIONS), _bag(after, DIRECTIONS)),
+        ("a count", _counts(before), _counts(after)),
+    )
+    for what, was, now in checks:
+        if lost := set(was) - set(now):
+            return f"it loses {what}: {', '.join(sorted(lost))}"
     return None
 
 

@@ -39,12 +39,21 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
     parts = [
         PIPELINE_VERSION,
         prompt,
-        [spec.rewriter, REWRITER_VERSIONS[spec.rewriter], *([spec.rewriter_model] if spec.rewriter_model else [])],
+        _rewriter_parts(spec),
         [spec.labeller, spec.labeller_sha256],
         [spec.encoder, spec.encoder_sha256, spec.width, spec.node_features],
         [spec.max_actions, spec.max_specifics, spec.in_order],
     ]
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
+
+
+def _rewriter_parts(spec: TextSpec) -> list[str | int]:
+    parts: list[str | int] = [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]]
+    if spec.rewriter_model:
+        parts.append(spec.rewriter_model)
+    if spec.rewriter == "openai" and spec.wording != "caption":
+        parts.append(spec.wording)
+    return parts
 
 
 def scope_key(prompt: str, bundle: str, lists: ActionLists) -> str:

@@ -15,6 +15,7 @@ from marey.text.keys import NO_LABELLER, labeller_bundle
 from marey.text.labellers import NoLabeller
 from marey.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
 from marey.text.roles import RoleLabeller
+from marey.text.wordings import Wording
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
@@ -70,8 +71,8 @@ def load_labeller(name: str) -> RoleLabeller:
     )
 
 
-def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
-    """The rewriter of that name.
+def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption") -> PromptRewriter:
+    """The rewriter of that name; `openai` writes in the wording of the training texts.
 
     Raises:
         InvalidBundle: there is none.
@@ -86,5 +87,5 @@ def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
     if name == "openai":
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
 
-        return OpenAIRewriter(Endpoint.of(settings()))
+        return OpenAIRewriter(Endpoint.of(settings()), wording)
     raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai.")

@@ -6,6 +6,7 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,12 +21,12 @@ from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
-from marey.text.guard import changed_meaning
+from marey.text.guard import changed_meaning, lost_meaning
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.rewriters import NotRewritten, PromptRewriter
+from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.words import EDGE_PUNCTUATION
 
@@ -81,7 +82,7 @@ class TextPipeline:
         labeller = OneAtATime(load_labeller(spec.labeller))
         return cls(
             spec,
-            rewriter=load_rewriter(spec.rewriter, labeller),
+            rewriter=load_rewriter(spec.rewriter, labeller, spec.wording),
             labeller=labeller,
             encoder=load_encoder(spec.encoder, encoder_path),
         )
@@ -106,20 +107,20 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        graphs = [graph for graph, _ in self._read([text for text, _ in rewritten])]
+        graphs = [graph for graph, _ in self._read([rewrite.text for rewrite in rewritten])]
         return [
-            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, text, graph, reason), self._warnings(graph))
-            for prompt, (text, reason), graph in zip(checked, rewritten, graphs, strict=True)
+            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, rewrite, graph), self._warnings(graph))
+            for prompt, rewrite, graph in zip(checked, rewritten, graphs, strict=True)
         ]
 
-    def _rewrite_reason(self, prompt: str, text: str, graph: SemanticGraph, refused: str | None) -> str | None:
+    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, graph: SemanticGraph) -> str | None:
         """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
-        if text != prompt:
+        if rewrite.text != prompt:
             reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
-        if refused is not None:
-            reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {refused}")
-        if graph.text != text:
+        if rewrite.refused is not None:
+            reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {rewrite.refused}")
+        if graph.text != rewrite.text:
             reasons.append("the model reads several actions as one sentence each, in the order of time")
         return "; ".join(reasons) or None
 
@@ -130,30 +131,30 @@ class TextPipeline:
         """Get ready to read these prompts one by one."""
         self.rewriter.prefetch(prompts)
 
-    def _rewritten(self, prompts: Sequence[str]) -> list[tuple[str, str | None]]:
+    def _rewritten(self, prompts: Sequence[str]) -> list[Rewrite]:
         if len(prompts) > 1:
             self.prefetch(prompts)
         return [self.rewrite(prompt) for prompt in prompts]
 
-    def rewrite(self, prompt: str) -> tuple[str, str | None]:
+    def rewrite(self, prompt: str) -> Rewrite:
         """Rewrite a prompt for the model; with a reason if the rewriter ran and its result was not used."""
         try:
-            rewritten = self.rewriter.rewrite(prompt)
+            rewrite = self.rewriter.rewrite(prompt)
         except NotRewritten as error:
             log.warning("a prompt was not rewritten: %s", error.message)
-            return prompt, error.message
-        if rewritten == prompt:
-            return prompt, None
+            return Rewrite(prompt, refused=error.message)
+        if rewrite.text == prompt:
+            return rewrite
         from marey.text.spelling import Speller
 
         if self._speller is None:
             self._speller = Speller.load()
-        before, after = self._graphs([self._speller.correct(prompt), rewritten])
-        reason = changed_meaning(before, after)
+        before, after = self._graphs([self._speller.correct(prompt), rewrite.text])
+        reason = (lost_meaning if self.spec.wording == "description" else changed_meaning)(before, after)
         if reason is None:
-            return rewritten, None
+            return rewrite
         log.info("a rewrite was refused")
-        return prompt, reason
+        return Rewrite(prompt, refused=reason)
 
     def features(self, prompts: Sequence[str]) -> list[TextFeatures]:
         """Graph and node vectors of each prompt.
@@ -163,10 +164,10 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        read = self._read([text for text, _ in rewritten])
+        read = self._read([rewrite.text for rewrite in rewritten])
         return [
-            self._features(prompt, graph, actions, reason)
-            for prompt, (_, reason), (graph, actions) in zip(checked, rewritten, read, strict=True)
+            replace(self._features(prompt, graph, actions), not_rewritten=rewrite.refused, seconds=rewrite.seconds)
+            for prompt, rewrite, (graph, actions) in zip(checked, rewritten, read, strict=True)
         ]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
@@ -180,13 +181,11 @@ class TextPipeline:
                 graphs[k] = graph
         return list(zip(graphs, actions, strict=True))
 
-    def _features(
-        self, prompt: str, graph: SemanticGraph, actions: tuple[str, ...], reason: str | None
-    ) -> TextFeatures:
+    def _features(self, prompt: str, graph: SemanticGraph, actions: tuple[str, ...]) -> TextFeatures:
         if len(actions) == 1:
-            return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason)
+            return TextFeatures(prompt, graph.text, graph, self.encode(graph))
         rows = np.stack(self.pooled(actions)).astype(np.float16)
-        return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason, actions, rows)
+        return TextFeatures(prompt, graph.text, graph, self.encode(graph), actions=actions, action_rows=rows)
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
         """Return one vector per node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token

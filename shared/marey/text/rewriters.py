@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from marey.core.errors import MareyError
@@ -34,6 +35,21 @@ class NotRewritten(MareyError):
     """Raised if a rewriter has no better version of a prompt, which is then used as written."""
 
 
+@dataclass(frozen=True)
+class Rewrite:
+    """A prompt as the model is to read it.
+
+    Attributes:
+        text: the prompt in other words.
+        seconds: length of the motion that the rewriter proposes; None = none.
+        refused: why a rewrite was not used, where `text` is the prompt as written.
+    """
+
+    text: str
+    seconds: float | None = None
+    refused: str | None = None
+
+
 class PromptRewriter(Protocol):
     """Port of rewriters: bring a prompt closer to the captions a model was trained on (MOGO's TCA; SnapMoGen Tab.
     6)."""
@@ -43,7 +59,7 @@ class PromptRewriter(Protocol):
         """Name in `TextSpec.rewriter`."""
         ...
 
-    def rewrite(self, prompt: str) -> str:
+    def rewrite(self, prompt: str) -> Rewrite:
         """The rewritten prompt. Raises NotRewritten."""
         ...
 
@@ -57,9 +73,9 @@ class NoRewriter:
 
     name = "none"
 
-    def rewrite(self, prompt: str) -> str:
+    def rewrite(self, prompt: str) -> Rewrite:
         """`prompt` itself."""
-        return prompt
+        return Rewrite(prompt)
 
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Do nothing."""
@@ -74,11 +90,11 @@ class RulesRewriter:
         self._labeller = labeller
         self._speller = speller
 
-    def rewrite(self, prompt: str) -> str:
+    def rewrite(self, prompt: str) -> Rewrite:
         """The prompt as a caption: "Walk 2m fowards" → "a person walks 2 meters forwards"."""
         words = expand_units(self._speller.correct(prompt).split())
         words = self._third_person(words)
-        return " ".join(self._present_tense(words))
+        return Rewrite(" ".join(self._present_tense(words)))
 
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Do nothing."""

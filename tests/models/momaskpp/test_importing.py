@@ -115,6 +115,8 @@ def test_snapmogens_weights_become_a_bundle_with_its_refiner(snapmogen: Path, mo
     bundle = Bundle.open(models / "snap")
     assert not bundle.manifest.commercial
     assert (bundle.manifest.layout, bundle.manifest.fps) == ("snapmogen-296", 30)
+    assert bundle.manifest.text is not None
+    assert bundle.manifest.text.wording == "description"
     config, networks = load_networks(bundle)
     assert (config.masked.conditioning, config.masked.heads, config.tokenizer.layout) == (
         "cross-attention",

@@ -16,7 +16,7 @@ from marey.text import openai_rewriter
 from marey.text.features import TextFeatures
 from marey.text.keys import as_served, feature_key
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
-from marey.text.rewriters import NotRewritten
+from marey.text.rewriters import NotRewritten, Rewrite
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.texts import shared_pipeline
 
@@ -47,7 +47,7 @@ def reason_of(rewriter: OpenAIRewriter, prompt: str = PROMPT) -> str:
 
 
 def test_the_endpoint_is_asked_for_a_caption_in_the_style_of_the_training_captions(model: LanguageModel) -> None:
-    assert rewriter_of(model).rewrite(PROMPT) == CAPTION
+    assert rewriter_of(model).rewrite(PROMPT).text == CAPTION
     (asked,) = model.asked
     assert asked.path == "/v1/chat/completions"
     assert asked.authorization == f"Bearer {KEY}"
@@ -57,9 +57,41 @@ def test_the_endpoint_is_asked_for_a_caption_in_the_style_of_the_training_captio
     assert asked.prompt == PROMPT
 
 
+DESCRIBED = "The person shuffles forward, the left foot dragging behind, with both arms hanging loosely at the sides."
+
+
+def rewrite_of(answer: str) -> Rewrite:
+    with LanguageModel(lambda asked, before: CompletionReply(answer)) as model:
+        made = OpenAIRewriter(Endpoint(model.url, "some-model", None, 5.0), "description").rewrite("zombie walk")
+        (asked,) = model.asked
+        assert "about 60 words" in asked.question["messages"][0]["content"]
+    return made
+
+
+@pytest.mark.parametrize("length", ["6", "6 seconds", "6.0 s."])
+def test_a_description_comes_with_the_length_of_the_motion(length: str) -> None:
+    assert rewrite_of(f"Motion: {DESCRIBED}\nSeconds: {length}") == Rewrite(DESCRIBED, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (DESCRIBED, "a line of motion and a line of seconds"),
+        (f"Motion: {DESCRIBED}\nSeconds: a while", "no length in seconds"),
+        (f"Motion: {DESCRIBED}\nSeconds: 0", "no length in seconds"),
+        (f"Motion: {DESCRIBED}\nSeconds: 600", "no length in seconds"),
+        (f"Motion: {'step ' * 101}\nSeconds: 6", "more than 100 words"),
+        (f"Motion: {DESCRIBED}\nSeconds: 6\nSeconds: 7", "a line of motion and a line of seconds"),
+    ],
+)
+def test_other_answers_are_no_descriptions(answer: str, reason: str) -> None:
+    with pytest.raises(NotRewritten, match=reason):
+        rewrite_of(answer)
+
+
 def test_a_prompt_is_asked_once(model: LanguageModel) -> None:
     rewriter = rewriter_of(model)
-    assert [rewriter.rewrite(PROMPT) for _ in range(3)] == [CAPTION] * 3
+    assert [rewriter.rewrite(PROMPT).text for _ in range(3)] == [CAPTION] * 3
     assert len(model.asked) == 1
 
 
@@ -74,7 +106,7 @@ def test_the_oldest_answers_are_forgotten(model: LanguageModel, monkeypatch: pyt
 @pytest.mark.parametrize("status", [429, 500, 503])
 def test_a_busy_endpoint_is_asked_again(model: LanguageModel, status: int) -> None:
     model.answer = lambda asked, before: CompletionReply(CAPTION) if before else CompletionReply("", status=status)
-    assert rewriter_of(model).rewrite(PROMPT) == CAPTION
+    assert rewriter_of(model).rewrite(PROMPT).text == CAPTION
     assert len(model.asked) == 2
 
 
@@ -137,7 +169,7 @@ def test_rubbish_is_no_caption(model: LanguageModel, answer: CompletionReply, re
 @pytest.mark.parametrize("said", [f'"{CAPTION}"', f"- {CAPTION}", f"\n  {CAPTION}\n"])
 def test_what_models_like_to_put_around_a_caption_is_taken_off(model: LanguageModel, said: str) -> None:
     model.answer = lambda asked, before: CompletionReply(said)
-    assert rewriter_of(model).rewrite(PROMPT) == CAPTION
+    assert rewriter_of(model).rewrite(PROMPT).text == CAPTION
 
 
 def test_an_endpoint_that_fails_again_and_again_is_left_alone(
@@ -152,7 +184,7 @@ def test_an_endpoint_that_fails_again_and_again_is_left_alone(
     now = openai_rewriter.time.monotonic()
     monkeypatch.setattr(openai_rewriter.time, "monotonic", lambda: now + 31)
     model.answer = lambda asked, before: CompletionReply(CAPTION)
-    assert rewriter.rewrite("run") == CAPTION
+    assert rewriter.rewrite("run").text == CAPTION
 
 
 def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageModel) -> None:
@@ -169,7 +201,7 @@ def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageMode
         if prompt == prompts[5]:
             assert "404" in reason_of(rewriter, prompt)
         else:
-            assert rewriter.rewrite(prompt) == f"A person goes {prompt}."
+            assert rewriter.rewrite(prompt).text == f"A person goes {prompt}."
     assert len(model.asked) == len(prompts)
 
 

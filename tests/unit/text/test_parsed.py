@@ -11,6 +11,7 @@ from marey.cli.commands import text as command
 from marey.text.loading import load_rewriter
 from marey.text.parsed import NO_ACTION
 from marey.text.pipeline import TextPipeline
+from marey.text.rewriters import Rewrite
 from marey.text.words import EDGE_PUNCTUATION
 from tests.support.texts import shared_pipeline
 
@@ -64,8 +65,8 @@ def test_a_rewriter_is_named_with_its_rewrite_and_with_the_reason_for_a_refused_
     class Another:
         name = "rules"
 
-        def rewrite(self, prompt: str) -> str:
-            return prompt.replace("left", "right")
+        def rewrite(self, prompt: str) -> Rewrite:
+            return Rewrite(prompt.replace("left", "right"))
 
         def prefetch(self, prompts: object) -> None:
             pass

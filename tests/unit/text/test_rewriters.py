@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
+from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
 from marey.text.guard import changed_meaning
 from marey.text.loading import load_rewriter
 from marey.text.pipeline import TextPipeline
-from marey.text.rewriters import PromptRewriter, RulesRewriter, expand_units
+from marey.text.rewriters import PromptRewriter, Rewrite, RulesRewriter, expand_units
 from marey.text.roles import Frame
 from marey.text.spelling import Speller
 from marey.text.words import lemma, one_slip, third_person
@@ -39,7 +40,7 @@ def pipeline() -> TextPipeline:
     ],
 )
 def test_a_prompt_becomes_a_caption(pipeline: TextPipeline, prompt: str, expected: str) -> None:
-    assert pipeline.rewrite(prompt) == (expected, None)
+    assert pipeline.rewrite(prompt) == Rewrite(expected)
 
 
 def test_raw_and_rewritten_prompt_are_both_kept(pipeline: TextPipeline) -> None:
@@ -56,8 +57,8 @@ class Says:
     def __init__(self, text: str) -> None:
         self.text = text
 
-    def rewrite(self, prompt: str) -> str:
-        return self.text
+    def rewrite(self, prompt: str) -> Rewrite:
+        return Rewrite(self.text, 7.0)
 
     def prefetch(self, prompts: Sequence[str]) -> None:
         pass
@@ -80,9 +81,9 @@ def test_a_rewrite_that_changes_the_meaning_is_refused(pipeline: TextPipeline, r
     guarded = TextPipeline(
         TextSpec(rewriter="rules"), rewriter=rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder
     )
-    text, reason = guarded.rewrite(prompt)
-    assert text == prompt
-    assert what in str(reason)
+    made = guarded.rewrite(prompt)
+    assert (made.text, made.seconds) == (prompt, None)
+    assert what in str(made.refused)
 
 
 def test_a_rewrite_that_says_the_same_is_kept(pipeline: TextPipeline) -> None:
@@ -90,7 +91,29 @@ def test_a_rewrite_that_says_the_same_is_kept(pipeline: TextPipeline) -> None:
     guarded = TextPipeline(
         TextSpec(rewriter="rules"), rewriter=rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder
     )
-    assert guarded.rewrite("a person waves his left hand two times") == (rewriter.rewrite(""), None)
+    assert guarded.rewrite("a person waves his left hand two times") == rewriter.rewrite("")
+
+
+@pytest.mark.parametrize(
+    ("rewrite", "lost"),
+    [
+        ("The person lifts the left arm beside the head and swings the forearm from side to side two times.", None),
+        ("The person lifts the right arm and swings the forearm two times.", "a side"),
+        ("The person lifts the left arm and swings the forearm.", "a count"),
+    ],
+)
+def test_a_description_may_say_more_but_loses_nothing(pipeline: TextPipeline, rewrite: str, lost: str | None) -> None:
+    described = TextPipeline(
+        TextSpec(rewriter="rules", wording="description"),
+        rewriter=Says(rewrite), labeller=pipeline.labeller, encoder=pipeline.encoder,
+    )  # fmt: skip
+    (features,) = described.features(["wave the left hand two times"])
+    if lost is None:
+        assert (features.rewritten, features.seconds) == (rewrite, 7.0)
+    else:
+        assert (features.rewritten, features.seconds) == (features.prompt, None)
+        assert lost in str(features.not_rewritten)
+    assert TextFeatures.from_blob(features.to_blob()).seconds == features.seconds
 
 
 def test_the_guard_compares_verbs_by_their_lemma() -> None:

@@ -80,7 +80,7 @@ class OneShot:
         features = self._text.features([w.prompt for w in wanted])
         frames_of = self._generator.limits.frames_of
         requests = [
-            Request(text, w.seed, frames_of(w.seconds), scope=self._scope(w.prompt))
+            Request(text, w.seed, frames_of(w.seconds, text), scope=self._scope(w.prompt))
             for w, text in zip(wanted, features, strict=True)
         ]
         requests = [self._generator.resolve_length(request) for request in requests]

@@ -113,9 +113,9 @@ class GeneratorHandler(Generic[S]):
         return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
-        frames = self.generator.limits.frames_of(item.seconds)
         recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
+        frames = self.generator.limits.frames_of(item.seconds, text)
         return Request(text, item.seed, frames, recording, item.scope)
 
 

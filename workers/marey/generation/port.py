@@ -41,9 +41,14 @@ class Limits:
     fps: float
     text_width: int
 
-    def frames_of(self, seconds: float | None) -> int | None:
-        """Return the frames of a length; None = the model decides."""
-        return None if seconds is None else round(seconds * self.fps)
+    def frames_of(self, seconds: float | None, text: TextFeatures | None = None) -> int | None:
+        """Return the frames of a length, or of what the rewriter of a prompt proposes, brought into the range of the
+        bundle; None = the model decides."""
+        if seconds is not None:
+            return round(seconds * self.fps)
+        if text is None or text.seconds is None:
+            return None
+        return min(max(round(text.seconds * self.fps), self.min_frames), self.max_frames)
 
     def check(self, request: Request) -> None:
         """Check that a request is within the limits.

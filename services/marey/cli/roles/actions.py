@@ -231,7 +231,7 @@ class _Run:
         pipeline = pipeline_of(generator)
         texts = pipeline.features([prompt.text for prompt in prompts])
         lengths = (length_of(generator.bundle, Item(prompt.text)) for prompt in prompts)
-        frames = [generator.limits.frames_of(seconds) for seconds in lengths]
+        frames = [generator.limits.frames_of(seconds, text) for seconds, text in zip(lengths, texts, strict=True)]
         scopes = self._scopes(pipeline, prompts)
         jobs = [
             (prompt, Request(text, seed, wanted, scope=scope))

@@ -23,6 +23,7 @@ from marey.models.momaskpp.bundle import MODEL, ScaleNetworks
 from marey.models.momaskpp.config import RELEASED_HUMANML3D, RELEASED_SNAPMOGEN, MoMaskPPConfig
 from marey.models.momaskpp.released import MASKED, REFINER, TOKENIZER, UNUSED, Rule, renamed
 from marey.nn.bundling import write_generator
+from marey.text.wordings import Wording
 
 ENCODER = "t5-v1_1-base"
 INSIDE = ("checkpoint_dir",)
@@ -40,6 +41,7 @@ class PublishedSet:
         statistics: where mean and deviation lie, relative to its folder.
         data: the data set that it was trained on.
         normalisation: lines of the card.
+        wording: of its training texts.
     """
 
     name: str
@@ -47,6 +49,7 @@ class PublishedSet:
     statistics: tuple[str, ...]
     data: str
     normalisation: str
+    wording: Wording = "caption"
 
 
 SETS = (
@@ -56,6 +59,7 @@ SETS = (
         ("meta_data", "../meta_data", "../../meta_data", "../../../meta_data"),
         "SnapMoGen",
         "Mean and deviation of the data set's `meta_data`, all 296 features.",
+        "description",
     ),
     PublishedSet(
         "humanml3d",
@@ -89,14 +93,15 @@ def import_momaskpp(request: ImportRequest, sets: Sequence[PublishedSet] = SETS)
     statistics = download.statistics(where, config.features)
     accounts = download.finish()
     with text_encoder_of(request, ENCODER) as spec:
+        text = spec.model_copy(update={"wording": published.wording})
         return write_generator(
             request.output,
             MODEL,
             config,
             {name: network.state_dict() for name, network in networks.parts().items()},
             statistics,
-            text=spec,
-            card=make_card(request, accounts, about=ABOUT, normalisation=published.normalisation, text=spec),
+            text=text,
+            card=make_card(request, accounts, about=ABOUT, normalisation=published.normalisation, text=text),
             overwrite=request.overwrite,
             dtype=np.float32,
             licence=request.licence,
