@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from marey.data import gestures
 from marey.data.describe import describe_text
-from marey.data.gestures import COUNTS, made_gestures
+from marey.data.gestures import KINDS, made_gestures
 from marey.data.pack import PackClip
 from marey.data.part import MAX_FRAMES, Part
 from marey.data.sampling import sampling_weights
@@ -24,17 +25,21 @@ OTHER = {"left": "right", "right": "left"}
 SAID = (("stand still",),)
 
 
-def idle(seconds: float = 4.0, content: str = "idle") -> Part:
-    joints = Body(seconds, speed=steady(0.0)).joints().astype(np.float32)
+def idle(seconds: float = 4.0, content: str = "idle", speed: float = 0.0) -> Part:
+    joints = Body(seconds, speed=steady(speed)).joints().astype(np.float32)
     source = PackClip("idle-1", "cmu", content, "", "train", 0, 0, source="idle-1", captions=SAID)
     return Part("idle-1", source, content, False, joints, describe_text(SAID, joints, FPS))
+
+
+def few(count: int) -> dict[str, gestures.Kind]:
+    return {action: replace(kind, count=count) for action, kind in KINDS.items()}
 
 
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gestures, "COUNTS", dict.fromkeys(COUNTS, 24))
-        return list(made_gestures([idle(), idle(2.0), idle(content="walk")]))
+        patch.setattr(gestures, "KINDS", few(24))
+        return list(made_gestures([idle(), idle(2.0), idle(content="walk"), idle(content="walk", speed=1.2)]))
 
 
 def of(made: list[Part], action: str) -> list[Part]:
@@ -53,7 +58,7 @@ def tilt(part: Part) -> np.ndarray:
 
 
 def test_as_many_as_asked_for_are_made_of_every_action(made: list[Part]) -> None:
-    assert Counter(part.content for part in made) == dict.fromkeys(COUNTS, 24)
+    assert Counter(part.content for part in made) == dict.fromkeys(KINDS.keys() - {"sprint"}, 24)
     assert all(part.made and part.source.split == "train" for part in made)
     assert len({part.id for part in made}) == len(made)
 
@@ -62,10 +67,12 @@ def test_feet_stay_bones_keep_their_length_and_the_body_ends_as_it_began(made: l
     lengths = np.linalg.norm(HUMANML3D.offsets[1:], axis=-1)
     for part in made:
         assert 20 < len(part.joints) <= MAX_FRAMES + 1
-        assert np.ptp(part.joints[:, [7, 8, 10, 11]], axis=0).max() < 0.02
+        stays = [10, 11] if part.content == "shoot-basket" else [7, 8, 10, 11]
+        assert part.content == "carry" or np.ptp(part.joints[:, stays], axis=0).max() < 0.02
         bones = np.linalg.norm(part.joints[:, 1:] - part.joints[:, list(HUMANML3D.parents[1:])], axis=-1)
         assert np.abs(bones - lengths).max() < 1e-4
-        assert np.abs(part.joints[-1] - part.joints[0]).max() < 0.12
+        if part.content not in ("carry", "aim", "talk", "shiver"):  # clips may begin and end within these
+            assert np.abs(part.joints[-1] - part.joints[0]).max() < 0.12
 
 
 def test_the_hand_that_is_told_waves_and_the_other_hangs(made: list[Part]) -> None:
@@ -118,6 +125,34 @@ def test_hands_meet_in_a_clap_and_a_nod_moves_the_head_alone(made: list[Part]) -
         assert np.ptp(part.joints[:, [20, 21]], axis=0).max() < 0.12
 
 
+def ahead(part: Part) -> np.ndarray:
+    """Metres by which the foremost wrist is before the middle of the trunk, (T,); the body faces +Z."""
+    return part.joints[:, [20, 21], 2].max(1) - part.joints[:, [0, 12], 2].mean(1)
+
+
+def test_hands_reach_and_aim_ahead_and_shoot_over_the_head(made: list[Part]) -> None:
+    for part in of(made, "reach-forward"):
+        assert (ahead(part) > 0.4).sum() >= 5
+        assert ahead(part)[-1] < 0.3
+        assert height(part, part.source.side).max() < 0.0
+    for part in of(made, "aim"):
+        assert (ahead(part) > 0.35).sum() >= FPS
+    for part in of(made, "shoot-basket"):
+        assert part.joints[:, [20, 21], 1].max() > part.joints[:, 15, 1].max() + 0.05
+
+
+def test_a_load_is_held_still_and_shivering_hands_shake(made: list[Part]) -> None:
+    for part in of(made, "carry"):
+        side = part.source.side
+        for one in ("left", "right") if side == "both" else (side,):
+            seen = part.joints[:, WRIST[one]] - part.joints[:, [16, 17]].mean(1)
+            assert np.ptp(seen, axis=0).max() < 0.12
+            assert seen[:, 1].min() > -0.5
+    for part in of(made, "shiver"):
+        middle = part.joints[8:-8, 20] - part.joints[8:-8, 0]
+        assert np.abs(np.diff(middle, 2, axis=0)).mean() > 0.004
+
+
 def test_captions_are_in_three_voices_and_name_the_side_that_acts(made: list[Part]) -> None:
     for part in made:
         *voices, words = part.source.captions
@@ -126,13 +161,13 @@ def test_captions_are_in_three_voices_and_name_the_side_that_acts(made: list[Par
         assert part.facts.text == part.source.captions
         for text in (text for author in voices for text in author):
             assert "{" not in text
-            if part.content in ("wave", "raise-arm", "guide") and part.source.side != "both":
+            if part.content in ("wave", "raise-arm", "guide", "reach-forward") and part.source.side != "both":
                 assert part.source.side in text.lower(), text
                 assert OTHER[part.source.side] not in text.lower(), text
 
 
 def test_the_same_idles_give_the_same_gestures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gestures, "COUNTS", {"wave": 3})
+    monkeypatch.setattr(gestures, "KINDS", {"wave": few(3)["wave"]})
     first, second = (list(made_gestures([idle()])) for _ in range(2))
     for a, b in zip(first, second, strict=True):
         assert a.source == b.source

@@ -1,4 +1,5 @@
-"""Pose editing of a standing body: move arms along smooth paths and bend the trunk while the feet stay in place.
+"""Pose editing of a standing or walking body: move arms along smooth paths and bend the trunk; the feet stay as
+captured.
 
 Captures for commercial use have two waves, two raised arms and a bow; `marey.data.gestures` makes more of them from
 captured idles with these functions. Directions are in the frame of the body: outward (away from the body on the arm's
@@ -28,14 +29,17 @@ _LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
 _LEGS = (1, 2, 4, 5, 7, 8, 10, 11)
 _CARRIED = [j for j in range(22) if j not in _LEGS[2:]]
 """Joints that move with the hips."""
+_ANKLES, _TOES = [7, 8], [10, 11]
 _SPINE = (3, 6, 9)
 _NECK = 12
 _COLLAR_LIFT = np.radians(22.0)  # lift of the shoulder if the arm points straight up
 _LIFT_FROM, _LIFT_TO = np.radians(-20.0), np.radians(80.0)
 _VIA = {"upper": (35.0, -25.0), "fore": (20.0, 25.0)}  # an arm rises in front of the body with a bent elbow
 _BACK = 0.12  # metres that the hips move back in a bow to the level
+_HIPS_FOLLOW = 0.9  # share of the rise of the ankles; knees are not to be stretched
 _DOWN = 0.03  # metres that they move down in it
 _PELVIS_SHARE = 0.45  # share of a bow by the hips; the spine bends by the rest
+_POLE = (0.7, -1.0, -0.3)  # elbows point down and outward
 _SWING_FROM = 0.7  # share of the rise after which a hand swings
 
 
@@ -58,7 +62,7 @@ def direction(azimuth: float, elevation: float) -> Array:
 
 
 class StandingBody:
-    """A standing motion (T, 22, 3) at 20 fps for pose editing; metres, Y up."""
+    """A motion (T, 22, 3) on the feet, at 20 fps, for pose editing; metres, Y up."""
 
     def __init__(self, joints: Array) -> None:
         self.joints = np.array(joints, np.float64)
@@ -129,26 +133,65 @@ class StandingBody:
         self.joints[:, elbow] = self.joints[:, shoulder] + _LENGTH[elbow] * self.world(bones[0], side)
         self.joints[:, wrist] = self.joints[:, elbow] + _LENGTH[wrist] * self.world(bones[1], side)
 
-    def reach(self, side: str, target: Array) -> tuple[Array, Array]:
-        """Directions (T, 3) of upper arm and forearm that put the wrist at a target, the elbow down and outward.
+    def reach(self, side: str, target: Array, pole: Sequence[float] = _POLE) -> tuple[Array, Array]:
+        """Directions (T, 3) of upper arm and forearm that put the wrist at a target.
 
         Args:
             side: of the arm.
-            target: (T, 3) the wrist relative to the shoulder, in the body's frame, metres.
+            target: (T, 3) the wrist relative to the shoulder, in the body's frame, metres; brought into reach.
+            pole: where the elbow points, in the body's frame; down and outward by default.
         """
         _, _, elbow, wrist = ARMS[side]
         upper, lower = _LENGTH[elbow], _LENGTH[wrist]
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
         axis = target / distance
         distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
-        pole = np.array([0.7, -1.0, -0.3]) - axis * (axis @ np.array([0.7, -1.0, -0.3]))[:, None]
+        aside = np.asarray(pole) - axis * (axis @ np.asarray(pole))[:, None]
         along = (distance**2 + upper**2 - lower**2) / (2 * distance)
-        bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * normalize(pole)
+        bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * normalize(aside)
         return normalize(bent), normalize(distance * axis - bent)
 
     def from_shoulder(self, side: str, points: Array) -> Array:
         """Convert points (T, 3) of the world to the body's frame, relative to a shoulder."""
         return self.local(points - self.joints[:, ARMS[side][1]], side)
+
+    def hold(self, side: str, way: Array, point: Array, *, lag: float = 0.0, pole: Sequence[float] = _POLE) -> None:
+        """Move a hand to a point before the chest and back; see `move_arm`.
+
+        Args:
+            side: of the arm.
+            way: (T,) progress of the movement, 0 to 1.
+            point: (3,) or (T, 3) the wrist relative to the middle of the shoulders, in the body's frame, metres.
+            lag: seconds by which the forearm follows the upper arm.
+            pole: see `reach`.
+        """
+        middle = self.joints[:, [arm[1] for arm in ARMS.values()]].mean(1)
+        self.move_arm(side, way, *self.reach(side, self.from_shoulder(side, middle) + point, pole), lag)
+
+    def shrug(self, degrees: Array) -> None:
+        """Lift both shoulders by turning the collars by `degrees` (T,)."""
+        for side, (collar, *_) in ARMS.items():
+            self.turn(collar, "forward", _SIGN[side] * degrees)
+
+    def steady(self, share: float) -> None:
+        """Take a share, 0 to 1, of the swing of the shoulders out of the spine."""
+        across = self.joints[:, ARMS[LEFT][1]] - self.joints[:, ARMS[RIGHT][1]]
+        seen = self.local(across, LEFT)
+        self.lean(share * np.degrees(np.arctan2(seen[:, 2], seen[:, 0])), "up")
+
+    def shift(self, up: Array, forward: Array | float = 0.0, left: Array | float = 0.0) -> None:
+        """Move the hips and all above them, in metres (T,); the knees are solved."""
+        moved = np.stack(np.broadcast_arrays(left, up, forward), axis=-1)
+        self.joints[:, _CARRIED] += self.world(moved, LEFT)[:, None]
+
+    def rise_on_toes(self, degrees: Array) -> None:
+        """Lift the heels by turning the feet about the toes by `degrees` (T,), the hips following."""
+        before = self.joints[:, _ANKLES].copy()
+        turned = from_rotvec(self._left * np.radians(degrees)[:, None])[:, None]
+        toes = self.joints[:, _TOES]
+        self.joints[:, _ANKLES] = toes + rotate(turned, before - toes)
+        seen = self.local((self.joints[:, _ANKLES] - before).mean(1), LEFT)
+        self.shift(_HIPS_FOLLOW * seen[:, 1], seen[:, 2])
 
     def lean(self, degrees: Array, axis: str, joints: Sequence[int] = _SPINE) -> None:
         """Bend the spine by `degrees` (T,) in total; see `turn`."""
@@ -212,3 +255,25 @@ def swings(way: Array, rate: Callable[[Array], Array] | float) -> Array:
     rates = np.broadcast_to(rate(t) if callable(rate) else rate, t.shape)
     phase = np.cumsum(np.where(t >= begin, rates, 0.0)) / FPS
     return np.sin(2 * np.pi * phase) * eased((way - _SWING_FROM) / (1 - _SWING_FROM))
+
+
+def stations(frames: int, times: Sequence[float], points: Sequence[Sequence[float]]) -> Array:
+    """Path (frames, K) through points (n, K) at `times` in seconds, increasing, with a stop at each; ends are held."""
+    t = np.arange(frames) / FPS
+    at, through = np.asarray(times, np.float64), np.asarray(points, np.float64)
+    k = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(at) - 2)
+    w = eased((t - at[k]) / (at[k + 1] - at[k]))[:, None]
+    return (1 - w) * through[k] + w * through[k + 1]
+
+
+def tremble(frames: int, rate: float, phase: float) -> Array:
+    """Oscillation (frames,) between -1 and 1 of about `rate` per second, unsteady in pace and strength.
+
+    Args:
+        frames: its length.
+        rate: mean full swings per second.
+        phase: radians; different parts of a body get different ones.
+    """
+    t = np.arange(frames) / FPS
+    strength = 0.78 + 0.22 * np.sin(2 * np.pi * 0.6 * t + 2.3 * phase)
+    return strength * np.sin(2 * np.pi * rate * t + phase + 0.35 * np.sin(2 * np.pi * 0.8 * t + 1.7 * phase))
