@@ -10,7 +10,6 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,6 +20,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.arrange import Arranged, Posed, arrange
 from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
+from marey.motion.io.mesh import Mesh
 from marey.motion.rotations import unroll
 
 GENERATOR = "Marey"
@@ -31,25 +31,6 @@ DTYPES = {FLOAT: "<f4", UNSIGNED_SHORT: "<u2"}
 VERTICES, INDICES = 34962, 34963  # targets of bufferViews
 FEET = ("L_ankle", "L_toe", "R_ankle", "R_toe")
 """Names of the columns of `MotionClip.contacts`."""
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A body in the rest pose of a skeleton, each part fixed to one joint.
-
-    Attributes:
-        points: (V, 3) metres, from the joint that carries each, Y up.
-        normals: (V, 3) unit vectors.
-        joints: (V,) the joint that carries each point.
-        triangles: (F, 3) points, counter-clockwise from outside.
-        colour: of the material, linear RGB from 0 to 1.
-    """
-
-    points: NDArray[np.floating[Any]] = field(repr=False)
-    normals: NDArray[np.floating[Any]] = field(repr=False)
-    joints: NDArray[np.integer[Any]] = field(repr=False)
-    triangles: NDArray[np.integer[Any]] = field(repr=False)
-    colour: tuple[float, float, float] = (0.6, 0.58, 0.54)
 
 
 def write_glb(

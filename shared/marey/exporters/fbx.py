@@ -1,0 +1,41 @@
+"""FBX: skeleton, bind pose and motion, for Unreal, Unity, Maya, MotionBuilder and Blender. No prompt is in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from marey.exporters.exporter import Coordinates, Exporter
+
+if TYPE_CHECKING:
+    from marey.motion.clip import MotionClip
+
+
+def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
+    """Write a binary FBX file, version 7.4.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.fbx_write.write_fbx`; or the skeleton has no such rest pose.
+    """
+    from marey.motion.io.fbx_write import format_fbx
+
+    if coordinates.rest_pose != "t":
+        from marey.motion.rest_pose import change_rest_pose
+
+        clip = change_rest_pose(clip, coordinates.rest_pose)
+    mesh = None
+    if coordinates.mesh:
+        from marey.viz.mannequin import mannequin
+
+        mesh = mannequin(clip)
+    return format_fbx(clip, coordinates, mesh, unit=coordinates.unit, up=coordinates.up)
+
+
+EXPORTER: Exporter[MotionClip] = Exporter(
+    format="fbx",
+    media_type="application/octet-stream",
+    extension="fbx",
+    holds_prompt=False,
+    encode=encode,
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh"}),
+    stored=False,
+)

@@ -1,0 +1,235 @@
+"""Write FBX files: binary, version 7.4, without Autodesk's SDK.
+
+A file holds a skeleton of `LimbNode`s, their bind pose, one animation, and on request a skinned mesh. At rest
+`Lcl Rotation` is 0: the orientation of a joint stands in `PreRotation`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from marey.core.errors import InvalidInput
+from marey.motion.arrange import Arranged, Posed, arrange
+from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
+from marey.motion.files import write_atomically
+from marey.motion.io.fbx_document import TAKE, Document, ticks
+from marey.motion.io.fbx_mesh import add_mesh
+from marey.motion.io.fbx_nodes import Long, Node, node
+from marey.motion.io.fbx_templates import prop
+from marey.motion.io.mesh import Mesh
+from marey.motion.rotations import (
+    IDENTITY,
+    Array,
+    conjugate,
+    continuous_euler,
+    multiply,
+    rotate,
+    to_euler,
+    to_matrix,
+)
+from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+
+ORDER = "ZYX"
+"""R = Rz Ry Rx: `RotationOrder` 0, which FBX names eEulerXYZ."""
+AXES = "XYZ"
+LINEAR = 24836
+"""Flags of a key: linear interpolation, with a tangent that no program has to guess."""
+
+
+@dataclass(frozen=True, eq=False)
+class FbxPoses:
+    """Joints and their motion in the unit and axes of a file.
+
+    Attributes:
+        names: of the joints.
+        parents: index of the parent, -1 for a root; parents come before children.
+        places: (J, 3) rest position from the parent.
+        turns: (J, 4) rest rotation from the parent.
+        rotations: (T, J, 4) rotations from the parent.
+        moving: positions (T, 3) from the parent, of the joints that have position curves.
+        fps: frames a second.
+        unit, up: of the file.
+        limbs: (J,) False for plain nodes of a hierarchy, such as `Armature`; None = all are joints.
+        scales: (J,) scale of each node; None = 1.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    places: Array = field(repr=False)
+    turns: Array = field(repr=False)
+    rotations: Array = field(repr=False)
+    moving: dict[int, Array] = field(repr=False)
+    fps: float
+    unit: Unit = "cm"
+    up: Up = "y"
+    limbs: tuple[bool, ...] | None = field(default=None, repr=False)
+    scales: Array | None = field(default=None, repr=False)
+
+    def bind_matrices(self) -> Array:
+        """Return the matrices (J, 4, 4) from each joint to the world in the rest pose; columns are the axes."""
+        scales = np.ones(len(self.names)) if self.scales is None else self.scales
+        local = np.tile(np.eye(4), (len(self.names), 1, 1))
+        local[:, :3, :3] = to_matrix(self.turns) * scales[:, None, None]
+        local[:, :3, 3] = self.places
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                local[joint] = local[parent] @ local[joint]
+        return local
+
+
+def write_fbx(
+    path: Path | str,
+    clip: Posed,
+    *,
+    unit: Unit = "cm",
+    up: Up = "y",
+    root_bone: bool = False,
+    in_place: InPlace | None = None,
+    tpose_frame: bool = False,
+    placement: Placement = "origin",
+) -> None:
+    """Write a clip as binary FBX, atomically: the skeleton in its T-pose, its bind pose, and the motion.
+
+    Args:
+        path: the file.
+        clip: a MotionClip or a BvhClip.
+        unit, up: of the file, which states both.
+        root_bone, in_place, tpose_frame, placement: see `ExportOptions`.
+
+    Raises:
+        InvalidInput: options that contradict each other, bones that change their length, or numbers that are not
+            finite.
+    """
+    options = ExportOptions(root_bone=root_bone, in_place=in_place, tpose_frame=tpose_frame, placement=placement)
+    write_atomically(Path(path), format_fbx(clip, options, unit=unit, up=up))
+
+
+def format_fbx(
+    clip: Posed, options: ExportOptions = PLAIN, mesh: Mesh | None = None, *, unit: Unit = "cm", up: Up = "y"
+) -> bytes:
+    """Return the bytes of the FBX file; equal clips give equal bytes. See `write_fbx`.
+
+    Args:
+        mesh: a body of the clip's skeleton.
+    """
+    posed = arrange(clip, options)
+    document = Document()
+    poses = _poses(posed, unit, up)
+    models = _add_motion(document, poses)
+    if mesh is not None:
+        add_mesh(document, mesh, poses.bind_matrices(), models, len(posed.skeleton) - len(clip.skeleton), unit, up)
+    return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=unit, up=up)
+
+
+def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
+    """Return poses in the unit and axes of a file; with another axis, every joint's own axes turn with the world."""
+    tree, scale = posed.skeleton, 1 / METRES[unit]
+    places, moving = tree.offsets.astype(np.float64) * scale, posed.positions * scale
+    rotations = posed.rotations
+    if up == "z":
+        back = conjugate(Z_TO_Y)
+        places, moving = rotate(back, places), rotate(back, moving)
+        rotations = multiply(multiply(back, rotations), Z_TO_Y)
+    return FbxPoses(
+        names=tree.joint_names,
+        parents=tree.parents,
+        places=places,
+        turns=np.tile(IDENTITY, (len(tree), 1)),
+        rotations=rotations,
+        moving={joint: moving[:, joint] for joint in range(moving.shape[1])},
+        fps=posed.fps,
+        unit=unit,
+        up=up,
+    )
+
+
+def _add_motion(document: Document, poses: FbxPoses) -> list[Long]:
+    """Add joints, bind pose and animation; return the identifiers of the joints.
+
+    Raises:
+        InvalidInput: numbers that are not finite.
+    """
+    angles = continuous_euler(to_euler(multiply(conjugate(poses.turns), poses.rotations), ORDER))[..., ::-1]
+    if not (np.isfinite(angles).all() and all(np.isfinite(track).all() for track in poses.moving.values())):
+        raise InvalidInput("the clip holds NaN or infinite numbers", where=poses.names[0])
+    models = _add_joints(document, poses)
+    _add_bind_pose(document, poses, models)
+    _add_animation(document, poses, models, angles)
+    return models
+
+
+def _add_joints(document: Document, poses: FbxPoses) -> list[Long]:
+    pre = to_euler(poses.turns, ORDER)[:, ::-1]
+    models: list[Long] = []
+    for joint, (name, parent) in enumerate(zip(poses.names, poses.parents, strict=True)):
+        limb = poses.limbs is None or poses.limbs[joint]
+        kind = "LimbNode" if limb else "Null"
+        scale = 1.0 if poses.scales is None else float(poses.scales[joint])
+        rows = [
+            prop("PreRotation", "vector", pre[joint] + 0.0),
+            prop("RotationActive", "bool", (1,)),
+            prop("InheritType", "enum", (1,)),
+            prop("ScalingMax", "vector", (0, 0, 0)),
+            prop("DefaultAttributeIndex", "int", (0,)),
+            prop("Lcl Translation", "Lcl Translation", poses.places[joint] + 0.0, "A+" if joint in poses.moving else "A"),
+            prop("Lcl Rotation", "Lcl Rotation", (0, 0, 0), "A+"),
+            prop("Lcl Scaling", "Lcl Scaling", (scale,) * 3),
+        ]
+        models.append(document.add("Model", name, "Model", kind, _model(rows)))
+        document.connect(models[-1], models[parent] if parent >= 0 else 0)
+        size = [node("Properties70", below=[prop("Size", "double", (1,))])] if limb else []
+        below = [*size, node("TypeFlags", "Skeleton" if limb else "Null")]
+        document.connect(document.add("NodeAttribute", name, "NodeAttribute", kind, below), models[-1])
+    return models
+
+
+def _model(rows: list[Node]) -> list[Node]:
+    return [node("Version", 232), node("Properties70", below=rows), node("Shading", True), node("Culling", "CullingOff")]
+
+
+def _add_bind_pose(document: Document, poses: FbxPoses, models: list[Long]) -> None:
+    nodes = [
+        node("PoseNode", below=[node("Node", model), node("Matrix", matrix.T.reshape(-1))])
+        for model, matrix in zip(models, poses.bind_matrices(), strict=True)
+    ]
+    below = [node("Type", "BindPose"), node("Version", 100), node("NbPoseNodes", len(nodes)), *nodes]
+    document.add("Pose", "bind", "Pose", "BindPose", below)
+
+
+def _add_animation(document: Document, poses: FbxPoses, models: list[Long], angles: Array) -> None:
+    """Add one stack of one layer, with curves of rotation for all joints and of position for those that move."""
+    frames = len(angles)
+    times = np.array([ticks(frame, poses.fps) for frame in range(frames)], np.int64)
+    span = (0, int(times[-1]))
+    rows = [prop(f"{kind}{end}", "time", (at,)) for kind in ("Local", "Reference") for end, at in zip(("Start", "Stop"), span)]
+    stack = document.add("AnimationStack", TAKE, "AnimStack", "", [node("Properties70", below=rows)])
+    layer = document.add("AnimationLayer", "BaseLayer", "AnimLayer", "", [])
+    document.connect(layer, stack)
+    for joint, model in enumerate(models):
+        tracks = [("R", "Lcl Rotation", angles[:, joint])]
+        if joint in poses.moving:
+            tracks.insert(0, ("T", "Lcl Translation", poses.moving[joint]))
+        for letter, attribute, values in tracks:
+            rows = [prop(f"d|{axis}", "number", (value,)) for axis, value in zip(AXES, values[0] + 0.0, strict=True)]
+            curves = document.add("AnimationCurveNode", letter, "AnimCurveNode", "", [node("Properties70", below=rows)])
+            document.connect(curves, layer)
+            document.connect(curves, model, attribute)
+            for axis, column in zip(AXES, values.T, strict=True):
+                curve = document.add("AnimationCurve", "", "AnimCurve", "", _curve(times, column))
+                document.connect(curve, curves, f"d|{axis}")
+
+
+def _curve(times: np.ndarray, values: Array) -> list[Node]:
+    """Return the contents of a curve: one linear key a frame."""
+    return [
+        node("Default", float(values[0])),
+        node("KeyVer", 4008),
+        node("KeyTime", times),
+        node("KeyValueFloat", values.astype(np.float32)),
+        node("KeyAttrFlags", np.array([LINEAR], np.int32)),
+        node("KeyAttrDataFloat", np.array([0, 0, 218434821, 0], np.int32).view(np.float32)),
+        node("KeyAttrRefCount", np.array([len(times)], np.int32)),
+    ]
