@@ -6,6 +6,7 @@ A file holds a skeleton of `LimbNode`s, their bind pose, one animation, and on r
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -35,6 +36,7 @@ from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 ORDER = "ZYX"
 """R = Rz Ry Rx: `RotationOrder` 0, which FBX names eEulerXYZ."""
 AXES = "XYZ"
+APART = 1e-4  # metres
 LINEAR = 24836
 """Flags of a key: linear interpolation, with a tangent that no program has to guess."""
 
@@ -136,7 +138,7 @@ def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
     return FbxPoses(
         names=tree.joint_names,
         parents=tree.parents,
-        places=places,
+        places=apart(places, tree.parents, range(moving.shape[1]), scale),
         turns=np.tile(IDENTITY, (len(tree), 1)),
         rotations=rotations,
         moving={joint: moving[:, joint] for joint in range(moving.shape[1])},
@@ -144,6 +146,20 @@ def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
         unit=unit,
         up=up,
     )
+
+
+def apart(places: Array, parents: tuple[int, ...], moving: Iterable[int], scale: float) -> Array:
+    """Return rest positions (J, 3) in which no moving joint lies exactly on the Y axis of its parent.
+
+    Blender's importers take such a joint for the end of its parent's bone, connect the two, and leave out the motion
+    between them: the pelvis under a root bone would keep its height. A tenth of a millimetre is enough.
+    """
+    places = places.copy()
+    for joint in moving:
+        x, y, z = places[joint]
+        if parents[joint] >= 0 and max(abs(x), abs(z)) < APART * scale and y > 0:
+            places[joint, 2] += APART * scale
+    return places
 
 
 def _add_motion(document: Document, poses: FbxPoses) -> list[Long]:
