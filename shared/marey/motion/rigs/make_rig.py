@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile, TooLarge
-from marey.motion.retarget.rig import MAX_JOINTS, Rig
+from marey.motion.rigs.rig import MAX_JOINTS, Rig
 from marey.motion.rotations import from_matrix, multiply, rotate
 from marey.motion.units import Z_TO_Y, Up
 
@@ -28,12 +28,14 @@ class Node:
         parent: index of the parent in the file's list of nodes, -1 for a root.
         matrix: (4, 4) from the node's space to the file's, in the rest pose; columns are the axes, in the file's unit.
         bone: a skin is bound to it, or the format says that it is a bone.
+        tip: the end of a bone without a child, in the node's space and the file's unit, if the file states it.
     """
 
     name: str
     parent: int
     matrix: NDArray[np.float64]
     bone: bool = True
+    tip: tuple[float, float, float] | None = None
 
 
 def make_rig(
@@ -74,6 +76,7 @@ def make_rig(
     orientations, positions = from_matrix(axes), matrices[:, :3, 3] * unit
     if up == "z":
         orientations, positions = multiply(Z_TO_Y, orientations), rotate(Z_TO_Y, positions)
+    tips = np.array([nodes[node].tip or (np.nan,) * 3 for node in order], np.float64)
     return Rig(
         name=name,
         joint_names=names,
@@ -81,6 +84,7 @@ def make_rig(
         positions=positions,
         orientations=orientations,
         scales=sizes * unit,
+        tips=tips * (sizes * unit)[:, None],
         bones=tuple(nodes[node].bone for node in order),
         unit=unit,
         up=up,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.retarget.rig import Rig
+from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import Array, multiply, rotate
 
 

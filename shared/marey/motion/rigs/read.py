@@ -8,19 +8,19 @@ from pathlib import Path
 
 from marey.core.errors import InvalidInput
 from marey.motion.files import read_limited
-from marey.motion.retarget.rig import MAX_BYTES, Rig
+from marey.motion.rigs.rig import MAX_BYTES, Rig
 
 Reader = Callable[[bytes, str], Rig]
 """Reads the bytes of a file; the second argument names it in errors. Raises `InvalidFile` or `TooLarge`. It makes the
-rig with `marey.motion.retarget.make_rig.make_rig`, which checks what all formats have in common."""
+rig with `marey.motion.rigs.make_rig.make_rig`, which checks what all formats have in common."""
 
 READERS: dict[str, str] = {
-    "glb": "marey.motion.retarget.read_gltf:parse_glb_rig",
-    "gltf": "marey.motion.retarget.read_gltf:parse_gltf_rig",
-    "vrm": "marey.motion.retarget.read_gltf:parse_glb_rig",
-    "vrma": "marey.motion.retarget.read_gltf:parse_glb_rig",
-    "bvh": "marey.motion.retarget.read_bvh:parse_bvh_rig",
-    "json": "marey.motion.retarget.read_json:parse_json_rig",
+    "glb": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "gltf": "marey.motion.io.rig_gltf:parse_gltf_rig",
+    "vrm": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "vrma": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "bvh": "marey.motion.io.rig_bvh:parse_bvh_rig",
+    "json": "marey.motion.io.rig_json:parse_json_rig",
 }
 """Reader by the ending of a file's name, as `module:function`; modules are imported when they are needed."""
 

@@ -1,8 +1,8 @@
 """A rig: the joints of a character with its rest pose, as a file states them.
 
 A rig differs from a `Skeleton` in what a character brings along: joint axes that point anywhere, an A-pose, nodes above
-the hips, lengths in the unit of its file. Readers return it (`read.py`), the retargeter poses it (`retarget.py`), and
-exporters write the same hierarchy back (`RiggedMotion`).
+the hips, lengths in the unit of its file. Readers return it (`read.py`), the retargeter poses it (`marey.motion.retarget`),
+and exporters write the same hierarchy back (`RiggedMotion`).
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ class Rig:
         orientations: (J, 4) float64 unit quaternions `w x y z` of the joints in the rest pose, in the world.
         scales: (J,) metres of one unit in a joint's own space: what a child's local translation is multiplied by. It is
             `unit` where no node scales, and 0.01 under an `Armature` of scale 0.01 in a glb.
+        tips: (J, 3) the end of a bone without a child, from its joint in its axes, metres; NaN where the file
+            states none (End Sites of BVH).
         bones: (J,) bool, False for plain nodes of the hierarchy, such as `Armature`, which no skin is bound to.
         unit: metres of one unit of the file (glb: 1, most FBX files: 0.01).
         up: the axis of the file that points up.
@@ -53,6 +55,7 @@ class Rig:
     orientations: Array = field(repr=False)
     scales: Array = field(repr=False)
     bones: tuple[bool, ...] = field(repr=False)
+    tips: Array = field(repr=False)
     unit: float = 1.0
     up: Up = "y"
     source: str = "marey"

@@ -1,1 +1,0 @@
-"""Retarget motion onto the rigs of other programs."""
