@@ -1,8 +1,8 @@
 """A rig: the joints of a character with its rest pose, as a file states them.
 
-A rig differs from a `Skeleton` in what a character brings along: joint axes that point anywhere, an A-pose, nodes above
-the hips, lengths in the unit of its file. Readers return it (`read.py`), the retargeter poses it (`marey.motion.retarget`),
-and exporters write the same hierarchy back (`RiggedMotion`).
+A rig differs from a `Skeleton` in what a character brings along: joint axes that point anywhere, an A-pose, nodes
+above the hips, lengths in the unit of its file. Readers return it (`read.py`), `marey.motion.retarget` poses it, and
+exporters write the same hierarchy back (`RiggedMotion`).
 """
 
 from __future__ import annotations
