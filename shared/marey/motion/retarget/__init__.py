@@ -1,0 +1,1 @@
+"""Retarget motion onto the rigs of other programs."""
