@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from marey.motion.io.fbx_nodes import CREATION_TIME, FILE_ID, SEPARATOR, TICKS, VERSION, Long, Node, Property, encode, node
 from marey.motion.io.fbx_templates import definitions, prop
-from marey.motion.units import METRES, Unit, Up
+from marey.motion.units import Up
 
 CREATOR = "Marey"
 TAKE = "motion"
@@ -76,8 +76,8 @@ class Document:
         else:
             self._connections.append(node("C", "OP", child, Long(parent), attribute))
 
-    def encode(self, *, fps: float, frames: int, unit: Unit, up: Up) -> bytes:
-        """Return the bytes of the file."""
+    def encode(self, *, fps: float, frames: int, unit: float, up: Up) -> bytes:
+        """Return the bytes of the file; its unit is given in metres."""
         end = ticks(frames - 1, fps)
         counts = Counter(each.name for each in self._objects)
         return encode([
@@ -121,10 +121,10 @@ def _header() -> list[Node]:
     ]
 
 
-def _settings(fps: float, end: Long, unit: Unit, up: Up) -> Node:
+def _settings(fps: float, end: Long, unit: float, up: Up) -> Node:
     """Return axes, unit and rate of the file."""
     mode, rate = time_mode(fps)
-    scale = round(METRES[unit] * 100, 6)  # in centimetres
+    scale = float(f"{unit * 100:.9g}")  # in centimetres
     rows: list[Node] = []
     for name, (axis, sign) in zip(("UpAxis", "FrontAxis", "CoordAxis"), AXES[up], strict=True):
         rows += [prop(name, "int", (axis,)), prop(f"{name}Sign", "int", (sign,))]

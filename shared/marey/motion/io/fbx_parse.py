@@ -19,8 +19,8 @@ from marey.motion.io.fbx_nodes import ARRAYS, MAGIC
 
 OLDEST, NEWEST, WIDE = 7100, 7799, 7500
 """Versions that are read; from the last one on, sizes have 64 bits."""
-MAX_ITEMS = 1_000_000
-"""Nodes and properties; 2,000 animated joints take about half."""
+MAX_ITEMS, NODE = 1_500_000, 4
+"""Properties of a file and its nodes, which count four times. 2,000 animated joints take about 1,300,000."""
 MAX_UNPACKED = 64 * 2**20  # bytes of all arrays that are read
 MAX_DEPTH = 32
 NUMBERS = {"Y": "<h", "C": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
@@ -50,7 +50,7 @@ class Packed:
 Value = bool | int | float | bytes | Packed
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class ReadNode:
     """A node of a file: its name, properties (texts are bytes) and children."""
 
@@ -147,7 +147,7 @@ class FbxFile:
     def _count(self, items: int) -> None:
         self._items += items
         if self._items > MAX_ITEMS:
-            raise TooLarge(f"more than {MAX_ITEMS:,} nodes and properties", where=self.where)
+            raise TooLarge(f"more nodes and properties than any rig has", where=self.where)
 
     def _node(self, at: int, limit: int, depth: int) -> tuple[int, ReadNode] | None:
         """Return where the node at a place ends, and the node; None at the end of a list."""
@@ -160,7 +160,7 @@ class FbxFile:
             raise self.broken(f"the node {name!r} at byte {at} ends beyond the file or its parent")
         if depth > MAX_DEPTH:
             raise self.broken(f"nodes are nested more than {MAX_DEPTH} deep")
-        self._count(1 + min(count, size))
+        self._count(NODE + min(count, size))
         node = ReadNode(name, [], [])
         if name in SKIPPED:
             return end, node

@@ -70,7 +70,7 @@ _LAYER = [
     *((name, "enum", (0,)) for name in ("BlendMode", "RotationAccumulationMode", "ScaleAccumulationMode")),
     ("BlendModeBypass", "ulonglong", (0,)),
 ]
-_SKELETON = [("Color", "color", (0.8, 0.8, 0.8)), ("Size", "double", (33.333333333333336,)), ("LimbLength", "double", (1,))]
+_SKELETON = [("Color", "color", (0.8, 0.8, 0.8)), ("Size", "double", (33.333333333333336,))]
 _MESH = [
     ("Color", "color", (0.8, 0.8, 0.8)),
     *((name, "vector", (0, 0, 0)) for name in ("BBoxMin", "BBoxMax")),

@@ -53,7 +53,8 @@ class FbxPoses:
         rotations: (T, J, 4) rotations from the parent.
         moving: positions (T, 3) from the parent, of the joints that have position curves.
         fps: frames a second.
-        unit, up: of the file.
+        unit: metres of one unit of the file.
+        up: the axis of the file that points up.
         limbs: (J,) False for plain nodes of a hierarchy, such as `Armature`; None = all are joints.
         scales: (J,) scale of each node; None = 1.
     """
@@ -65,7 +66,7 @@ class FbxPoses:
     rotations: Array = field(repr=False)
     moving: dict[int, Array] = field(repr=False)
     fps: float
-    unit: Unit = "cm"
+    unit: float = 0.01
     up: Up = "y"
     limbs: tuple[bool, ...] | None = field(default=None, repr=False)
     scales: Array | None = field(default=None, repr=False)
@@ -120,10 +121,10 @@ def format_fbx(
     posed = arrange(clip, options)
     document = Document()
     poses = _poses(posed, unit, up)
-    models = _add_motion(document, poses)
+    models = add_motion(document, poses)
     if mesh is not None:
         add_mesh(document, mesh, poses.bind_matrices(), models, len(posed.skeleton) - len(clip.skeleton), unit, up)
-    return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=unit, up=up)
+    return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=poses.unit, up=up)
 
 
 def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
@@ -143,7 +144,7 @@ def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
         rotations=rotations,
         moving={joint: moving[:, joint] for joint in range(moving.shape[1])},
         fps=posed.fps,
-        unit=unit,
+        unit=METRES[unit],
         up=up,
     )
 
@@ -162,7 +163,7 @@ def apart(places: Array, parents: tuple[int, ...], moving: Iterable[int], scale:
     return places
 
 
-def _add_motion(document: Document, poses: FbxPoses) -> list[Long]:
+def add_motion(document: Document, poses: FbxPoses) -> list[Long]:
     """Add joints, bind pose and animation; return the identifiers of the joints.
 
     Raises:

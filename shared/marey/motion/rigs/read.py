@@ -20,6 +20,7 @@ READERS: dict[str, str] = {
     "vrm": "marey.motion.io.rig_gltf:parse_glb_rig",
     "vrma": "marey.motion.io.rig_gltf:parse_glb_rig",
     "bvh": "marey.motion.io.rig_bvh:parse_bvh_rig",
+    "fbx": "marey.motion.io.rig_fbx:parse_fbx_rig",
     "json": "marey.motion.io.rig_json:parse_json_rig",
 }
 """Reader by the ending of a file's name, as `module:function`; modules are imported when they are needed."""
