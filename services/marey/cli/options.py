@@ -87,6 +87,16 @@ class PlacementOption(StrEnum):
     KEEP = "keep"
 
 
+class NamesOption(StrEnum):
+    """Spellings of joint names."""
+
+    MIXAMO = "mixamo"
+    UE5 = "ue5"
+    HUMANIK = "humanik"
+    SMPLX = "smplx"
+    VRM = "vrm"
+
+
 def export_options(
     bvh_root: BvhRootOption,
     root_bone: bool,
@@ -95,6 +105,9 @@ def export_options(
     rest_pose: RestPoseOption,
     placement: PlacementOption,
     mesh: bool,
+    rig: str | None = None,
+    rig_map: Path | None = None,
+    names: NamesOption | None = None,
 ) -> ExportOptions:
     """Return the options of the files.
 
@@ -109,6 +122,9 @@ def export_options(
         rest_pose=rest_pose.value,
         placement=placement.value,
         mesh=mesh,
+        rig=rig,
+        rig_map=None if rig_map is None else str(rig_map),
+        names=None if names is None else names.value,
     )
 
 
@@ -222,4 +238,27 @@ Placement = Annotated[
     typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
 ]
 Mesh = Annotated[bool, typer.Option("--mesh", help="Add a neutral body to glb files, for viewers that show no bones.")]
+Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="NAME|FILE",
+        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .gltf, .vrm, .bvh, .json); "
+        "acts on BVH and glb. `marey rigs show` tells what is found in it.",
+    ),
+]
+RigMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--map", metavar="FILE", help="JSON of parts of the body and joint names of the rig, where they are not found."
+    ),
+]
+JointNames = Annotated[
+    NamesOption | None,
+    typer.Option(
+        "--names",
+        help="Rename the joints, and nothing else, for tools that retarget by name. A renamed clip put straight onto a "
+        "Mixamo or Manny character collapses, for the joints of those have other axes: use --rig.",
+    ),
+]
 TEMPLATE = DEFAULT_TEMPLATE

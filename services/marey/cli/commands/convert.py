@@ -52,6 +52,9 @@ def convert(
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
     mesh: options.Mesh = False,
+    rig: options.Rig = None,
+    rig_map: options.RigMap = None,
+    names: options.JointNames = None,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     from_rest_pose: Annotated[
@@ -73,7 +76,9 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
-        export=options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh),
+        export=options.export_options(
+            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
+        ),
         source_unit=from_unit.value,
         source_up=from_up.value,
         source_rest_pose=from_rest_pose.value,

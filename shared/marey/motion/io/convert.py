@@ -89,3 +89,8 @@ def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
     if tree.feet:
         contacts = find_contacts(joints, tree, clip.fps)
     return MotionClip.of(tree, rotations, root, contacts, clip.fps, manifest=manifest)
+
+
+def as_motion_clip(clip: MotionClip | BvhClip) -> MotionClip:
+    """Return a clip as `MotionClip`, converted if it is a BVH clip."""
+    return clip_from_bvh(clip, "bvh") if isinstance(clip, BvhClip) else clip

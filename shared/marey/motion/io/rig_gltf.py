@@ -111,7 +111,8 @@ def _with_relatives(bones: Iterable[int], parents: Sequence[int], nodes: Sequenc
             above = parents[above]
     waiting = list(bones)
     while waiting:
-        for child in nodes[waiting.pop()].get("children", []):
+        below: list[int] = nodes[waiting.pop()].get("children", [])
+        for child in below:
             if child not in kept and not _shows(nodes[child]):
                 kept.add(child)
                 waiting.append(child)

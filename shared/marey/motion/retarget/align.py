@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.retarget.body import Body, frame
 from marey.motion.retarget.spine import along, spans
+from marey.motion.rigs.body import Body, frame
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rotations import Array, between, from_matrix, multiply, rotate
 

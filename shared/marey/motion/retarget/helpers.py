@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.retarget.body import Body
+from marey.motion.rigs.body import Body
 from marey.motion.rotations import Array, conjugate, dot, from_rotvec, multiply, normalize
 
 

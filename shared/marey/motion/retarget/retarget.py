@@ -9,17 +9,19 @@ share its twist, and `ik_*` joints follow hands and feet (`helpers.py`). All oth
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.filters import smooth
 from marey.motion.retarget.align import IDENTITY, Alignment
 from marey.motion.retarget.arms import reach_hands
-from marey.motion.retarget.body import Body
 from marey.motion.retarget.helpers import share_twists
 from marey.motion.retarget.legs import STEADY, UP, Stance, flatten_toes, make_legs, solve_legs
 from marey.motion.retarget.source import Source
 from marey.motion.retarget.spine import blend, shares, spans
+from marey.motion.rigs.body import Body
 from marey.motion.rigs.parts import SIDES
+from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, between, conjugate, multiply, normalize, rotate
 
@@ -128,6 +130,16 @@ def _over(target: Body, joint: int) -> bool:
 
 def _local(source: Source, target: Body, world: Array, places: Array) -> RiggedMotion:
     rig = target.rig
+    rotations, translations, moving = local_poses(rig, world, places)
+    about = {"name": rig.name, "sha256": rig.sha256, "family": target.map.family}
+    manifest = {**source.manifest, "rig": about}
+    hips = target.map.parts["hips"]
+    return RiggedMotion(rig, rotations, translations, moving, source.contacts, source.fps, hips, manifest)
+
+
+def local_poses(rig: Rig, world: Array, places: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return local rotations (T, J, 4), translations (T, J, 3) and which joints move (J,), see `RiggedMotion`, of
+    orientations (T, J, 4) and places (T, J, 3) in the world."""
     rotations, translations = world.copy(), places.copy()
     inner = [joint for joint, parent in enumerate(rig.parents) if parent >= 0]
     over = [rig.parents[joint] for joint in inner]
@@ -136,9 +148,7 @@ def _local(source: Source, target: Body, world: Array, places: Array) -> RiggedM
     translations[:, inner] = rotate(back, places[:, inner] - places[:, over])
     moving = np.abs(translations - rig.offsets).max(axis=(0, 2)) > MOVES
     translations[:, ~moving] = rig.offsets[~moving]
-    about = {"name": rig.name, "sha256": rig.sha256, "family": target.map.family}
-    manifest = {**source.manifest, "rig": about}
-    return RiggedMotion(rig, rotations, translations, moving, source.contacts, source.fps, manifest)
+    return rotations, translations, moving
 
 
 def _facing(upright: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import forward_kinematics, global_rotations
-from marey.motion.retarget.body import Body
+from marey.motion.rigs.body import Body
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import Array, conjugate, multiply
 from marey.motion.skeleton import Skeleton

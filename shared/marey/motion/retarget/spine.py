@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from marey.motion.retarget.body import Body
+from marey.motion.rigs.body import Body
 from marey.motion.rotations import Array, normalize
 
 
 def spans(body: Body, chain: Sequence[int], end: Array) -> Array:
     """Return the beginning and end (n, 2) of each bone of a chain, as shares of its length; the last bone ends at a
     place (3,) of the upright rest pose."""
-    points = np.concatenate([body.places[list(chain)], end[None]])
+    points: Array = np.concatenate([body.places[list(chain)], end[None]])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     ends = np.concatenate([[0.0], np.cumsum(lengths)]) / max(float(lengths.sum()), 1e-9)
     return np.stack([ends[:-1], ends[1:]], axis=-1)
@@ -28,7 +28,7 @@ def shares(target: Array, source: Array) -> Array:
     overlap = np.minimum(target[:, None, 1], source[None, :, 1]) - np.maximum(target[:, None, 0], source[None, :, 0])
     overlap = np.maximum(overlap, 0.0)
     points = target.mean(axis=1)
-    holds = np.minimum(np.searchsorted(source[:, 1], points), len(source) - 1)
+    holds = np.array([min(int((source[:, 1] < point).sum()), len(source) - 1) for point in points], np.intp)
     empty = overlap.sum(axis=1) < 1e-6
     overlap[empty, holds[empty]] = 1.0
     return overlap / overlap.sum(axis=1, keepdims=True)
@@ -52,4 +52,5 @@ def along(body: Body, chain: Sequence[int], end: Array, places: Array) -> Array:
     """Return the points (n, 3) of a chain's upright rest pose at places (n,) from 0 to 1."""
     points = np.concatenate([body.places[list(chain)], end[None]])
     ends = np.concatenate([[0.0], spans(body, chain, end)[:, 1]])
-    return np.stack([np.interp(places, ends, column) for column in points.T], axis=-1)
+    columns: list[Array] = [np.interp(places, ends, points[:, axis]) for axis in range(3)]
+    return np.stack(columns, axis=-1)

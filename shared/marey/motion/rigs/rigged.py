@@ -27,6 +27,7 @@ class RiggedMotion:
             `ik_foot_l`. The others need no position channels.
         contacts: (T, 4) bool, True where L ankle, L toe, R ankle, R toe stand.
         fps: frames a second.
+        hips: the joint that carries the body.
         manifest: provenance of the motion with `rig`: name, sha256 and how joints were mapped; JSON.
         removed: what `in_place` took out, for the manifest; empty otherwise.
     """
@@ -37,6 +38,7 @@ class RiggedMotion:
     moving: NDArray[np.bool_] = field(repr=False)
     contacts: NDArray[np.bool_] = field(repr=False)
     fps: float
+    hips: int = 0
     manifest: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
     removed: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
 

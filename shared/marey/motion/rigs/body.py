@@ -40,15 +40,20 @@ class Body:
     upright: Array = field(repr=False)
 
     @classmethod
-    def of(cls, rig: Rig, joint_map: JointMap | None = None) -> Body:
+    def of(cls, rig: Rig, joint_map: JointMap | None = None, *, sized: bool = True) -> Body:
         """Return the body of a rig.
+
+        Args:
+            rig: the rig.
+            joint_map: its parts; None = find them.
+            sized: check the size.
 
         Raises:
             InvalidInput: the rig has no legs, or a size that no character has.
         """
         joint_map = map_joints(rig) if joint_map is None else joint_map
         body = cls(rig, joint_map, _upright(rig, joint_map))
-        if not SHORTEST <= body.leg <= TALLEST:
+        if sized and not SHORTEST <= body.leg <= TALLEST:
             raise InvalidInput(
                 f"its legs are {body.leg:.3g} m long: the unit of the file is wrong",
                 where=rig.name,
