@@ -9,6 +9,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
     from marey.motion.io.bvh import BvhClip
+    from marey.motion.rigs.rigged import RiggedMotion
 
 
 def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
@@ -34,6 +35,17 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
     return format_fbx(clip, coordinates, mesh, unit=coordinates.unit, up=coordinates.up)
 
 
+def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
+    """Write a motion on a rig: in the unit and axes of its file if that is FBX, else in centimetres, Y up.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.rigged_fbx.format_rigged_fbx`.
+    """
+    from marey.motion.io.rigged_fbx import format_rigged_fbx
+
+    return format_rigged_fbx(motion)
+
+
 def decode(data: bytes, where: str, coordinates: Coordinates) -> BvhClip:
     """Read a binary FBX file with its own skeleton, rest pose and facing; bones get a constant length. The file states
     its unit and axes.
@@ -54,6 +66,7 @@ EXPORTER = Exporter(
     holds_prompt=False,
     encode=encode,
     decode=decode,
-    options=frozenset({"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh"}),
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh", "rig", "rig_map", "names"}),
+    encode_rigged=encode_rigged,
     stored=False,
 )

@@ -16,7 +16,7 @@ from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
-OWN = ["bvh", "gif", "glb", "mp4", "npz", "webp"]
+OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "webp"]
 NAMES = count()
 
 
@@ -33,6 +33,7 @@ def test_formats_of_marey_are_installed() -> None:
     found = {each.format: (each.extension, each.media_type) for each in exporters().values()}
     assert found == {
         "bvh": ("bvh", "text/plain; charset=utf-8"),
+        "fbx": ("fbx", "application/octet-stream"),
         "gif": ("gif", "image/gif"),
         "glb": ("glb", "model/gltf-binary"),
         "mp4": ("mp4", "video/mp4"),
@@ -52,7 +53,7 @@ def test_the_registry_needs_the_standard_library_only() -> None:
     assert done.stdout == "False\n"
 
 
-@pytest.mark.parametrize("name", ["bvh", "gif", "glb", "npz", "webp"])
+@pytest.mark.parametrize("name", ["bvh", "fbx", "gif", "glb", "npz", "webp"])
 def test_a_format_says_whether_its_files_hold_the_prompt(name: str) -> None:
     data = exporter_of(name).encode(walker(seconds=0.1, prompt=SECRET), Coordinates())
     found = any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-16-le", "utf-32-le"))
