@@ -16,7 +16,7 @@ from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
-OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "webp"]
+OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "vrma", "webp"]
 NAMES = count()
 
 
@@ -38,6 +38,7 @@ def test_formats_of_marey_are_installed() -> None:
         "glb": ("glb", "model/gltf-binary"),
         "mp4": ("mp4", "video/mp4"),
         "npz": ("npz", "application/x-npz"),
+        "vrma": ("vrma", "model/gltf-binary"),
         "webp": ("webp", "image/webp"),
     }
     assert list(exporters()) == OWN
@@ -53,7 +54,7 @@ def test_the_registry_needs_the_standard_library_only() -> None:
     assert done.stdout == "False\n"
 
 
-@pytest.mark.parametrize("name", ["bvh", "fbx", "gif", "glb", "npz", "webp"])
+@pytest.mark.parametrize("name", ["bvh", "fbx", "gif", "glb", "npz", "vrma", "webp"])
 def test_a_format_says_whether_its_files_hold_the_prompt(name: str) -> None:
     data = exporter_of(name).encode(walker(seconds=0.1, prompt=SECRET), Coordinates())
     found = any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-16-le", "utf-32-le"))

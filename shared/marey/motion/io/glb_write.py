@@ -75,9 +75,9 @@ def format_glb(clip: Posed, options: ExportOptions = PLAIN, mesh: Mesh | None = 
         "asset": {"version": "2.0", "generator": GENERATOR, "extras": _extras(clip, posed, options)},
         "scene": 0,
         "scenes": [{"nodes": [0, count] if shown else [0]}],
-        "nodes": [*_nodes(posed), *shown],
+        "nodes": [*joint_nodes(posed), *shown],
         "skins": [_skin(posed, numbers)],
-        "animations": [_animation(posed, numbers)],
+        "animations": [animation_of(posed, numbers)],
         "accessors": numbers.accessors,
         "bufferViews": numbers.views,
         "buffers": [{"byteLength": len(numbers.data)}],
@@ -127,7 +127,7 @@ class Numbers:
         return len(self.accessors) - 1
 
 
-def _nodes(posed: Arranged) -> list[dict[str, Any]]:
+def joint_nodes(posed: Arranged) -> list[dict[str, Any]]:
     """Return a node a joint, in the skeleton's order; none is turned at rest."""
     tree = posed.skeleton
     nodes: list[dict[str, Any]] = []
@@ -171,7 +171,7 @@ def _body(mesh: Mesh, posed: Arranged, added: int, numbers: Numbers) -> dict[str
     }
 
 
-def _animation(posed: Arranged, numbers: Numbers) -> dict[str, Any]:
+def animation_of(posed: Arranged, numbers: Numbers) -> dict[str, Any]:
     """Return the animation: a rotation a joint, and positions of those that move (3.11)."""
     times = np.arange(len(posed.rotations)) / posed.fps
     ends = times.astype(np.float32)[[0, -1], None].tolist()
