@@ -6,32 +6,23 @@ A file holds a skeleton of `LimbNode`s, their bind pose, one animation, and on r
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from marey.core.errors import InvalidInput
-from marey.motion.arrange import Arranged, Posed, arrange
+from marey.motion.arrange import Posed, arrange
 from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
 from marey.motion.io.fbx_document import TAKE, Document, ticks
 from marey.motion.io.fbx_mesh import add_mesh
 from marey.motion.io.fbx_nodes import Long, Node, node
 from marey.motion.io.fbx_templates import prop
+from marey.motion.io.file_poses import FilePoses, poses_of
 from marey.motion.io.mesh import Mesh
-from marey.motion.rotations import (
-    IDENTITY,
-    Array,
-    conjugate,
-    continuous_euler,
-    multiply,
-    rotate,
-    to_euler,
-    to_matrix,
-)
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, to_euler
+from marey.motion.units import Unit, Up
 
 ORDER = "ZYX"
 """R = Rz Ry Rx: `RotationOrder` 0, which FBX names eEulerXYZ."""
@@ -39,48 +30,6 @@ AXES = "XYZ"
 APART = 1e-4  # metres
 LINEAR = 24836
 """Flags of a key: linear interpolation, with a tangent that no program has to guess."""
-
-
-@dataclass(frozen=True, eq=False)
-class FbxPoses:
-    """Joints and their motion in the unit and axes of a file.
-
-    Attributes:
-        names: of the joints.
-        parents: index of the parent, -1 for a root; parents come before children.
-        places: (J, 3) rest position from the parent.
-        turns: (J, 4) rest rotation from the parent.
-        rotations: (T, J, 4) rotations from the parent.
-        moving: positions (T, 3) from the parent, of the joints that have position curves.
-        fps: frames a second.
-        unit: metres of one unit of the file.
-        up: the axis of the file that points up.
-        limbs: (J,) False for plain nodes of a hierarchy, such as `Armature`; None = all are joints.
-        scales: (J,) scale of each node; None = 1.
-    """
-
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    places: Array = field(repr=False)
-    turns: Array = field(repr=False)
-    rotations: Array = field(repr=False)
-    moving: dict[int, Array] = field(repr=False)
-    fps: float
-    unit: float = 0.01
-    up: Up = "y"
-    limbs: tuple[bool, ...] | None = field(default=None, repr=False)
-    scales: Array | None = field(default=None, repr=False)
-
-    def bind_matrices(self) -> Array:
-        """Return the matrices (J, 4, 4) from each joint to the world in the rest pose; columns are the axes."""
-        scales = np.ones(len(self.names)) if self.scales is None else self.scales
-        local = np.tile(np.eye(4), (len(self.names), 1, 1))
-        local[:, :3, :3] = to_matrix(self.turns) * scales[:, None, None]
-        local[:, :3, 3] = self.places
-        for joint, parent in enumerate(self.parents):
-            if parent >= 0:
-                local[joint] = local[parent] @ local[joint]
-        return local
 
 
 def write_fbx(
@@ -120,50 +69,28 @@ def format_fbx(
     """
     posed = arrange(clip, options)
     document = Document()
-    poses = _poses(posed, unit, up)
+    poses = apart(poses_of(posed, unit, up))
     models = add_motion(document, poses)
     if mesh is not None:
         add_mesh(document, mesh, poses.bind_matrices(), models, len(posed.skeleton) - len(clip.skeleton), unit, up)
     return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=poses.unit, up=up)
 
 
-def _poses(posed: Arranged, unit: Unit, up: Up) -> FbxPoses:
-    """Return poses in the unit and axes of a file; with another axis, every joint's own axes turn with the world."""
-    tree, scale = posed.skeleton, 1 / METRES[unit]
-    places, moving = tree.offsets.astype(np.float64) * scale, posed.positions * scale
-    rotations = posed.rotations
-    if up == "z":
-        back = conjugate(Z_TO_Y)
-        places, moving = rotate(back, places), rotate(back, moving)
-        rotations = multiply(multiply(back, rotations), Z_TO_Y)
-    return FbxPoses(
-        names=tree.joint_names,
-        parents=tree.parents,
-        places=apart(places, tree.parents, range(moving.shape[1]), scale),
-        turns=np.tile(IDENTITY, (len(tree), 1)),
-        rotations=rotations,
-        moving={joint: moving[:, joint] for joint in range(moving.shape[1])},
-        fps=posed.fps,
-        unit=METRES[unit],
-        up=up,
-    )
-
-
-def apart(places: Array, parents: tuple[int, ...], moving: Iterable[int], scale: float) -> Array:
-    """Return rest positions (J, 3) in which no moving joint lies exactly on the Y axis of its parent.
+def apart(poses: FilePoses) -> FilePoses:
+    """Return poses in which no moving joint lies exactly on the Y axis of its parent at rest.
 
     Blender's importers take such a joint for the end of its parent's bone, connect the two, and leave out the motion
     between them: the pelvis under a root bone would keep its height. A tenth of a millimetre is enough.
     """
-    places = places.copy()
-    for joint in moving:
+    places, least = poses.places.copy(), APART / poses.unit
+    for joint in poses.moving:
         x, y, z = places[joint]
-        if parents[joint] >= 0 and max(abs(x), abs(z)) < APART * scale and y > 0:
-            places[joint, 2] += APART * scale
-    return places
+        if poses.parents[joint] >= 0 and max(abs(x), abs(z)) < least and y > 0:
+            places[joint, 2] += least
+    return replace(poses, places=places)
 
 
-def add_motion(document: Document, poses: FbxPoses) -> list[Long]:
+def add_motion(document: Document, poses: FilePoses) -> list[Long]:
     """Add joints, bind pose and animation; return the identifiers of the joints.
 
     Raises:
@@ -178,7 +105,7 @@ def add_motion(document: Document, poses: FbxPoses) -> list[Long]:
     return models
 
 
-def _add_joints(document: Document, poses: FbxPoses) -> list[Long]:
+def _add_joints(document: Document, poses: FilePoses) -> list[Long]:
     pre = to_euler(poses.turns, ORDER)[:, ::-1]
     models: list[Long] = []
     for joint, (name, parent) in enumerate(zip(poses.names, poses.parents, strict=True)):
@@ -207,7 +134,7 @@ def _model(rows: list[Node]) -> list[Node]:
     return [node("Version", 232), node("Properties70", below=rows), node("Shading", True), node("Culling", "CullingOff")]
 
 
-def _add_bind_pose(document: Document, poses: FbxPoses, models: list[Long]) -> None:
+def _add_bind_pose(document: Document, poses: FilePoses, models: list[Long]) -> None:
     nodes = [
         node("PoseNode", below=[node("Node", model), node("Matrix", matrix.T.reshape(-1))])
         for model, matrix in zip(models, poses.bind_matrices(), strict=True)
@@ -216,7 +143,7 @@ def _add_bind_pose(document: Document, poses: FbxPoses, models: list[Long]) -> N
     document.add("Pose", "bind", "Pose", "BindPose", below)
 
 
-def _add_animation(document: Document, poses: FbxPoses, models: list[Long], angles: Array) -> None:
+def _add_animation(document: Document, poses: FilePoses, models: list[Long], angles: Array) -> None:
     """Add one stack of one layer, with curves of rotation for all joints and of position for those that move."""
     frames = len(angles)
     times = np.array([ticks(frame, poses.fps) for frame in range(frames)], np.int64)
