@@ -2,8 +2,8 @@
 
     python blender_fbx.py FOLDER OPERATOR
 
-OPERATOR is `import_scene.fbx` or `wm.fbx_import`. Beside `a.fbx`, `a.npz` holds `joints` (T, J, 3) in metres, turned back to Y up, `rest`
-(J, 3), `names`, `times` in seconds, and `points` (V, 3) of the meshes in the last frame.
+OPERATOR is `import_scene.fbx` or `wm.fbx_import`. Beside `a.fbx`, `a.npz` holds `joints` (T, J, 3) in metres, turned back
+to Y up, `rest` (J, 3), `names`, `times` in seconds, `empties` and `points` (V, 3) of the meshes in the last frame.
 """
 
 import sys
@@ -25,7 +25,6 @@ def look(source, group, name):
     getattr(getattr(bpy.ops, group), name)(filepath=str(source))
     scene = bpy.context.scene
     armature = next(o for o in scene.objects if o.type == "ARMATURE")
-    assert not [o for o in scene.objects if o.type == "EMPTY"]
     bones = armature.pose.bones
     rest = y_up([armature.matrix_world @ bone.bone.head_local for bone in bones])
     strips = armature.animation_data
@@ -50,6 +49,7 @@ def look(source, group, name):
         "names": np.array([bone.name for bone in bones]),
         "times": (np.array(frames) - frames[0]) / fps,
         "fps": fps,
+        "empties": sum(o.type == "EMPTY" for o in scene.objects),
         "points": y_up(points),
     }
 

@@ -73,6 +73,7 @@ def imported(request, tmp_path_factory) -> tuple[Path, str]:
 def test_blender_puts_every_joint_where_the_npz_has_it(name, variant, imported):
     (folder, operator), clip = imported, ALL[name]
     with np.load(folder / f"{CASES.index((name, variant))}.npz") as seen:
+        assert seen["empties"] == 0, "every joint is a bone"
         check(seen["joints"], list(seen["names"]), clip, variant)
         frames = seen["times"] * float(seen["fps"])
         if operator == OPERATORS[0]:  # the older importer rounds rates: 23.976 to 24, 12.5 to 13

@@ -1,9 +1,9 @@
-"""Write and read USD files with `usd-core`, as a Python with it and numpy does: what is written, and its faults.
+"""Read USD files with `usd-core`: the faults in them, and where joints are.
 
-    python usd_check.py FOLDER
+    python usd_check.py FOLDER [--faults]
 
-Beside each `a.npz` of the folder, which Marey wrote, `a.usd` is read: `a.json` gets the faults that the validators of
-pxr.UsdValidation find, the joints' names, places in metres and Y up, and times in seconds.
+With --faults they are printed, and nothing else is read. Beside each `a.usd`, `a.json` gets the faults
+that the validators of pxr.UsdValidation find, the joints' names, places in metres and Y up, and times in seconds.
 """
 
 import json
@@ -14,12 +14,19 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 
-def look(path):
-    stage = Usd.Stage.Open(str(path))
+def faults_of(stage):
     registry = UsdValidation.ValidationRegistry()
     names = [each.name for each in registry.GetAllValidatorMetadata() if "Package" not in each.name]
     context = UsdValidation.ValidationContext(registry.GetOrLoadValidatorsByName(names))
-    faults = [f"{each.GetName()}: {each.GetMessage()}" for each in context.Validate(stage)]
+    return names, [
+        f"{each.GetValidator().GetMetadata().name} {each.GetName()}: {each.GetMessage()}"
+        for each in context.Validate(stage)
+    ]
+
+
+def look(path):
+    stage = Usd.Stage.Open(str(path))
+    names, faults = faults_of(stage)
     skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skeleton"))
     cache = UsdSkel.Cache()
     cache.Populate(UsdSkel.Root(stage.GetDefaultPrim()), Usd.TraverseInstanceProxies())
@@ -44,5 +51,9 @@ def look(path):
     }
 
 
+if sys.argv[2:] == ["--faults"]:
+    for path in sorted(Path(sys.argv[1]).glob("*.usd")):
+        print(faults_of(Usd.Stage.Open(str(path)))[1])
+    sys.exit()
 for path in sorted(Path(sys.argv[1]).glob("*.usd")):
     path.with_suffix(".json").write_text(json.dumps(look(path)), encoding="utf-8")

@@ -87,7 +87,10 @@ def scene_file(
         objects.append(node("Model", number, f"{name}\0\1Model", "LimbNode", below=[rows(properties)]))
         flags = node("TypeFlags", "Skeleton")
         objects.append(node("NodeAttribute", attribute, "\0\1NodeAttribute", "LimbNode", below=[flags]))
-        links += [node("C", "OO", number, Long(1000 + parent if parent >= 0 else 0)), node("C", "OO", attribute, number)]
+        links += [
+            node("C", "OO", number, Long(1000 + parent if parent >= 0 else 0)),
+            node("C", "OO", attribute, number),
+        ]
     stated = rows({name: (value,) for name, value in (settings or {}).items()})
     return encode_nodes(
         [

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Decoded = TypeVar("Decoded")
 """The result of `Exporter.decode`: a `MotionClip`, or a `BvhClip` for files that leave open how the body faces."""
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
-_EXTENSION = re.compile(r"[a-z0-9]{1,9}")
+_EXTENSION = re.compile(r"(?=.{1,9}\Z)[a-z0-9]+(\.[a-z0-9]+)?")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
 _DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(ExportOptions)}
 
@@ -44,7 +44,7 @@ class Exporter(Generic[Decoded]):
     Attributes:
         format: its name in routes, in the database and after `--format`: `[a-z0-9]{1,16}`. It never changes.
         media_type: the `Content-Type` of downloads.
-        extension: the ending of file names, without the dot.
+        extension: the ending of file names, without the dot before it; it may have a part more, such as `smplx.npz`.
         holds_prompt: files hold the clip's manifest, which has the prompt. When a prompt is erased, stored files are
             decoded and encoded again with the remaining manifest; such a format needs a `decode` that returns a
             `MotionClip` with the manifest.

@@ -66,7 +66,9 @@ EXPORTER = Exporter(
     holds_prompt=False,
     encode=encode,
     decode=decode,
-    options=frozenset({"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh", "rig", "rig_map", "names"}),
+    options=frozenset(
+        {"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh", "rig", "rig_map", "names"}
+    ),
     encode_rigged=encode_rigged,
     stored=False,
 )

@@ -16,7 +16,7 @@ from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
-OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "vrma", "webp"]
+OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "smplx", "usd", "vrma", "webp"]
 NAMES = count()
 
 
@@ -38,6 +38,8 @@ def test_formats_of_marey_are_installed() -> None:
         "glb": ("glb", "model/gltf-binary"),
         "mp4": ("mp4", "video/mp4"),
         "npz": ("npz", "application/x-npz"),
+        "smplx": ("smplx.npz", "application/x-npz"),
+        "usd": ("usd", "model/vnd.usd"),
         "vrma": ("vrma", "model/gltf-binary"),
         "webp": ("webp", "image/webp"),
     }
@@ -98,7 +100,14 @@ def test_a_plugin_that_cannot_be_used_is_named(tmp_path: Path, exporter: str, en
 
 
 @pytest.mark.parametrize(
-    "values", [("../up", "toy", False), ("toy", "t.y", False), ("toy", "toy", True), ("t" * 17, "toy", False)]
+    "values",
+    [
+        ("../up", "toy", False),
+        ("toy", "t..y", False),
+        ("toy", "a.toy.file", False),
+        ("toy", "toy", True),
+        ("t" * 17, "toy", False),
+    ],
 )
 def test_names_that_do_not_fit_and_prompts_that_could_not_be_erased_are_refused(values: tuple[str, str, bool]) -> None:
     name, extension, holds_prompt = values

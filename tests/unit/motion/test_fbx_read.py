@@ -71,7 +71,11 @@ def test_joints_are_where_the_documented_product_puts_them(order: int, inherit: 
         each |= {name: random.uniform(-180, 180, 3) for name in ("PreRotation", "PostRotation", "Lcl Rotation")}
         each["Lcl Scaling"] = np.full(3, random.uniform(0.5, 2))
     models = [
-        (f"j{k}", k - 1, {name: tuple(v) for name, v in each.items()} | {"RotationOrder": (order,), "InheritType": (inherit,)})
+        (
+            f"j{k}",
+            k - 1,
+            {name: tuple(v) for name, v in each.items()} | {"RotationOrder": (order,), "InheritType": (inherit,)},
+        )
         for k, each in enumerate(chains)
     ]
     rig = parse_fbx_rig(scene_file(models, {"UnitScaleFactor": 2.5}))
@@ -128,7 +132,9 @@ def test_a_skeleton_that_is_none_is_refused(models, message: str) -> None:
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", ["maya_human_ik_7400_binary.fbx", "91_48.fbx", "rig-human.glb", "m2m-wrong-bone-names.glb"])
+@pytest.mark.parametrize(
+    "name", ["maya_human_ik_7400_binary.fbx", "91_48.fbx", "rig-human.glb", "m2m-wrong-bone-names.glb"]
+)
 def test_a_motion_on_a_rig_is_written_and_read_again(name: str) -> None:
     rig = read_rig(archive(f"rigs/{name}"))
     random = np.random.default_rng(0)

@@ -6,7 +6,18 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable
 
-from marey.motion.io.fbx_nodes import CREATION_TIME, FILE_ID, SEPARATOR, TICKS, VERSION, Long, Node, Property, encode, node
+from marey.motion.io.fbx_nodes import (
+    CREATION_TIME,
+    FILE_ID,
+    SEPARATOR,
+    TICKS,
+    VERSION,
+    Long,
+    Node,
+    Property,
+    encode,
+    node,
+)
 from marey.motion.io.fbx_templates import definitions, prop
 from marey.motion.units import Up
 
@@ -53,7 +64,9 @@ class Document:
                 return number
         raise AssertionError("1,024 collisions")
 
-    def add(self, kind: str, name: str, label: str, sub: str, below: Iterable[Node], *, number: Long | None = None) -> Long:
+    def add(
+        self, kind: str, name: str, label: str, sub: str, below: Iterable[Node], *, number: Long | None = None
+    ) -> Long:
         """Add an object and return its identifier.
 
         Args:

@@ -14,9 +14,7 @@ from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 NAME = "body"
 
 
-def add_mesh(
-    document: Document, mesh: Mesh, bind: Array, models: list[Long], added: int, unit: Unit, up: Up
-) -> None:
+def add_mesh(document: Document, mesh: Mesh, bind: Array, models: list[Long], added: int, unit: Unit, up: Up) -> None:
     """Add a body and bind it to the joints.
 
     Args:
@@ -50,7 +48,12 @@ def _model() -> list[Node]:
         prop("ScalingMax", "vector", (0, 0, 0)),
         prop("DefaultAttributeIndex", "int", (0,)),
     ]
-    return [node("Version", 232), node("Properties70", below=rows), node("Shading", True), node("Culling", "CullingOff")]
+    return [
+        node("Version", 232),
+        node("Properties70", below=rows),
+        node("Shading", True),
+        node("Culling", "CullingOff"),
+    ]
 
 
 def _geometry(points: Array, normals: Array, mesh: Mesh) -> list[Node]:

@@ -26,7 +26,9 @@ MAX_DEPTH = 32
 NUMBERS = {"Y": "<h", "C": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _NUMBERS = {ord(letter): struct.Struct(form) for letter, form in NUMBERS.items()}
 _SIZE, _ARRAY = struct.Struct("<I"), struct.Struct("<III")
-SKIPPED = frozenset({"Geometry", "Video", "Texture", "Material", "Implementation", "BindingTable", "Shape", "Thumbnail"})
+SKIPPED = frozenset(
+    {"Geometry", "Video", "Texture", "Material", "Implementation", "BindingTable", "Shape", "Thumbnail"}
+)
 ASCII = "Export it as binary FBX (7.4 or 7.5), which every program that writes FBX offers."
 
 

@@ -131,7 +131,9 @@ def read_scene(data: bytes, where: str) -> Scene:
     if len(models) > MAX_MODELS:
         raise TooLarge(f"{len(models)} nodes, over the limit of {MAX_MODELS}", where=where)
     connections = _connections(file)
-    parents = {child: parent for child, parent, name in connections if child in models and parent in models and not name}
+    parents = {
+        child: parent for child, parent, name in connections if child in models and parent in models and not name
+    }
     for child, parent, _ in connections:  # some writers name the kind in the attribute alone
         if kinds.get(child) in BONES and parent in models and models[parent].kind == "":
             models[parent] = Model(parent, models[parent].name, kinds[child], models[parent].properties)

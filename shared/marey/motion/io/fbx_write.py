@@ -118,7 +118,9 @@ def _add_joints(document: Document, poses: FilePoses) -> list[Long]:
             prop("InheritType", "enum", (1,)),
             prop("ScalingMax", "vector", (0, 0, 0)),
             prop("DefaultAttributeIndex", "int", (0,)),
-            prop("Lcl Translation", "Lcl Translation", poses.places[joint] + 0.0, "A+" if joint in poses.moving else "A"),
+            prop(
+                "Lcl Translation", "Lcl Translation", poses.places[joint] + 0.0, "A+" if joint in poses.moving else "A"
+            ),
             prop("Lcl Rotation", "Lcl Rotation", (0, 0, 0), "A+"),
             prop("Lcl Scaling", "Lcl Scaling", (scale,) * 3),
         ]
@@ -131,7 +133,12 @@ def _add_joints(document: Document, poses: FilePoses) -> list[Long]:
 
 
 def _model(rows: list[Node]) -> list[Node]:
-    return [node("Version", 232), node("Properties70", below=rows), node("Shading", True), node("Culling", "CullingOff")]
+    return [
+        node("Version", 232),
+        node("Properties70", below=rows),
+        node("Shading", True),
+        node("Culling", "CullingOff"),
+    ]
 
 
 def _add_bind_pose(document: Document, poses: FilePoses, models: list[Long]) -> None:
@@ -148,7 +155,11 @@ def _add_animation(document: Document, poses: FilePoses, models: list[Long], ang
     frames = len(angles)
     times = np.array([ticks(frame, poses.fps) for frame in range(frames)], np.int64)
     span = (0, int(times[-1]))
-    rows = [prop(f"{kind}{end}", "time", (at,)) for kind in ("Local", "Reference") for end, at in zip(("Start", "Stop"), span)]
+    rows = [
+        prop(f"{kind}{end}", "time", (at,))
+        for kind in ("Local", "Reference")
+        for end, at in zip(("Start", "Stop"), span)
+    ]
     stack = document.add("AnimationStack", TAKE, "AnimStack", "", [node("Properties70", below=rows)])
     layer = document.add("AnimationLayer", "BaseLayer", "AnimLayer", "", [])
     document.connect(layer, stack)

@@ -21,9 +21,12 @@ READERS: dict[str, str] = {
     "vrma": "marey.motion.io.rig_gltf:parse_glb_rig",
     "bvh": "marey.motion.io.rig_bvh:parse_bvh_rig",
     "fbx": "marey.motion.io.rig_fbx:parse_fbx_rig",
+    "npz": "marey.motion.io.rig_smplx:parse_smplx_rig",
     "json": "marey.motion.io.rig_json:parse_json_rig",
 }
 """Reader by the ending of a file's name, as `module:function`; modules are imported when they are needed."""
+LIMITS = {"npz": 2**28}
+"""Largest file of a format in bytes, where it is not `MAX_BYTES`: the model of SMPL-X holds far more than joints."""
 
 
 def read_rig(path: Path | str) -> Rig:
@@ -40,7 +43,7 @@ def read_rig(path: Path | str) -> Rig:
     if extension not in READERS:
         known = ", ".join(f".{each}" for each in READERS)
         raise InvalidInput(f"`{path.suffix}` is not a rig format", where=str(path), hint=f"Known: {known}.")
-    return _reader(extension)(read_limited(path, MAX_BYTES), str(path))
+    return _reader(extension)(read_limited(path, LIMITS.get(extension, MAX_BYTES)), str(path))
 
 
 def _reader(extension: str) -> Reader:
