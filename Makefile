@@ -51,7 +51,7 @@ clients: $(STAMP) ## Install Blender, ufbx, usd-core and three.js into out/clien
 	$(CLIENTS)/blender/bin/pip install -q bpy==4.5.15 pufbx==0.1.0
 	$(CLIENTS)/usd/bin/pip install -q usd-core==26.11 'numpy>=2.2,<3'
 	npm install --silent --no-audit --no-fund --prefix $(CLIENTS)/three \
-	  three@0.185.1 gltf-validator@2.0.0-dev.3.10 @pixiv/three-vrm@3.5.5 @pixiv/three-vrm-animation@3.5.5
+	  three@0.187.0 gltf-validator@2.0.0-dev.3.10 @pixiv/three-vrm@3.5.5 @pixiv/three-vrm-animation@3.5.5
 	MAREY_REQUIRE_CLIENTS=1 MAREY_BPY_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python \
 	  MAREY_UFBX_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python MAREY_USD_PYTHON=$(CURDIR)/$(CLIENTS)/usd/bin/python \
 	  MAREY_THREE=$(CURDIR)/$(CLIENTS)/three $(BIN)/pytest -q -n 2 --dist loadfile -m '' tests/clients

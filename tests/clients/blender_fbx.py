@@ -2,8 +2,8 @@
 
     python blender_fbx.py FOLDER OPERATOR
 
-OPERATOR is `import_scene.fbx` or `wm.fbx_import`. Beside `a.fbx`, `a.npz` holds `joints` (T, J, 3) in metres, turned back
-to Y up, `rest` (J, 3), `names`, `times` in seconds, `empties` and `points` (V, 3) of the meshes in the last frame.
+OPERATOR is `import_scene.fbx` or `wm.fbx_import`. Beside `a.fbx`, `a.npz` holds `joints` (T, J, 3) in metres, turned
+back to Y up, `rest` (J, 3), `names`, `times` in seconds, `empties` and `points` (V, 3) of the meshes in the last frame.
 """
 
 import sys

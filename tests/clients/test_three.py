@@ -1,4 +1,4 @@
-"""A written BVH in three.js: every joint where the npz has it. `tests.support.clients` says what has to be installed."""
+"""A written BVH in three.js: every joint where the npz has it; see `tests.support.clients` for what is needed."""
 
 from __future__ import annotations
 

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from marey.motion.io.fbx_nodes import MAGIC, Long, Node, node
+from marey.motion.io.fbx_nodes import MAGIC, FbxNode, Long, node
 from marey.motion.io.fbx_parse import FbxFile, Packed, ReadNode
 
 LETTERS = {"<f4": "f", "<f8": "d", "<i4": "i", "<i8": "l"}
 
 
-def encode_nodes(top: Sequence[Node], version: int = 7400, *, packed: bool = False) -> bytes:
+def encode_nodes(top: Sequence[FbxNode], version: int = 7400, *, packed: bool = False) -> bytes:
     """Return the bytes of a file; `packed` arrays are compressed."""
     data = bytearray(MAGIC + struct.pack("<I", version))
     for each in top:
@@ -22,7 +22,7 @@ def encode_nodes(top: Sequence[Node], version: int = 7400, *, packed: bool = Fal
     return bytes(data) + bytes(25 if version >= 7500 else 13)
 
 
-def _append(data: bytearray, each: Node, version: int, packed: bool) -> None:
+def _append(data: bytearray, each: FbxNode, version: int, packed: bool) -> None:
     form = "<QQQB" if version >= 7500 else "<IIIB"
     start, content = len(data), b"".join(_property(value, packed) for value in each.properties)
     name = each.name.encode()
@@ -56,7 +56,7 @@ def rewritten(data: bytes, version: int, *, packed: bool = False) -> bytes:
     return encode_nodes([_again(file, each) for each in file.top], version, packed=packed)
 
 
-def _again(file: FbxFile, each: ReadNode) -> Node:
+def _again(file: FbxFile, each: ReadNode) -> FbxNode:
     values = [file.array(each, "fdilb", most=2**20) if isinstance(v, Packed) else v for v in each.properties]
     large = [Long(v) if isinstance(v, int) and not isinstance(v, bool) and abs(v) >= 2**31 else v for v in values]
     return node(each.name, *large, below=[_again(file, child) for child in each.children])
@@ -74,14 +74,14 @@ def scene_file(
         settings: such as `UpAxis`.
     """
 
-    def row(name: str, values: Sequence[float]) -> Node:
+    def row(name: str, values: Sequence[float]) -> FbxNode:
         return node("P", name, "Vector3D", "Vector", "", *(v if isinstance(v, int) else float(v) for v in values))
 
-    def rows(properties: Mapping[str, Sequence[float]]) -> Node:
+    def rows(properties: Mapping[str, Sequence[float]]) -> FbxNode:
         return node("Properties70", below=[row(*each) for each in properties.items()])
 
-    objects: list[Node] = []
-    links: list[Node] = []
+    objects: list[FbxNode] = []
+    links: list[FbxNode] = []
     for index, (name, parent, properties) in enumerate(models):
         number, attribute = Long(1000 + index), Long(5000 + index)
         objects.append(node("Model", number, f"{name}\0\1Model", "LimbNode", below=[rows(properties)]))

@@ -147,7 +147,7 @@ Formats = Annotated[
     typer.Option(
         "--format",
         metavar="FORMAT",
-        help="File format, such as bvh, glb or mp4; may be repeated. None given = all but films.",
+        help="File format, such as bvh, fbx, glb or mp4; may be repeated. None given = npz and bvh.",
     ),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; created if missing.")]
@@ -231,20 +231,24 @@ TPoseFrame = Annotated[
 ]
 RestPose = Annotated[
     RestPoseOption,
-    typer.Option("--rest-pose", help="Rest pose of BVH files: T-pose, or the A-pose of a rig whose A-pose is known."),
+    typer.Option(
+        "--rest-pose", help="Rest pose of BVH, FBX and USD files: T-pose, or the A-pose of a rig whose A-pose is known."
+    ),
 ]
 Placement = Annotated[
     PlacementOption,
     typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
 ]
-Mesh = Annotated[bool, typer.Option("--mesh", help="Add a neutral body to glb files, for viewers that show no bones.")]
+Mesh = Annotated[
+    bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
+]
 Rig = Annotated[
     str | None,
     typer.Option(
         "--rig",
         metavar="NAME|FILE",
-        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .gltf, .vrm, .bvh, .json); "
-        "acts on BVH and glb. `marey rigs show` tells what is found in it.",
+        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .gltf, .vrm, .fbx, .bvh, .json; "
+        ".npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
     ),
 ]
 RigMap = Annotated[

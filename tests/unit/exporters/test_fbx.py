@@ -123,7 +123,7 @@ def test_options_act_on_the_file() -> None:
     assert np.ptp(still.root[:, [0, 2]], axis=0).max() < 1e-6
     moved = replace(clip, manifest={"placement": {"x": 1.0, "z": 2.0, "heading": 0.0}})
     kept = parse_fbx(format_fbx(moved, ExportOptions(placement="keep")))
-    np.testing.assert_allclose(kept.root, clip.root + [1, 0, 2], atol=1e-4)
+    np.testing.assert_allclose(kept.root, clip.root + np.array([1, 0, 2]), atol=1e-4)
     posed = exporter_of("fbx").write(tumbling(SNAPMOGEN, 30), Coordinates(rest_pose="a"))
     offsets = parse_fbx(posed).skeleton
     assert offsets.offsets[offsets.index("L_hand0001_bind_JNT")][1] < -0.05, "arms hang in an A-pose"

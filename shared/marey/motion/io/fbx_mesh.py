@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.io.fbx_document import Document
-from marey.motion.io.fbx_nodes import Long, Node, node
+from marey.motion.io.fbx_document import FbxDocument
+from marey.motion.io.fbx_nodes import FbxNode, Long, node
 from marey.motion.io.fbx_templates import prop
 from marey.motion.io.mesh import Mesh
 from marey.motion.rotations import Array, conjugate, rotate
@@ -14,7 +14,9 @@ from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 NAME = "body"
 
 
-def add_mesh(document: Document, mesh: Mesh, bind: Array, models: list[Long], added: int, unit: Unit, up: Up) -> None:
+def add_mesh(
+    document: FbxDocument, mesh: Mesh, bind: Array, models: list[Long], added: int, unit: Unit, up: Up
+) -> None:
     """Add a body and bind it to the joints.
 
     Args:
@@ -34,14 +36,14 @@ def add_mesh(document: Document, mesh: Mesh, bind: Array, models: list[Long], ad
     document.connect(document.add("Material", NAME, "Material", "", _material(mesh)), model)
     skin = document.add("Deformer", "", "Deformer", "Skin", [node("Version", 101), node("Link_DeformAcuracy", 50.0)])
     document.connect(skin, geometry)
-    for joint in np.unique(carriers).tolist():
+    for joint in sorted(set(map(int, carriers))):
         held = np.flatnonzero(carriers == joint).astype(np.int32)
         cluster = document.add("Deformer", f"{NAME}.{joint}", "SubDeformer", "Cluster", _cluster(held, bind[joint]))
         document.connect(cluster, skin)
         document.connect(models[joint], cluster)
 
 
-def _model() -> list[Node]:
+def _model() -> list[FbxNode]:
     rows = [
         prop("RotationActive", "bool", (1,)),
         prop("InheritType", "enum", (1,)),
@@ -56,7 +58,7 @@ def _model() -> list[Node]:
     ]
 
 
-def _geometry(points: Array, normals: Array, mesh: Mesh) -> list[Node]:
+def _geometry(points: Array, normals: Array, mesh: Mesh) -> list[FbxNode]:
     corners = mesh.triangles.astype(np.int32)
     polygons = corners.copy()
     polygons[:, 2] ^= -1  # the last corner of a polygon is marked by its complement
@@ -88,14 +90,14 @@ def _geometry(points: Array, normals: Array, mesh: Mesh) -> list[Node]:
     ]
 
 
-def _material(mesh: Mesh) -> list[Node]:
+def _material(mesh: Mesh) -> list[FbxNode]:
     rows = [prop("DiffuseColor", "color", mesh.colour, "A"), prop("DiffuseFactor", "number", (1,))]
     below = [node("Version", 102), node("ShadingModel", "lambert"), node("MultiLayer", 0)]
     return [*below, node("Properties70", below=rows)]
 
 
-def _cluster(held: np.ndarray, bind: Array) -> list[Node]:
-    """Return a joint's share of the skin. `TransformLink` is where the joint was bound, `Transform` the mesh from there."""
+def _cluster(held: np.ndarray, bind: Array) -> list[FbxNode]:
+    """Return a joint's share of the skin. `TransformLink` is where the joint was, `Transform` the mesh from there."""
     return [
         node("Version", 100),
         node("UserData", "", ""),

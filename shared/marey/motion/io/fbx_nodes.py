@@ -37,7 +37,7 @@ Property = bool | int | float | str | bytes | NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class FbxNode:
     """A node of a file.
 
     Attributes:
@@ -49,20 +49,22 @@ class Node:
 
     name: str
     properties: tuple[Property, ...] = ()
-    children: tuple[Node, ...] = ()
+    children: tuple[FbxNode, ...] = ()
     block: bool = field(default=False, repr=False)
 
-    def first(self, name: str) -> Node | None:
+    def first(self, name: str) -> FbxNode | None:
         """Return the first child of a name."""
         return next((child for child in self.children if child.name == name), None)
 
 
-def node(name: str, *properties: Property, below: tuple[Node, ...] | list[Node] = (), block: bool = False) -> Node:
+def node(
+    name: str, *properties: Property, below: tuple[FbxNode, ...] | list[FbxNode] = (), block: bool = False
+) -> FbxNode:
     """Return a node with these properties and children."""
-    return Node(name, properties, tuple(below), block)
+    return FbxNode(name, properties, tuple(below), block)
 
 
-def encode(top: list[Node]) -> bytes:
+def encode(top: list[FbxNode]) -> bytes:
     """Return the bytes of a file with these nodes at its top."""
     data = bytearray(MAGIC + struct.pack("<I", VERSION))
     for each in top:
@@ -73,7 +75,7 @@ def encode(top: list[Node]) -> bytes:
     return bytes(data)
 
 
-def _append(data: bytearray, each: Node) -> None:
+def _append(data: bytearray, each: FbxNode) -> None:
     """Append a node with all below it: its header holds the place where it ends."""
     name, start = each.name.encode("ascii"), len(data)
     properties = b"".join(_property(value) for value in each.properties)

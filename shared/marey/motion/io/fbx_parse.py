@@ -149,7 +149,7 @@ class FbxFile:
     def _count(self, items: int) -> None:
         self._items += items
         if self._items > MAX_ITEMS:
-            raise TooLarge(f"more nodes and properties than any rig has", where=self.where)
+            raise TooLarge("more nodes and properties than any rig has", where=self.where)
 
     def _node(self, at: int, limit: int, depth: int) -> tuple[int, ReadNode] | None:
         """Return where the node at a place ends, and the node; None at the end of a list."""

@@ -133,7 +133,7 @@ def _clip(
     places = np.stack(spread, axis=1) @ axes.T * unit
     turned = [np.broadcast_to(moving.linear[key], (frames, 3, 3)) for key in joints]
     world = multiply(from_matrix(axes @ _turns(np.stack(turned, axis=1))), conjugate(at_rest))
-    above = [parent for parent in parents[1:]]
+    above = list(parents[1:])
     rotations = world.copy()
     rotations[:, 1:] = multiply(conjugate(world[:, above]), world[:, 1:])
     offsets, local = start.copy(), places.copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from marey.motion.io.fbx_nodes import Long, Node, Property, node
+from marey.motion.io.fbx_nodes import FbxNode, Long, Property, node
 
 TYPES = {
     "bool": ("bool", ""),
@@ -22,7 +22,7 @@ TYPES = {
 }
 """Type and label of properties by a short name; other names stand for themselves."""
 
-_AXES = "X Y Z".split()
+_AXES = ["X", "Y", "Z"]
 _NODE: list[tuple[str, str, tuple[float, ...]]] = [
     ("QuaternionInterpolate", "enum", (0,)),
     *((name, "vector", (0, 0, 0)) for name in ("RotationOffset", "RotationPivot", "ScalingOffset", "ScalingPivot")),
@@ -61,8 +61,10 @@ _NODE: list[tuple[str, str, tuple[float, ...]]] = [
     ("Visibility", "Visibility", (1,)),
     ("Visibility Inheritance", "Visibility Inheritance", (1,)),
 ]  # fmt: skip
-_STACK = [("Description", "string", "")]
-_STACK += [(name, "time", (0,)) for name in ("LocalStart", "LocalStop", "ReferenceStart", "ReferenceStop")]
+_STACK = [
+    ("Description", "string", ""),
+    *((name, "time", (0,)) for name in ("LocalStart", "LocalStop", "ReferenceStart", "ReferenceStop")),
+]
 _LAYER = [
     ("Weight", "number", (100,)),
     *((name, "bool", (0,)) for name in ("Mute", "Solo", "Lock")),
@@ -97,7 +99,7 @@ _LONG = {"time", "ulonglong"}
 _ANIMATABLE = {"number", "Visibility"}
 
 
-def prop(name: str, kind: str, values: Iterable[float] | str, flags: str | None = None) -> Node:
+def prop(name: str, kind: str, values: Iterable[float] | str, flags: str | None = None) -> FbxNode:
     """Return a property `P` of an object.
 
     Args:
@@ -114,9 +116,9 @@ def prop(name: str, kind: str, values: Iterable[float] | str, flags: str | None 
     return node("P", name, label, sub, flags, *(number(value) for value in values))
 
 
-def definitions(counts: Mapping[str, int]) -> Node:
+def definitions(counts: Mapping[str, int]) -> FbxNode:
     """Return the node `Definitions`: how many objects of each type follow, and their templates."""
-    types: list[Node] = [node("ObjectType", "GlobalSettings", below=[node("Count", 1)])]
+    types: list[FbxNode] = [node("ObjectType", "GlobalSettings", below=[node("Count", 1)])]
     for kind, count in counts.items():
         below = [node("Count", count)]
         if kind in TEMPLATES:

@@ -15,9 +15,9 @@ from marey.core.errors import InvalidInput
 from marey.motion.arrange import Posed, arrange
 from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
-from marey.motion.io.fbx_document import TAKE, Document, ticks
+from marey.motion.io.fbx_document import TAKE, FbxDocument, ticks
 from marey.motion.io.fbx_mesh import add_mesh
-from marey.motion.io.fbx_nodes import Long, Node, node
+from marey.motion.io.fbx_nodes import FbxNode, Long, node
 from marey.motion.io.fbx_templates import prop
 from marey.motion.io.file_poses import FilePoses, poses_of
 from marey.motion.io.mesh import Mesh
@@ -27,7 +27,7 @@ from marey.motion.units import Unit, Up
 ORDER = "ZYX"
 """R = Rz Ry Rx: `RotationOrder` 0, which FBX names eEulerXYZ."""
 AXES = "XYZ"
-APART = 1e-4  # metres
+LEAST = 1e-4  # metres
 LINEAR = 24836
 """Flags of a key: linear interpolation, with a tangent that no program has to guess."""
 
@@ -68,21 +68,21 @@ def format_fbx(
         mesh: a body of the clip's skeleton.
     """
     posed = arrange(clip, options)
-    document = Document()
-    poses = apart(poses_of(posed, unit, up))
+    document = FbxDocument()
+    poses = off_parent_axis(poses_of(posed, unit, up))
     models = add_motion(document, poses)
     if mesh is not None:
         add_mesh(document, mesh, poses.bind_matrices(), models, len(posed.skeleton) - len(clip.skeleton), unit, up)
     return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=poses.unit, up=up)
 
 
-def apart(poses: FilePoses) -> FilePoses:
+def off_parent_axis(poses: FilePoses) -> FilePoses:
     """Return poses in which no moving joint lies exactly on the Y axis of its parent at rest.
 
     Blender's importers take such a joint for the end of its parent's bone, connect the two, and leave out the motion
     between them: the pelvis under a root bone would keep its height. A tenth of a millimetre is enough.
     """
-    places, least = poses.places.copy(), APART / poses.unit
+    places, least = poses.places.copy(), LEAST / poses.unit
     for joint in poses.moving:
         x, y, z = places[joint]
         if poses.parents[joint] >= 0 and max(abs(x), abs(z)) < least and y > 0:
@@ -90,7 +90,7 @@ def apart(poses: FilePoses) -> FilePoses:
     return replace(poses, places=places)
 
 
-def add_motion(document: Document, poses: FilePoses) -> list[Long]:
+def add_motion(document: FbxDocument, poses: FilePoses) -> list[Long]:
     """Add joints, bind pose and animation; return the identifiers of the joints.
 
     Raises:
@@ -105,7 +105,7 @@ def add_motion(document: Document, poses: FilePoses) -> list[Long]:
     return models
 
 
-def _add_joints(document: Document, poses: FilePoses) -> list[Long]:
+def _add_joints(document: FbxDocument, poses: FilePoses) -> list[Long]:
     pre = to_euler(poses.turns, ORDER)[:, ::-1]
     models: list[Long] = []
     for joint, (name, parent) in enumerate(zip(poses.names, poses.parents, strict=True)):
@@ -132,7 +132,7 @@ def _add_joints(document: Document, poses: FilePoses) -> list[Long]:
     return models
 
 
-def _model(rows: list[Node]) -> list[Node]:
+def _model(rows: list[FbxNode]) -> list[FbxNode]:
     return [
         node("Version", 232),
         node("Properties70", below=rows),
@@ -141,7 +141,7 @@ def _model(rows: list[Node]) -> list[Node]:
     ]
 
 
-def _add_bind_pose(document: Document, poses: FilePoses, models: list[Long]) -> None:
+def _add_bind_pose(document: FbxDocument, poses: FilePoses, models: list[Long]) -> None:
     nodes = [
         node("PoseNode", below=[node("Node", model), node("Matrix", matrix.T.reshape(-1))])
         for model, matrix in zip(models, poses.bind_matrices(), strict=True)
@@ -150,7 +150,7 @@ def _add_bind_pose(document: Document, poses: FilePoses, models: list[Long]) -> 
     document.add("Pose", "bind", "Pose", "BindPose", below)
 
 
-def _add_animation(document: Document, poses: FilePoses, models: list[Long], angles: Array) -> None:
+def _add_animation(document: FbxDocument, poses: FilePoses, models: list[Long], angles: Array) -> None:
     """Add one stack of one layer, with curves of rotation for all joints and of position for those that move."""
     frames = len(angles)
     times = np.array([ticks(frame, poses.fps) for frame in range(frames)], np.int64)
@@ -158,7 +158,7 @@ def _add_animation(document: Document, poses: FilePoses, models: list[Long], ang
     rows = [
         prop(f"{kind}{end}", "time", (at,))
         for kind in ("Local", "Reference")
-        for end, at in zip(("Start", "Stop"), span)
+        for end, at in zip(("Start", "Stop"), span, strict=True)
     ]
     stack = document.add("AnimationStack", TAKE, "AnimStack", "", [node("Properties70", below=rows)])
     layer = document.add("AnimationLayer", "BaseLayer", "AnimLayer", "", [])
@@ -177,7 +177,7 @@ def _add_animation(document: Document, poses: FilePoses, models: list[Long], ang
                 document.connect(curve, curves, f"d|{axis}")
 
 
-def _curve(times: np.ndarray, values: Array) -> list[Node]:
+def _curve(times: np.ndarray, values: Array) -> list[FbxNode]:
     """Return the contents of a curve: one linear key a frame."""
     return [
         node("Default", float(values[0])),

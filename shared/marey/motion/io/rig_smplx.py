@@ -16,11 +16,33 @@ from marey.motion.rigs.make_rig import Node, make_rig
 from marey.motion.rigs.rig import Rig
 
 _FINGERS = [f"{finger}{n}" for finger in ("index", "middle", "pinky", "ring", "thumb") for n in (1, 2, 3)]
-JOINTS = (
-    "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot "
-    "neck left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist "
-    "jaw left_eye_smplhf right_eye_smplhf"
-).split() + [f"{side}_{finger}" for side in ("left", "right") for finger in _FINGERS]
+JOINTS = [
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "left_knee",
+    "right_knee",
+    "spine2",
+    "left_ankle",
+    "right_ankle",
+    "spine3",
+    "left_foot",
+    "right_foot",
+    "neck",
+    "left_collar",
+    "right_collar",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "jaw",
+    "left_eye_smplhf",
+    "right_eye_smplhf",
+] + [f"{side}_{finger}" for side in ("left", "right") for finger in _FINGERS]
 """Names of the 55 joints in the order of the model's arrays."""
 _HAND = {
     f"{side}_{f}": f"{side}_{f[:-1]}{int(f[-1]) - 1}" for side in ("left", "right") for f in _FINGERS if f[-1] > "1"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from marey.motion.io.fbx_document import Document
-from marey.motion.io.fbx_write import add_motion, apart
+from marey.motion.io.fbx_document import FbxDocument
+from marey.motion.io.fbx_write import add_motion, off_parent_axis
 from marey.motion.io.file_poses import rigged_poses
 from marey.motion.rigs.rigged import RiggedMotion
 
@@ -14,6 +14,6 @@ def format_rigged_fbx(motion: RiggedMotion) -> bytes:
     Raises:
         InvalidInput: numbers that are not finite.
     """
-    document, poses = Document(), apart(rigged_poses(motion, "fbx"))
+    document, poses = FbxDocument(), off_parent_axis(rigged_poses(motion, "fbx"))
     add_motion(document, poses)
     return document.encode(fps=poses.fps, frames=len(poses.rotations), unit=poses.unit, up=poses.up)

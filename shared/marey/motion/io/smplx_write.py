@@ -20,8 +20,8 @@ BODY, FACE = 22, 25
 
 
 def format_smplx(motion: RiggedMotion) -> bytes:
-    """Return the bytes of the npz file: metres, Z up, facing -Y, on the mean body of the model. Equal motions give equal
-    bytes.
+    """Return the bytes of the npz file: metres, Z up, facing -Y, on the mean body of the model. Equal motions give
+    equal bytes.
 
     The pelvis stands at `J0 + trans`, where J0 is its place in the model, and the whole body is turned about it by
     `root_orient`. Face and fingers are at rest.
@@ -49,7 +49,7 @@ def format_smplx(motion: RiggedMotion) -> bytes:
     if not (np.isfinite(poses).all() and np.isfinite(trans).all()):
         raise InvalidInput("the motion holds NaN or infinite numbers", where=rig.name)
     buffer = io.BytesIO()
-    np.savez(buffer, **_arrays(poses, trans, motion.fps))
+    np.savez(buffer, allow_pickle=False, **_arrays(poses, trans, motion.fps))
     return buffer.getvalue()
 
 
@@ -60,11 +60,11 @@ def _arrays(poses: NDArray[Any], trans: NDArray[Any], fps: float) -> dict[str, N
     return {
         "surface_model_type": np.array(SOURCE),
         "gender": np.array("neutral"),
-        "mocap_frame_rate": np.float64(fps),
-        "mocap_framerate": np.float64(fps),
-        "mocap_time_length": np.float64(len(poses) / fps),
+        "mocap_frame_rate": np.array(fps, np.float64),
+        "mocap_framerate": np.array(fps, np.float64),
+        "mocap_time_length": np.array(len(poses) / fps, np.float64),
         "betas": np.zeros(BETAS),
-        "num_betas": np.int64(BETAS),
+        "num_betas": np.array(BETAS, np.int64),
         "trans": trans.astype(np.float32),
         "poses": poses,
         "root_orient": poses[:, :3],

@@ -119,7 +119,7 @@ def _add_skeleton(pxr: Any, stage: Any, poses: FilePoses, paths: list[str]) -> N
 
 
 def _add_animation(pxr: Any, stage: Any, poses: FilePoses, paths: list[str]) -> None:
-    """Add the animation: rotations and translations of all joints in each frame, since the format asks for whole sets."""
+    """Add the animation: rotations and translations of all joints in each frame, as the format asks for."""
     animation = pxr.UsdSkel.Animation.Define(stage, f"{ROOT}/Skeleton/Animation")
     animation.CreateJointsAttr(paths)
     frames, count = poses.rotations.shape[:2]

@@ -30,7 +30,8 @@ BONES = frozenset(
 
 
 def format_vrma(clip: Posed, options: ExportOptions = PLAIN) -> bytes:
-    """Return the bytes of a VRM animation: metres, Y up, +Z in front, in the T-pose at rest. Equal clips give equal bytes.
+    """Return the bytes of a VRM animation: metres, Y up, +Z in front, in the T-pose at rest. Equal clips give equal
+    bytes.
 
     Raises:
         InvalidInput: a bone that VRM requires is not found in the skeleton, or numbers that are not finite.
