@@ -13,7 +13,7 @@ from marey.motion.rigs.make_rig import Node, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import about, conjugate, from_rotvec, multiply, rotate, to_matrix
 from marey.motion.skeleton import HUMANML3D
-from marey.motion.units import Z_TO_Y
+from marey.motion.units import Z_TO_Y, Up
 
 TRUNK = ("spine1", "spine2", "spine3")
 
@@ -33,7 +33,7 @@ class Change:
     pose: str
     spine: int
     unit: float
-    up: str
+    up: Up
     roll: bool = True
     twists: bool = True
     roots: bool = True
@@ -47,7 +47,7 @@ class Change:
             str(draw.choice(["t", "a", "random"])),
             int(draw.integers(1, 7)),
             float(draw.choice([0.01, 1.0, 100.0])),
-            str(draw.choice(["y", "z"])),
+            "z" if draw.integers(2) else "y",
             *(bool(draw.integers(2)) for _ in range(4)),
         )
 
@@ -83,13 +83,17 @@ class Change:
         rest = HUMANML3D.rest.astype(np.float64)
         rest[:, 1] -= rest[:, 1].min()
         place = dict(zip(HUMANML3D.joint_names, rest, strict=True))
-        over = {n: HUMANML3D.joint_names[p] if p >= 0 else None for n, p in zip(HUMANML3D.joint_names, HUMANML3D.parents)}
+        parents = HUMANML3D.parents
+        over = {
+            name: HUMANML3D.joint_names[parents[joint]] if joint else None
+            for joint, name in enumerate(HUMANML3D.joint_names)
+        }
         chain = self.trunk()
         for name in TRUNK:
             del over[name]
         below = "pelvis"
         line = [place[name] for name in (*TRUNK, "neck")]
-        for number, (name, at) in enumerate(chain):
+        for name, at in chain:
             over[name], place[name] = below, line[int(at)] + (at % 1) * (line[min(int(at) + 1, 3)] - line[int(at)])
             below = name
         for name, parent in list(over.items()):
@@ -105,8 +109,14 @@ class Change:
             place |= {"world": np.zeros(3), "master": np.zeros(3)}
         names: list[str] = []
         while len(names) < len(over):
-            names += [name for name, parent in over.items() if name not in names and (parent is None or parent in names)]
-        return names, [-1 if over[n] is None else names.index(over[n]) for n in names], np.array([place[n] for n in names])
+            names += [
+                name for name, parent in over.items() if name not in names and (parent is None or parent in names)
+            ]
+        return (
+            names,
+            [-1 if over[n] is None else names.index(over[n]) for n in names],
+            np.array([place[n] for n in names]),
+        )
 
     def trunk(self) -> list[tuple[str, float]]:
         """Return the spine joints of the copy with their place: 0, 1, 2 are the original's, fractions lie between."""
@@ -151,4 +161,6 @@ def lively(clip: MotionClip, seed: int) -> MotionClip:
     root = clip.root.astype(np.float64)
     world = global_rotations(clip.skeleton, rotations)
     lowest = forward_kinematics(clip.skeleton, rotations, root, world=world)[..., 1].min()
-    return MotionClip.of(clip.skeleton, rotations, root - [0, lowest, 0], clip.contacts, clip.fps, manifest=clip.manifest)
+    return MotionClip.of(
+        clip.skeleton, rotations, root - [0, lowest, 0], clip.contacts, clip.fps, manifest=clip.manifest
+    )
