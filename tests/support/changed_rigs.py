@@ -125,7 +125,7 @@ class Change:
         if self.spine == 2:
             return [("spine1", 0.0), ("spine3", 2.0)]
         extra = [0.5, 1.5, 2.5][: self.spine - 3]
-        return [(f"spine{n + 1}" if n in (0, 1, 2) else f"spine_{n}", n) for n in sorted([0.0, 1.0, 2.0, *extra])]
+        return [(f"spine{int(n) + 1}" if n in (0, 1, 2) else f"spine_{n}", n) for n in sorted([0.0, 1.0, 2.0, *extra])]
 
     def motion(self, clip: MotionClip) -> MotionClip:
         """Return the clip with a spine that bends where the copy has joints, so that it can follow."""

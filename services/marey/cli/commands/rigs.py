@@ -44,9 +44,8 @@ def show(
     for note in about["notes"]:
         console.result(f"{'note':<8} {note}")
     rows = [(part, found["joint"], found["how"]) for part, found in about["parts"].items()]
-    console.table(
-        ("part", "joint", "found by"), [*rows, *((role, joint, "") for joint, role in about["others"].items())]
-    )
+    rows += [(role, joint, "") for joint, role in about["others"].items()]
+    console.table(("part", "joint", "found by"), rows)
 
 
 def describe(body: Body) -> dict[str, Any]:
