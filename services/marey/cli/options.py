@@ -247,7 +247,7 @@ Rig = Annotated[
     typer.Option(
         "--rig",
         metavar="NAME|FILE",
-        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .gltf, .vrm, .fbx, .bvh, .json,"
+        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json,"
         " .npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
     ),
 ]

@@ -11,7 +11,7 @@ from marey.motion.feet import find_contacts
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
-from marey.motion.rigs.by_words import feet_and_facing
+from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import Array, about, multiply, rotate
 from marey.motion.skeleton import known_order, skeleton_of
 

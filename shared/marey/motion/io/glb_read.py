@@ -21,7 +21,7 @@ from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.files import read_limited
 from marey.motion.io.glb_write import BIN, FEET, FLOAT, GENERATOR, JSON, MAGIC, VERSION
 from marey.motion.io.rigged_glb_read import hips_motion
-from marey.motion.rigs.by_words import feet_and_facing
+from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import Array, conjugate, multiply, rotate
 from marey.motion.skeleton import skeleton_of
 

@@ -25,8 +25,8 @@ from marey.motion.units import METRES
 
 UNITS = ("cm", "m", "in", "mm", "ft")
 """Units in which BVH files are found, the usual one first."""
-PERSON = (0.55, 1.15)
-"""Metres of legs of a person, from which a unit is told."""
+FIGURE, PERSON = (0.25, 2.5), (0.55, 1.15)
+"""Metres of legs: of any figure, for which the usual unit is kept, and of a person, from which another unit is told."""
 
 
 def parse_bvh_rig(data: bytes, where: str = "bvh") -> Rig:
@@ -76,7 +76,8 @@ def _with_unit(rig: Rig) -> Rig:
         leg = Body.of(rig, sized=False).leg
     except InvalidInput:
         leg = 0.0
-    fits = [unit for unit in UNITS if PERSON[0] <= leg * METRES[unit] <= PERSON[1]]
+    usual = FIGURE[0] <= leg * METRES[UNITS[0]] <= FIGURE[1]
+    fits = [unit for unit in UNITS if usual or PERSON[0] <= leg * METRES[unit] <= PERSON[1]]
     name = fits[0] if fits else UNITS[0]
     metres = METRES[name]
     return replace(

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
+from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import forward_kinematics, global_rotations
 from marey.motion.rigs.body import Body
 from marey.motion.rigs.rig import Rig
@@ -91,3 +93,26 @@ def body_of(skeleton: Skeleton) -> Body:
         InvalidInput: it has no legs that can be told.
     """
     return _body_of(skeleton.name, skeleton.joint_names, skeleton.parents, skeleton.offsets.tobytes())
+
+
+def source_on(body: Body, clip: BvhClip, contacts: NDArray[np.bool_] | None = None) -> Source:
+    """Return a BVH clip as a motion of a rig whose rest pose is known from another file, such as one that begins with a
+    T-pose.
+
+    Args:
+        body: the rig, with the joints of the clip in any order.
+        clip: the motion.
+        contacts: (T, 4) bool, which feet stand; None = none does.
+
+    Raises:
+        InvalidInput: a joint of the rig is not in the clip.
+    """
+    names = clip.skeleton.joint_names
+    missing = [name for name in body.rig.joint_names if name not in names]
+    if missing:
+        raise InvalidInput(f"the motion has no joint {missing[0]!r}", where=body.rig.name)
+    order = [names.index(name) for name in body.rig.joint_names]
+    world = global_rotations(clip.skeleton, clip.rotations)[:, order]
+    turned = multiply(world, conjugate(multiply(body.upright, body.rig.orientations)))
+    stands = np.zeros((len(world), 4), bool) if contacts is None else contacts
+    return Source(body, turned, clip.joints()[:, order], stands, clip.fps)

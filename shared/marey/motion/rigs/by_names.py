@@ -8,7 +8,7 @@ from typing import cast
 from marey.motion.rigs.families import best_family
 from marey.motion.rigs.parts import FINGER_JOINTS, FINGERS, SIDES, sided
 from marey.motion.rigs.rig import Rig
-from marey.motion.rigs.tree import above, hangs_on
+from marey.motion.rigs.tree import above, between, hangs_on
 from marey.motion.rigs.words import CONTROL, ENDS, TWISTS, read_names
 
 # In order of confidence: `shoulder` is the upper arm in SMPL and the collar bone elsewhere, `hip` the thigh in some.
@@ -73,6 +73,9 @@ class Finder:
                 for part, joint in fingers.items():
                     parts[f"{side}_{part}"] = joint
                     how.setdefault(f"{side}_{part}", "words")
+            wrist = self._wrist(parts, side)
+            if wrist is not None:
+                parts[f"{side}_hand"], how[f"{side}_hand"] = wrist, "words"
             if f"{side}_foot" in parts and f"{side}_toes" not in parts:
                 add({f"{side}_toes": joint for joint in self._toes(parts[f"{side}_foot"])}, "tree")
         return parts, how, None if family is None else family[0].name
@@ -130,6 +133,13 @@ class Finder:
             joints.sort(key=lambda joint: len(above(self.rig.parents, joint)))
             found.update({f"{finger}{n}": joint for n, joint in enumerate(joints[:FINGER_JOINTS], start=1)})
         return found
+
+    def _wrist(self, parts: Mapping[str, int], side: str) -> int | None:
+        """Return a joint named wrist between the lower arm and what is called the hand."""
+        arm, hand = parts.get(f"{side}_lower_arm"), parts.get(f"{side}_hand")
+        if arm is None or hand is None:
+            return None
+        return next((j for j in between(self.rig.parents, arm, hand) if self.words[j].word == "wrist"), None)
 
     def _toes(self, foot: int) -> list[int]:
         """Return the only child of a foot that is no helper."""

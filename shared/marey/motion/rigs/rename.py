@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numpy as np
-
 from marey.core.errors import InvalidInput
 from marey.motion.export_options import Names
-from marey.motion.rigs.joint_map import map_joints
+from marey.motion.rigs.landmarks import map_names
 from marey.motion.rigs.parts import FINGERS, SIDES
-from marey.motion.rigs.rig import Rig
-from marey.motion.rotations import IDENTITY
 
 CENTRE: dict[Names, dict[str, str]] = {
     "mixamo": {
@@ -67,21 +63,10 @@ def renamed(joint_names: tuple[str, ...], parents: tuple[int, ...], names: Names
     Raises:
         InvalidInput: the parts of the body are not found, or two joints would have one name.
     """
-    count = len(joint_names)
-    rig = Rig(
-        name="skeleton",
-        joint_names=joint_names,
-        parents=parents,
-        positions=np.zeros((count, 3)),
-        orientations=np.tile(IDENTITY, (count, 1)),
-        scales=np.ones(count),
-        bones=(True,) * count,
-        tips=np.full((count, 3), np.nan),
-    )
     found = list(joint_names)
-    for part, joint in map_joints(rig).parts.items():
+    for part, joint in map_names(joint_names, parents).parts.items():
         found[joint] = name_of(part, names) or found[joint]
-    if len(set(found)) < count:
+    if len(set(found)) < len(found):
         raise InvalidInput(f"two joints would have one name in the spelling {names!r}", where="names", argument="names")
     return tuple(found)
 

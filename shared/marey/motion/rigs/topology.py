@@ -14,7 +14,7 @@ import numpy as np
 from marey.motion.rigs.parts import sided
 from marey.motion.rigs.rig import Rig
 
-SHORT = 0.35
+SHORT = 0.5
 """Length of a first bone relative to the next one, below which it is a hip or collar joint and no limb bone."""
 ALIKE = 0.1
 """Relative difference in length of two chains that are a pair."""
