@@ -14,7 +14,7 @@ PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all pytest mutants chaos soak lint docs check-deploy format bench lock wheels clean
+.PHONY: help setup demo test test-all clients pytest mutants chaos soak lint docs check-deploy format bench lock wheels clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -43,6 +43,18 @@ test-all: $(STAMP) ## Lint, and every test
 
 pytest: $(STAMP)
 	$(BIN)/pytest -q $(PARALLEL) $(SELECT)
+
+# Each in an environment of its own: they need other versions of numpy than Marey, and bpy exists for Python 3.11 alone.
+CLIENTS := out/clients
+clients: $(STAMP) ## Install Blender, ufbx, usd-core and three.js into out/clients, and open written files in them
+	for name in blender usd; do test -x $(CLIENTS)/$$name/bin/python || python3.11 -m venv $(CLIENTS)/$$name || exit 1; done
+	$(CLIENTS)/blender/bin/pip install -q bpy==4.5.15 pufbx==0.1.0
+	$(CLIENTS)/usd/bin/pip install -q usd-core==26.11 'numpy>=2.2,<3'
+	npm install --silent --no-audit --no-fund --prefix $(CLIENTS)/three \
+	  three@0.187.0 gltf-validator@2.0.0-dev.3.10 @pixiv/three-vrm@3.5.5 @pixiv/three-vrm-animation@3.5.5
+	MAREY_REQUIRE_CLIENTS=1 MAREY_BPY_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python \
+	  MAREY_UFBX_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python MAREY_USD_PYTHON=$(CURDIR)/$(CLIENTS)/usd/bin/python \
+	  MAREY_THREE=$(CURDIR)/$(CLIENTS)/three $(BIN)/pytest -q -n 2 --dist loadfile -m '' tests/clients
 
 mutants: $(STAMP) ## 150 mutants each of models, jobs and motion; SEED=1 draws those of a seed, or goes on with them
 	$(BIN)/python -m tests.mutants $(if $(SEED),--seed $(SEED))

@@ -19,6 +19,7 @@ from marey.cli.commands import (
     jobs,
     models,
     review,
+    rigs,
     serve,
     streams,
     submit,
@@ -121,6 +122,7 @@ app.command("api")(serve.api)
 app.command("probe")(serve.probe)
 app.add_typer(text.app, name="text")
 app.add_typer(models.app, name="models")
+app.add_typer(rigs.app, name="rigs")
 app.add_typer(data.app, name="data")
 app.add_typer(train.app, name="train")
 app.add_typer(evaluations.app, name="eval")

@@ -87,6 +87,16 @@ class PlacementOption(StrEnum):
     KEEP = "keep"
 
 
+class NamesOption(StrEnum):
+    """Spellings of joint names."""
+
+    MIXAMO = "mixamo"
+    UE5 = "ue5"
+    HUMANIK = "humanik"
+    SMPLX = "smplx"
+    VRM = "vrm"
+
+
 def export_options(
     bvh_root: BvhRootOption,
     root_bone: bool,
@@ -95,6 +105,9 @@ def export_options(
     rest_pose: RestPoseOption,
     placement: PlacementOption,
     mesh: bool,
+    rig: str | None = None,
+    rig_map: Path | None = None,
+    names: NamesOption | None = None,
 ) -> ExportOptions:
     """Return the options of the files.
 
@@ -109,6 +122,9 @@ def export_options(
         rest_pose=rest_pose.value,
         placement=placement.value,
         mesh=mesh,
+        rig=rig,
+        rig_map=None if rig_map is None else str(rig_map),
+        names=None if names is None else names.value,
     )
 
 
@@ -131,7 +147,7 @@ Formats = Annotated[
     typer.Option(
         "--format",
         metavar="FORMAT",
-        help="File format, such as bvh, glb or mp4; may be repeated. None given = all but films.",
+        help="File format, such as bvh, fbx, glb or mp4; may be repeated. None given = npz and bvh.",
     ),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; created if missing.")]
@@ -215,11 +231,38 @@ TPoseFrame = Annotated[
 ]
 RestPose = Annotated[
     RestPoseOption,
-    typer.Option("--rest-pose", help="Rest pose of BVH files: T-pose, or the A-pose of a rig whose A-pose is known."),
+    typer.Option(
+        "--rest-pose", help="Rest pose of BVH, FBX and USD files: T-pose, or the A-pose of a rig whose A-pose is known."
+    ),
 ]
 Placement = Annotated[
     PlacementOption,
     typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
 ]
-Mesh = Annotated[bool, typer.Option("--mesh", help="Add a neutral body to glb files, for viewers that show no bones.")]
+Mesh = Annotated[
+    bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
+]
+Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="NAME|FILE",
+        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json,"
+        " .npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
+    ),
+]
+RigMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--map", metavar="FILE", help="JSON of parts of the body and joint names of the rig, where they are not found."
+    ),
+]
+JointNames = Annotated[
+    NamesOption | None,
+    typer.Option(
+        "--names",
+        help="Rename the joints, and nothing else, for tools that retarget by name. A renamed clip put straight onto a "
+        "Mixamo or Manny character collapses, for the joints of those have other axes: use --rig.",
+    ),
+]
 TEMPLATE = DEFAULT_TEMPLATE

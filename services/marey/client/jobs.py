@@ -28,7 +28,7 @@ from marey.client.types.jobs import (
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
-from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Placement
+from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Names, Placement
 from marey.vocabulary.scope import ScopePolicy
 
 Row = Item | Mapping[str, object] | str
@@ -388,6 +388,9 @@ class Jobs(Resource):
         tpose_frame: bool = False,
         placement: Placement = "origin",
         mesh: bool = False,
+        rig: str | None = None,
+        rig_map: str | None = None,
+        names: Names | None = None,
         on_progress: OnFetched | FetchObserver | None = None,
     ) -> Sequence[FetchedItem]:
         """Fetch the motions that a job has so far, eight files at a time, with a `manifest.csv`.
@@ -402,8 +405,8 @@ class Jobs(Resource):
             review: only motions with this review.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
-            bvh_root, root_bone, in_place, tpose_frame, placement, mesh: of files whose formats have these options; see
-                `docs/reference/formats.md`.
+            bvh_root, root_bone, in_place, tpose_frame, placement, mesh, rig, rig_map, names: of files whose formats
+                have these options; see `docs/reference/formats.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
 
@@ -434,6 +437,9 @@ class Jobs(Resource):
                 tpose_frame=tpose_frame,
                 placement=placement,
                 mesh=mesh,
+                rig=rig,
+                rig_map=rig_map,
+                names=names,
             ),
             observer=_Counting(on_progress) if callable(on_progress) else on_progress,
         )

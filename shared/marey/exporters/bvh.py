@@ -9,6 +9,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
     from marey.motion.io.bvh import BvhClip
+    from marey.motion.rigs.rigged import RiggedMotion
 
 
 def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
@@ -24,6 +25,17 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
 
         clip = change_rest_pose(clip, coordinates.rest_pose)
     return format_bvh(clip, unit=coordinates.unit, up=coordinates.up, options=coordinates).encode()
+
+
+def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
+    """Write a motion on a rig.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.rigged_bvh.format_rigged_bvh`.
+    """
+    from marey.motion.io.rigged_bvh import format_rigged_bvh
+
+    return format_rigged_bvh(motion, unit=coordinates.unit, up=coordinates.up, options=coordinates).encode()
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> BvhClip:
@@ -52,5 +64,8 @@ EXPORTER = Exporter(
     holds_prompt=False,
     encode=encode,
     decode=decode,
-    options=frozenset({"bvh_root", "root_bone", "in_place", "tpose_frame", "rest_pose", "placement"}),
+    options=frozenset(
+        {"bvh_root", "root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "rig", "rig_map", "names"}
+    ),
+    encode_rigged=encode_rigged,
 )

@@ -59,7 +59,7 @@ def convert(
     if isinstance(clip, BvhClip):
         notes = clip.notes
         clip = clip if fps is None else resample_bvh(clip, fps)
-        clip = clip if writer is reader else clip_from_bvh(clip, source.name)
+        clip = clip if writer is reader and export.rig is None else clip_from_bvh(clip, source.name)
     elif fps is not None:
         clip = resample(clip, fps)
     write_atomically(target, writer.write(clip, Coordinates.of(export, unit, up)))
@@ -81,12 +81,13 @@ def read_motion(path: Path, coordinates: Coordinates) -> MotionClip:
 
 
 def _exporter_for(path: Path) -> Exporter[Any]:
-    extension = path.suffix.lower().removeprefix(".")
-    found = next((each for each in exporters().values() if each.extension == extension), None)
-    if found is None:
+    """Return the exporter whose extension a name has; of two, the longer: `a.smplx.npz` is no npz of a motion."""
+    name = path.name.lower()
+    found = [each for each in exporters().values() if name.endswith(f".{each.extension}")]
+    if not found:
         known = ", ".join(f".{each.extension}" for each in exporters().values())
         raise InvalidInput(f"`{path.suffix}` is not a known motion format", where=str(path), hint=f"Known: {known}.")
-    return found
+    return max(found, key=lambda each: len(each.extension))
 
 
 def _decode(reader: Exporter[Any], path: Path, coordinates: Coordinates) -> MotionClip | BvhClip:

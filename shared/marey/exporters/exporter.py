@@ -5,18 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from marey.motion.export_options import ExportOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.io.bvh import BvhClip
+    from marey.motion.rigs.rigged import RiggedMotion
     from marey.motion.units import Unit, Up
 
 Decoded = TypeVar("Decoded")
 """The result of `Exporter.decode`: a `MotionClip`, or a `BvhClip` for files that leave open how the body faces."""
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
-_EXTENSION = re.compile(r"[a-z0-9]{1,9}")
+_EXTENSION = re.compile(r"(?=.{1,9}\Z)[a-z0-9]+(\.[a-z0-9]+)?")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
 _DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(ExportOptions)}
 
@@ -42,7 +44,7 @@ class Exporter(Generic[Decoded]):
     Attributes:
         format: its name in routes, in the database and after `--format`: `[a-z0-9]{1,16}`. It never changes.
         media_type: the `Content-Type` of downloads.
-        extension: the ending of file names, without the dot.
+        extension: the ending of file names, without the dot before it; it may have a part more, such as `smplx.npz`.
         holds_prompt: files hold the clip's manifest, which has the prompt. When a prompt is erased, stored files are
             decoded and encoded again with the remaining manifest; such a format needs a `decode` that returns a
             `MotionClip` with the manifest.
@@ -51,6 +53,8 @@ class Exporter(Generic[Decoded]):
         stored: workers write it for every motion, and `marey generate` where no format is named; False = it is made on
             request alone, by `generate`, `convert` and `fetch`, because it takes long or can be made at any time.
         options: names of the `ExportOptions` that `encode` heeds; the others of its coordinates have their defaults.
+        encode_rigged: write a motion that was put on a rig, with the rig's hierarchy, rest pose and joint axes; needed
+            for the option `rig`. `root_bone`, `in_place`, `tpose_frame` and `placement` are in the motion already.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
     """
@@ -63,6 +67,7 @@ class Exporter(Generic[Decoded]):
     decode: Callable[[bytes, str, Coordinates], Decoded] | None = None
     options: frozenset[str] = frozenset()
     stored: bool = True
+    encode_rigged: Callable[[RiggedMotion, Coordinates], bytes] | None = None
 
     def __post_init__(self) -> None:
         """Check the names.
@@ -76,10 +81,22 @@ class Exporter(Generic[Decoded]):
                 raise ValueError(f"{value!r} does not match {pattern.pattern}")
         if self.holds_prompt and self.decode is None:
             raise ValueError(f"{self.format} holds prompts, so it needs `decode`: erasure rewrites its files")
+        if ("rig" in self.options) != (self.encode_rigged is not None):
+            raise ValueError(f"{self.format} needs both the option `rig` and `encode_rigged`, or neither")
         if unknown := self.options - _DEFAULTS.keys():
             raise ValueError(f"{self.format} has unknown options: {', '.join(sorted(unknown))}")
 
     def write(self, clip: MotionClip | Decoded, coordinates: Coordinates) -> bytes:
-        """Encode a clip with those of the coordinates that the format has."""
+        """Encode a clip with those of the coordinates that the format has.
+
+        Raises:
+            InvalidInput: the clip cannot be written with these options, or put on the rig.
+        """
         others = {name: value for name, value in _DEFAULTS.items() if name not in self.options}
-        return self.encode(clip, replace(coordinates, **others))
+        kept = replace(coordinates, **others)
+        if kept.rig is None or self.encode_rigged is None:
+            return self.encode(clip, kept)
+        from marey.motion.io.convert import as_motion_clip
+        from marey.motion.retarget.apply import put_on_rig
+
+        return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept), kept)

@@ -8,6 +8,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.rigs.rigged import RiggedMotion
 
 
 def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
@@ -23,6 +24,17 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     from marey.viz.mannequin import mannequin
 
     return format_glb(clip, coordinates, mannequin(clip))
+
+
+def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
+    """Write a motion on a rig: always in metres, Y up.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.rigged_glb.format_rigged_glb`.
+    """
+    from marey.motion.io.rigged_glb import format_rigged_glb
+
+    return format_rigged_glb(motion, options=coordinates)
 
 
 def decode(data: bytes, where: str, coordinates: Coordinates) -> MotionClip:
@@ -43,6 +55,7 @@ EXPORTER = Exporter(
     holds_prompt=True,
     encode=encode,
     decode=decode,
-    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement", "mesh"}),
+    options=frozenset({"root_bone", "in_place", "tpose_frame", "placement", "mesh", "rig", "rig_map", "names"}),
+    encode_rigged=encode_rigged,
     stored=False,
 )

@@ -1,4 +1,4 @@
-"""Motions: clips in memory, their npz, BVH and glb files, and the geometry behind them. Needs the extra `motion`.
+"""Motions: clips in memory, their npz, BVH, glb and FBX files, and the geometry behind them. Needs the extra `motion`.
 
     from marey.motion import load_npz, write_bvh
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from marey.motion.clip import MotionClip, load_npz
     from marey.motion.io.bvh import BvhClip, read_bvh, write_bvh
     from marey.motion.io.convert import clip_from_bvh
+    from marey.motion.io.fbx_read import read_fbx
+    from marey.motion.io.fbx_write import write_fbx
     from marey.motion.io.glb_read import read_glb
     from marey.motion.io.glb_write import write_glb
 
@@ -29,6 +31,8 @@ __getattr__ = lazy_names(
         "marey.motion.clip": "MotionClip load_npz",
         "marey.motion.io.bvh": "BvhClip read_bvh write_bvh",
         "marey.motion.io.convert": "clip_from_bvh",
+        "marey.motion.io.fbx_read": "read_fbx",
+        "marey.motion.io.fbx_write": "write_fbx",
         "marey.motion.io.glb_read": "read_glb",
         "marey.motion.io.glb_write": "write_glb",
     },
@@ -41,7 +45,9 @@ __all__ = [
     "clip_from_bvh",
     "load_npz",
     "read_bvh",
+    "read_fbx",
     "read_glb",
     "write_bvh",
+    "write_fbx",
     "write_glb",
 ]

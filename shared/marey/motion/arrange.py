@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.export_options import PLAIN, ExportOptions
+from marey.motion.rigs.rename import renamed
 from marey.motion.rotations import IDENTITY, Array, about, conjugate, multiply, rotate, unroll
 from marey.motion.skeleton import Skeleton
 
@@ -62,8 +63,28 @@ def arrange(clip: Posed, options: ExportOptions = PLAIN) -> Arranged:
     """Return the poses of a clip with these options.
 
     Raises:
-        InvalidInput: bones of the clip change their length, the placement in its manifest cannot be read, or a root
-            bone is wanted where a joint has its name.
+        InvalidInput: bones of the clip change their length, the placement in its manifest cannot be read, a root bone
+            is wanted where a joint has its name, or the parts of the body that other names need are not found.
+    """
+    rotations, root, heading, removed = moved(clip, options)
+    skeleton = clip.skeleton.with_offsets(np.concatenate([_standing(clip.skeleton)[None], clip.skeleton.offsets[1:]]))
+    if options.names is not None:
+        skeleton = replace(skeleton, joint_names=renamed(skeleton.joint_names, skeleton.parents, options.names))
+    ends = cast("Array | None", getattr(clip, "ends", None))
+    arranged = Arranged(skeleton, rotations, root[:, None], clip.fps, ends, removed)
+    if options.root_bone:
+        arranged = _with_root_bone(arranged, heading)
+    return _with_rest_frame(arranged) if options.tpose_frame else arranged
+
+
+def moved(clip: Posed, options: ExportOptions) -> tuple[Array, Array, Array, dict[str, Any]]:
+    """Move a clip as a whole: in place, or where it was taken from.
+
+    Returns:
+        Rotations (T, J, 4), root (T, 3) in metres, heading (T, 4) or (1, 4), and what `in_place` took out.
+
+    Raises:
+        InvalidInput: bones of the clip change their length, or its placement cannot be read.
     """
     if getattr(clip, "positions", None) is not None:
         raise InvalidInput("bones of this clip change their length, and files have one offset per joint")
@@ -80,12 +101,7 @@ def arrange(clip: Posed, options: ExportOptions = PLAIN) -> Arranged:
         turn, shift = placement_of(clip)
         rotations[:, 0], heading = multiply(turn, rotations[:, 0]), multiply(turn, heading)
         root = rotate(turn, root) + shift
-    skeleton = clip.skeleton.with_offsets(np.concatenate([_standing(clip.skeleton)[None], clip.skeleton.offsets[1:]]))
-    ends = cast("Array | None", getattr(clip, "ends", None))
-    arranged = Arranged(skeleton, rotations, root[:, None], clip.fps, ends, removed)
-    if options.root_bone:
-        arranged = _with_root_bone(arranged, heading)
-    return _with_rest_frame(arranged) if options.tpose_frame else arranged
+    return rotations, root, heading, removed
 
 
 def headings(rotations: Array) -> Array:

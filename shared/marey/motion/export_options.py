@@ -11,6 +11,7 @@ BvhRoot = Literal["zero", "offset"]
 InPlace = Literal["travel", "heading"]
 Placement = Literal["origin", "keep"]
 RestPose = Literal["t", "a"]
+Names = Literal["mixamo", "ue5", "humanik", "smplx", "vrm"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,9 @@ class ExportOptions:
         rest_pose: T-pose, or the A-pose of a rig whose A-pose is known.
         placement: put the motion where its manifest says it was taken from (`keep`), or leave it at the origin.
         mesh: add a neutral body of round limbs, which moves with the skeleton.
+        rig: put the motion on a rig: a reference skeleton (`mixamo`, `ue4`, `humanik`) or a file with a skeleton.
+        rig_map: JSON file that says which joint of the rig is which part of the body, where the joints are not found.
+        names: names of the joints, without a change of anything else.
 
     Raises:
         InvalidInput: two options contradict each other.
@@ -40,6 +44,9 @@ class ExportOptions:
     rest_pose: RestPose = "t"
     placement: Placement = "origin"
     mesh: bool = False
+    rig: str | None = None
+    rig_map: str | None = None
+    names: Names | None = None
 
     def __post_init__(self) -> None:
         if self.root_bone and self.bvh_root == "offset":
@@ -62,6 +69,19 @@ class ExportOptions:
                 where="placement",
                 hint="Leave out placement, or in-place.",
                 argument="placement",
+            )
+
+        for name in ("mesh", "names", "rest_pose") if self.rig else ():
+            if name in self.chosen:
+                raise InvalidInput(
+                    "a motion on a rig has the joints and the rest pose of the rig",
+                    where=name,
+                    hint=f"Leave out {name}, or the rig.",
+                    argument=name,
+                )
+        if self.rig_map and not self.rig:
+            raise InvalidInput(
+                "a map of joints belongs to a rig", where="rig_map", hint="Name the rig too.", argument="rig_map"
             )
 
     @property

@@ -43,7 +43,7 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
     legs = [[hip, skeleton.children[hip][0], chain[-1]] for hip, chain in zip((l_hip, r_hip), chains, strict=True)]
     held = [smooth_above(stands[:, side].astype(np.float64), 0.04 * fps) for side in range(2)]
     needed = [
-        hold * _needed_drop(before[:, leg], joints[:, leg[0]], joints[:, chain])
+        hold * needed_drop(before[:, leg], joints[:, leg[0]], joints[:, chain])
         for leg, chain, hold in zip(legs, chains, held, strict=True)
     ]
     drop = smooth_above(np.max(needed, axis=0), 0.1 * fps)
@@ -53,7 +53,7 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
     for leg, chain, hold in zip(legs, chains, held, strict=True):
         hip, ankle = joints[:, leg[0]], joints[:, leg[2]]
         was = _without_backward_bend(before[:, leg], ahead, fps)
-        wanted = _soft_distance(was, length(ankle - hip), fps)
+        wanted = soft_distance(was, length(ankle - hip), fps)
         joints[:, chain] = draw_foot(joints[:, chain], hip, wanted, hold)
         joints[:, leg[1]] = two_bone_knee(was, hip, joints[:, leg[2]], ahead)
 
@@ -64,8 +64,14 @@ def leg_lengths(leg: Array) -> tuple[Array, Array]:
     return bones[..., 0], bones[..., 1]
 
 
-def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
-    """Return by how much (T,) the hip must come down until leg and foot together reach the toe."""
+def needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
+    """Return by how much (T,) the hip must come down until leg and foot together reach the toe.
+
+    Args:
+        leg: (T, 3, 3) hip, knee and ankle, for its lengths, metres.
+        hip: (T, 3) where the hip is.
+        foot: (T, n, 3) the foot, toe first and ankle last.
+    """
     across, span = foot[:, 0] - hip, length(foot[:, -1] - foot[:, 0])
     reach = 0.99 * (sum(leg_lengths(leg)) + span)
     room = np.sqrt(np.maximum(reach**2 - across[:, 0] ** 2 - across[:, 2] ** 2, 0.0))
@@ -96,7 +102,7 @@ def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
     return np.where((cover > 0)[:, None, None], fixed, leg)
 
 
-def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
+def soft_distance(leg: Array, distance: Array, fps: float) -> Array:
     """Return distances (T,) from hip to ankle, close to the requested ones, but without jumps of the knee.
 
     The nearer a leg is to `STRETCH`, the less it is stretched; and where it is nearly straight, what the knee moves off

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.clip import MotionClip
-from marey.motion.io.glb_write import Mesh
+from marey.motion.io.mesh import Mesh
 from marey.motion.rotations import Array, cross, normalize
 from marey.viz.body import LimbShape, dress_clip
 

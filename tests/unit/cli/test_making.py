@@ -92,8 +92,8 @@ def test_a_made_file_replaces_another_only_on_request(client: Transport, tmp_pat
 
 
 def test_a_format_that_is_known_nowhere_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(Conflict, match="was not made as usd"):
-        plan([item()], tmp_path, ["usd"])
+    with pytest.raises(Conflict, match="was not made as abc"):
+        plan([item()], tmp_path, ["abc"])
 
 
 def test_without_an_npz_no_file_can_be_made(tmp_path: Path) -> None:

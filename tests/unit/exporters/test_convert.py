@@ -63,5 +63,8 @@ def test_a_format_that_is_only_written_is_not_read(tmp_path):
     convert(tmp_path / "a.npz", tmp_path / "b.wr")
     with pytest.raises(InvalidInput, match="can be written, but not read"):
         convert(tmp_path / "b.wr", tmp_path / "c.npz")
-    with pytest.raises(InvalidInput, match=r"Known: \.bvh, \.gif, \.glb, \.mp4, \.npz, \.ty, \.webp, \.wr\."):
-        convert(tmp_path / "a.npz", tmp_path / "b.fbx")
+    with pytest.raises(
+        InvalidInput,
+        match=r"Known: \.bvh, \.fbx, \.gif, \.glb, \.mp4, \.npz, \.smplx\.npz, \.ty, \.usd, \.vrma, \.webp, \.wr\.",
+    ):
+        convert(tmp_path / "a.npz", tmp_path / "b.abc")

@@ -211,7 +211,11 @@ def test_options_that_contradict_each_other_are_refused(options: dict[str, Any])
 @pytest.mark.parametrize(
     ("formats", "options", "message"),
     [
-        (["npz"], {"root_bone": True}, "npz files have no such option\n  Formats that have root_bone: bvh, glb."),
+        (
+            ["npz"],
+            {"root_bone": True},
+            "npz files have no such option\n  Formats that have root_bone: bvh, fbx, glb, usd.",
+        ),
         (["glb", "npz"], {"bvh_root": "offset"}, "glb, npz files have no such option"),
     ],
 )

@@ -16,7 +16,7 @@ from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
-OWN = ["bvh", "gif", "glb", "mp4", "npz", "webp"]
+OWN = ["bvh", "fbx", "gif", "glb", "mp4", "npz", "smplx", "usd", "vrma", "webp"]
 NAMES = count()
 
 
@@ -33,10 +33,14 @@ def test_formats_of_marey_are_installed() -> None:
     found = {each.format: (each.extension, each.media_type) for each in exporters().values()}
     assert found == {
         "bvh": ("bvh", "text/plain; charset=utf-8"),
+        "fbx": ("fbx", "application/octet-stream"),
         "gif": ("gif", "image/gif"),
         "glb": ("glb", "model/gltf-binary"),
         "mp4": ("mp4", "video/mp4"),
         "npz": ("npz", "application/x-npz"),
+        "smplx": ("smplx.npz", "application/x-npz"),
+        "usd": ("usd", "model/vnd.usd"),
+        "vrma": ("vrma", "model/gltf-binary"),
         "webp": ("webp", "image/webp"),
     }
     assert list(exporters()) == OWN
@@ -52,7 +56,7 @@ def test_the_registry_needs_the_standard_library_only() -> None:
     assert done.stdout == "False\n"
 
 
-@pytest.mark.parametrize("name", ["bvh", "gif", "glb", "npz", "webp"])
+@pytest.mark.parametrize("name", ["bvh", "fbx", "gif", "glb", "npz", "vrma", "webp"])
 def test_a_format_says_whether_its_files_hold_the_prompt(name: str) -> None:
     data = exporter_of(name).encode(walker(seconds=0.1, prompt=SECRET), Coordinates())
     found = any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-16-le", "utf-32-le"))
@@ -96,7 +100,14 @@ def test_a_plugin_that_cannot_be_used_is_named(tmp_path: Path, exporter: str, en
 
 
 @pytest.mark.parametrize(
-    "values", [("../up", "toy", False), ("toy", "t.y", False), ("toy", "toy", True), ("t" * 17, "toy", False)]
+    "values",
+    [
+        ("../up", "toy", False),
+        ("toy", "t..y", False),
+        ("toy", "a.toy.file", False),
+        ("toy", "toy", True),
+        ("t" * 17, "toy", False),
+    ],
 )
 def test_names_that_do_not_fit_and_prompts_that_could_not_be_erased_are_refused(values: tuple[str, str, bool]) -> None:
     name, extension, holds_prompt = values

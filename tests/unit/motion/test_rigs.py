@@ -8,7 +8,7 @@ from marey.motion.clip import load_npz
 from marey.motion.feet import find_contacts
 from marey.motion.io.bvh import BvhClip, write_bvh
 from marey.motion.kinematics import facing
-from marey.motion.rigs import feet_and_facing
+from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import about, multiply, rotate
 from marey.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton, mirror_by_name
 from tests.support.walker import walker

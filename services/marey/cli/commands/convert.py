@@ -40,11 +40,11 @@ FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that
 def convert(
     source: Source,
     target: Annotated[
-        Path, typer.Argument(metavar="TARGET", help="A motion file or a film, such as .bvh, .glb or .mp4.")
+        Path, typer.Argument(metavar="TARGET", help="A motion file or a film, such as .bvh, .fbx or .mp4.")
     ],
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
-    unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
-    up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
+    unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH, FBX or USD result.")] = Unit.CENTIMETRE,
+    up: Annotated[Up, typer.Option("--up", help="Axis of a BVH, FBX or USD result that points up.")] = Up.Y,
     bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
     root_bone: options.RootBone = False,
     in_place: options.InPlace = None,
@@ -52,6 +52,9 @@ def convert(
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
     mesh: options.Mesh = False,
+    rig: options.Rig = None,
+    rig_map: options.RigMap = None,
+    names: options.JointNames = None,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     from_rest_pose: Annotated[
@@ -60,7 +63,7 @@ def convert(
     ] = options.RestPoseOption.T,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Convert a motion between BVH, glb, npz and installed formats, with another rate, unit, axis, root or pose."""
+    """Convert a motion between BVH, FBX, glb, npz and other formats, with another rate, unit, axis, root or pose."""
     from marey.core.extras import needs_extra
 
     try:
@@ -73,7 +76,9 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
-        export=options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh),
+        export=options.export_options(
+            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
+        ),
         source_unit=from_unit.value,
         source_up=from_up.value,
         source_rest_pose=from_rest_pose.value,

@@ -40,6 +40,9 @@ def fetch(
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
     mesh: options.Mesh = False,
+    rig: options.Rig = None,
+    rig_map: options.RigMap = None,
+    names: options.JointNames = None,
     only: Annotated[FetchReviewOption | None, typer.Option("--only", help="Only motions with this review.")] = None,
     prune: Annotated[
         bool,
@@ -56,7 +59,9 @@ def fetch(
     from marey.client import Client
 
     check_template(name_template)
-    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
+    export = options.export_options(
+        bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
+    )
     with Client() as client:
         found = find_all(client, "job", jobs)
         for job in found:
@@ -145,6 +150,7 @@ def fetch_job(
             formats=formats or None, name_template=template, review=None if only is None else only.value, prune=prune,
             overwrite=overwrite, on_progress=Observer(), bvh_root=export.bvh_root, root_bone=export.root_bone,
             in_place=export.in_place, tpose_frame=export.tpose_frame, placement=export.placement, mesh=export.mesh,
+            rig=export.rig, rig_map=export.rig_map, names=export.names,
         )  # fmt: skip
     for message in left:
         console.say(message)

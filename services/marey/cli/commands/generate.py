@@ -67,6 +67,9 @@ def generate(
     rest_pose: options.RestPose = options.RestPoseOption.T,
     placement: options.Placement = options.PlacementOption.ORIGIN,
     mesh: options.Mesh = False,
+    rig: options.Rig = None,
+    rig_map: options.RigMap = None,
+    names: options.JointNames = None,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
     overwrite: options.Overwrite = False,
@@ -77,7 +80,9 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
-    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
+    export = options.export_options(
+        bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
+    )
     kinds = _exporters(formats, export)
     defaults = row_defaults(
         sampling,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,7 @@ class Layout:
         ends: (J, 3) End Site offsets in metres; NaN or None = a short bone in the direction of the last one.
         unit: unit of the file's lengths.
         up: the axis of the file that points up.
-        moving: number of joints, from the root on, that have position channels: 2 with a root bone.
+        moving: joints with position channels: their number from the root on, such as 2 with a root bone, or the joints.
         root_offset: the root's OFFSET is its place in the rest pose; otherwise the OFFSETs of `moving` joints are zero.
     """
 
@@ -84,16 +85,16 @@ class Layout:
         ends: Array | None = None,
         unit: Unit = "cm",
         up: Up = "y",
-        moving: int = 1,
+        moving: int | Sequence[int] = 1,
         root_offset: bool = False,
     ) -> None:
         self.skeleton = skeleton
         self.up = up
-        self._moving = moving
+        self._moving = list(range(moving)) if isinstance(moving, int) else sorted(moving)
         self._scale = 1 / METRES[unit]
         self._offsets = self._turned(skeleton.offsets * self._scale)
         if not root_offset:
-            self._offsets[:moving] = 0
+            self._offsets[self._moving] = 0
         self._tips = self._turned(_tips(skeleton, ends) * self._scale)
         self._order: list[int] = []
         self._hierarchy = ["HIERARCHY"]
@@ -115,16 +116,19 @@ class Layout:
         """Format the lines of numbers, without their ends.
 
         Args:
-            positions: (T, moving, 3) metres, Y up, in the axes of the parents.
+            positions: (T, P, 3) of the moving joints in ascending order, metres, Y up, in the axes of the parents.
             angles: (T, J, 3) degrees, in the skeleton's order.
 
         Raises:
             InvalidInput: numbers that are not finite.
         """
         places = self._turned(np.asarray(positions, np.float64) * self._scale)
-        turns = angles[:, self._order]
-        columns = [column for joint in range(self._moving) for column in (places[:, joint], turns[:, joint])]
-        values = np.concatenate([*columns, turns[:, self._moving :].reshape(len(places), -1)], axis=1)
+        column = {joint: number for number, joint in enumerate(self._moving)}
+        columns: list[Array] = []
+        for joint in self._order:
+            columns += [places[:, column[joint]]] if joint in column else []
+            columns.append(angles[:, joint])
+        values = np.concatenate(columns, axis=1)
         if not np.isfinite(values).all():
             raise InvalidInput("the clip holds NaN or infinite numbers", where=self.skeleton.name)
         values = np.round(values, 6) + 0.0  # no -0
@@ -138,7 +142,7 @@ class Layout:
         self._order.append(j)
         children, pad = self.skeleton.children[j], "\t" * depth
         channels = "3 Zrotation Yrotation Xrotation"
-        if j < self._moving:
+        if j in self._moving:
             channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
         self._hierarchy += [
             f"{pad}{'JOINT' if j else 'ROOT'} {_word(self.skeleton.joint_names[j])}",

@@ -11,7 +11,7 @@ from marey.motion.feet import find_contacts
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
-from marey.motion.rigs import feet_and_facing
+from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import Array, about, multiply, rotate
 from marey.motion.skeleton import known_order, skeleton_of
 
@@ -89,3 +89,8 @@ def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
     if tree.feet:
         contacts = find_contacts(joints, tree, clip.fps)
     return MotionClip.of(tree, rotations, root, contacts, clip.fps, manifest=manifest)
+
+
+def as_motion_clip(clip: MotionClip | BvhClip) -> MotionClip:
+    """Return a clip as `MotionClip`, converted if it is a BVH clip."""
+    return clip_from_bvh(clip, "bvh") if isinstance(clip, BvhClip) else clip

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,6 +20,8 @@ from marey.motion.arrange import placement_of
 from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.files import read_limited
 from marey.motion.io.glb_write import BIN, FEET, FLOAT, GENERATOR, JSON, MAGIC, VERSION
+from marey.motion.io.rigged_glb_read import hips_motion
+from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import Array, conjugate, multiply, rotate
 from marey.motion.skeleton import skeleton_of
 
@@ -75,7 +78,9 @@ class _Document:
     def __init__(self, document: Mapping[str, Any], data: bytes, where: str) -> None:
         self.document, self.data, self.where = document, data, where
         self.extras: Mapping[str, Any] = document["asset"]["extras"]
-        self.nodes: list[Mapping[str, Any]] = document["nodes"][: len(document["skins"][0]["joints"])]
+        self.rigged: Mapping[str, Any] | None = self.extras.get("rigged")
+        joints = len(document["skins"][0]["joints"])
+        self.nodes: list[Mapping[str, Any]] = document["nodes"][: joints if self.rigged is None else None]
 
     def values(self, accessor: int) -> NDArray[np.float32]:
         """Return the numbers (N, width) of an accessor."""
@@ -101,6 +106,8 @@ class _Document:
 
 
 def _clip(file: _Document) -> MotionClip:
+    if file.rigged is not None:
+        return _rigged_clip(file, file.rigged)
     count, options = len(file.nodes), file.extras["options"]
     turns, places = file.tracks("rotation"), file.tracks("translation")
     rotations = np.stack([turns[joint] for joint in range(count)], axis=1)[..., [3, 0, 1, 2]]  # w x y z
@@ -120,18 +127,38 @@ def _clip(file: _Document) -> MotionClip:
     manifest = file.extras["manifest"]
     if not isinstance(manifest, dict) or not len(root) or np.abs(np.linalg.norm(rotations, axis=-1) - 1).max() > 1e-3:
         raise InvalidFile("has no frames, no manifest or rotations that are none", where=file.where)
-    fps = float(file.extras["fps"])
-    if not 0 < fps <= 1000:
-        raise InvalidFile(f"{fps:g} fps", where=file.where)
     clip = MotionClip.of(
         skeleton_of(tuple(names), tuple(parents), offsets),
         rotations,
         root,
         _contacts(file, len(root)),
-        fps,
+        _rate(file),
         manifest=cast("dict[str, Any]", manifest),
     )
     return _back_at_origin(clip) if options.get("placement") == "keep" else clip
+
+
+def _rigged_clip(file: _Document, rigged: Mapping[str, Any]) -> MotionClip:
+    """Return the body of a rig from the hips down, where it is in the file."""
+    first = int(bool(file.extras["options"].get("tpose_frame")))
+    motion = hips_motion(file.nodes, file.tracks("rotation"), file.tracks("translation"), int(rigged["hips"]))
+    feet, looks = feet_and_facing(motion.skeleton)
+    root = motion.root[first:]
+    return MotionClip.of(
+        replace(motion.skeleton, feet=feet, facing=looks),
+        motion.rotations[first:],
+        root,
+        _contacts(file, len(root)),
+        _rate(file),
+        manifest=cast("dict[str, Any]", file.extras["manifest"]),
+    )
+
+
+def _rate(file: _Document) -> float:
+    fps = float(file.extras["fps"])
+    if not 0 < fps <= 1000:
+        raise InvalidFile(f"{fps:g} fps", where=file.where)
+    return fps
 
 
 def _without_root_bone(rotations: Array, root: Array, pelvis: Array) -> tuple[Array, Array]:

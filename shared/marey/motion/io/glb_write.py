@@ -10,7 +10,6 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,6 +20,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.arrange import Arranged, Posed, arrange
 from marey.motion.export_options import PLAIN, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
+from marey.motion.io.mesh import Mesh
 from marey.motion.rotations import unroll
 
 GENERATOR = "Marey"
@@ -31,25 +31,6 @@ DTYPES = {FLOAT: "<f4", UNSIGNED_SHORT: "<u2"}
 VERTICES, INDICES = 34962, 34963  # targets of bufferViews
 FEET = ("L_ankle", "L_toe", "R_ankle", "R_toe")
 """Names of the columns of `MotionClip.contacts`."""
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A body in the rest pose of a skeleton, each part fixed to one joint.
-
-    Attributes:
-        points: (V, 3) metres, from the joint that carries each, Y up.
-        normals: (V, 3) unit vectors.
-        joints: (V,) the joint that carries each point.
-        triangles: (F, 3) points, counter-clockwise from outside.
-        colour: of the material, linear RGB from 0 to 1.
-    """
-
-    points: NDArray[np.floating[Any]] = field(repr=False)
-    normals: NDArray[np.floating[Any]] = field(repr=False)
-    joints: NDArray[np.integer[Any]] = field(repr=False)
-    triangles: NDArray[np.integer[Any]] = field(repr=False)
-    colour: tuple[float, float, float] = (0.6, 0.58, 0.54)
 
 
 def write_glb(
@@ -85,7 +66,7 @@ def format_glb(clip: Posed, options: ExportOptions = PLAIN, mesh: Mesh | None = 
     posed = arrange(clip, options)
     if not (np.isfinite(posed.rotations).all() and np.isfinite(posed.positions).all()):
         raise InvalidInput("the clip holds NaN or infinite numbers", where=posed.skeleton.name)
-    numbers = _Numbers()
+    numbers = Numbers()
     count = len(posed.skeleton)
     body = {} if mesh is None else _body(mesh, posed, count - len(clip.skeleton), numbers)
     shown = [{"name": "body", "mesh": 0, "skin": 0}] if body else []
@@ -94,19 +75,24 @@ def format_glb(clip: Posed, options: ExportOptions = PLAIN, mesh: Mesh | None = 
         "asset": {"version": "2.0", "generator": GENERATOR, "extras": _extras(clip, posed, options)},
         "scene": 0,
         "scenes": [{"nodes": [0, count] if shown else [0]}],
-        "nodes": [*_nodes(posed), *shown],
+        "nodes": [*joint_nodes(posed), *shown],
         "skins": [_skin(posed, numbers)],
-        "animations": [_animation(posed, numbers)],
+        "animations": [animation_of(posed, numbers)],
         "accessors": numbers.accessors,
         "bufferViews": numbers.views,
         "buffers": [{"byteLength": len(numbers.data)}],
     }
+    return pack(document, numbers)
+
+
+def pack(document: Mapping[str, Any], numbers: Numbers) -> bytes:
+    """Return the bytes of a file with this JSON and these numbers (4.4)."""
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"), sort_keys=True)
     chunks = _chunk(JSON, text.encode(), b" ") + _chunk(BIN, bytes(numbers.data), b"\0")
     return struct.pack("<4sII", MAGIC, VERSION, 12 + len(chunks)) + chunks
 
 
-class _Numbers:
+class Numbers:
     """The buffer of a file and the accessors into it."""
 
     def __init__(self) -> None:
@@ -141,17 +127,17 @@ class _Numbers:
         return len(self.accessors) - 1
 
 
-def _nodes(posed: Arranged) -> list[dict[str, Any]]:
+def joint_nodes(posed: Arranged) -> list[dict[str, Any]]:
     """Return a node a joint, in the skeleton's order; none is turned at rest."""
     tree = posed.skeleton
     nodes: list[dict[str, Any]] = []
     for name, offset, children in zip(tree.joint_names, tree.offsets, tree.children, strict=True):
-        node: dict[str, Any] = {"name": name, "translation": _floats(offset)}
+        node: dict[str, Any] = {"name": name, "translation": floats(offset)}
         nodes.append({**node, "children": list(children)} if children else node)
     return nodes
 
 
-def _skin(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
+def _skin(posed: Arranged, numbers: Numbers) -> dict[str, Any]:
     """Return the skin, by which programs know that the nodes are bones (3.7.3). It is there without a mesh too: Blender
     makes empties of nodes without one."""
     matrices = np.tile(np.eye(4, dtype=np.float32), (len(posed.skeleton), 1, 1))
@@ -160,7 +146,7 @@ def _skin(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
     return {"inverseBindMatrices": inverse, "joints": list(range(len(posed.skeleton))), "skeleton": 0}
 
 
-def _body(mesh: Mesh, posed: Arranged, added: int, numbers: _Numbers) -> dict[str, Any]:
+def _body(mesh: Mesh, posed: Arranged, added: int, numbers: Numbers) -> dict[str, Any]:
     """Return meshes and materials (3.7.2, 3.9).
 
     Args:
@@ -170,7 +156,7 @@ def _body(mesh: Mesh, posed: Arranged, added: int, numbers: _Numbers) -> dict[st
     points = (mesh.points + posed.skeleton.rest[carriers]).astype(np.float32)
     joints, weights = np.zeros((len(points), 4), np.uint16), np.zeros((len(points), 4), np.float32)
     joints[:, 0], weights[:, 0] = carriers, 1
-    low, high = _floats(points.min(axis=0)), _floats(points.max(axis=0))
+    low, high = floats(points.min(axis=0)), floats(points.max(axis=0))
     attributes = {
         "POSITION": numbers.add("VEC3", points, target=VERTICES, min=low, max=high),
         "NORMAL": numbers.add("VEC3", mesh.normals, target=VERTICES),
@@ -185,7 +171,7 @@ def _body(mesh: Mesh, posed: Arranged, added: int, numbers: _Numbers) -> dict[st
     }
 
 
-def _animation(posed: Arranged, numbers: _Numbers) -> dict[str, Any]:
+def animation_of(posed: Arranged, numbers: Numbers) -> dict[str, Any]:
     """Return the animation: a rotation a joint, and positions of those that move (3.11)."""
     times = np.arange(len(posed.rotations)) / posed.fps
     ends = times.astype(np.float32)[[0, -1], None].tolist()
@@ -212,29 +198,35 @@ def _extras(clip: Posed, posed: Arranged, options: ExportOptions) -> dict[str, A
     stands = {} if contacts is None else dict(zip(FEET, contacts.T, strict=True))
     return {
         "fps": float(posed.fps),
-        "contacts": {foot: _spans(column, first) for foot, column in stands.items()},
-        "options": {name: getattr(options, name) for name in options.chosen if name != "bvh_root"},
+        "contacts": {foot: spans(column, first) for foot, column in stands.items()},
+        "options": chosen_options(options),
         **posed.removed,
-        "manifest": _plain(getattr(clip, "manifest", {})),
+        "manifest": plain(getattr(clip, "manifest", {})),
     }
 
 
-def _spans(stands: NDArray[np.bool_], first: int) -> list[list[int]]:
+def chosen_options(options: ExportOptions) -> dict[str, Any]:
+    """Return the options that a file was written with, for its readers; a rig stands in the manifest, not as a path."""
+    return {name: getattr(options, name) for name in options.chosen if name not in ("bvh_root", "rig", "rig_map")}
+
+
+def spans(stands: NDArray[np.bool_], first: int) -> list[list[int]]:
     """Return the stretches of True as [begin, end) in frames of the file, whose motion begins in frame `first`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(np.int8))) + first
     return edges.reshape(-1, 2).tolist()
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return JSON without NaN and infinite numbers, which the format forbids (2.7); null stands in their place."""
     if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in cast("Mapping[Any, Any]", value).items()}
+        return {str(name): plain(each) for name, each in cast("Mapping[Any, Any]", value).items()}
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in cast("Sequence[Any]", value)]
+        return [plain(each) for each in cast("Sequence[Any]", value)]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _floats(vector: NDArray[np.floating[Any]]) -> list[float]:
+def floats(vector: NDArray[np.floating[Any]]) -> list[float]:
+    """Return a vector's numbers for JSON."""
     return [float(x) + 0.0 for x in vector]  # no -0
 
 

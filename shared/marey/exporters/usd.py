@@ -1,0 +1,56 @@
+"""USD: a UsdSkel skeleton and its animation, by Pixar's library (the extra `usd`). Only written; no prompt is in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from marey.exporters.exporter import Coordinates, Exporter
+
+if TYPE_CHECKING:
+    from marey.motion.clip import MotionClip
+    from marey.motion.rigs.rigged import RiggedMotion
+
+
+def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
+    """Write a USD file.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.usd_write.format_usd`; or the skeleton has no such rest pose.
+    """
+    from marey.motion.io.usd_write import format_usd
+
+    if coordinates.rest_pose != "t":
+        from marey.motion.rest_pose import change_rest_pose
+
+        clip = change_rest_pose(clip, coordinates.rest_pose)
+    mesh = None
+    if coordinates.mesh:
+        from marey.viz.mannequin import mannequin
+
+        mesh = mannequin(clip)
+    return format_usd(clip, coordinates, mesh, unit=coordinates.unit, up=coordinates.up)
+
+
+def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
+    """Write a motion on a rig, in centimetres, Y up.
+
+    Raises:
+        InvalidInput: see `marey.motion.io.usd_write.format_usd`.
+    """
+    from marey.motion.io.usd_write import format_rigged_usd
+
+    return format_rigged_usd(motion)
+
+
+EXPORTER: Exporter[MotionClip] = Exporter(
+    format="usd",
+    media_type="model/vnd.usd",
+    extension="usd",
+    holds_prompt=False,
+    encode=encode,
+    options=frozenset(
+        {"root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh", "rig", "rig_map", "names"}
+    ),
+    encode_rigged=encode_rigged,
+    stored=False,
+)

@@ -1,0 +1,54 @@
+"""Find a rig by name or file, with its parts."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from marey.core.documents import read_json
+from marey.core.errors import InvalidInput, NotFound
+from marey.motion.retarget.reference import REFERENCES, reference_rig
+from marey.motion.rigs.body import Body
+from marey.motion.rigs.joint_map import map_joints, read_map
+from marey.motion.rigs.read import READERS, read_rig
+
+
+def load_body(rig: str | Path, rig_map: str | Path | None = None) -> Body:
+    """Return a reference skeleton or the rig of a file, with its parts. Files are read again when they change.
+
+    Args:
+        rig: `mixamo`, `ue4`, `humanik`, or a file.
+        rig_map: JSON file of parts and joints that override what is found.
+
+    Raises:
+        InvalidInput: an unknown rig, one without legs or of a size that no character has, or a map that does not fit.
+        NotFound, InvalidFile, TooLarge: a file cannot be read.
+    """
+    return _load(str(rig), _stamp(rig), None if rig_map is None else str(rig_map), _stamp(rig_map))
+
+
+def _stamp(path: str | Path | None) -> tuple[int, int]:
+    """Return what changes when a file does."""
+    try:
+        status = Path("" if path is None else path).stat()
+    except (OSError, ValueError):
+        return 0, 0
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=16)
+def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> Body:
+    given = None if rig_map is None else read_map(read_json(Path(rig_map)), rig_map)
+    if rig in REFERENCES:
+        found = reference_rig(rig)
+    elif Path(rig).suffix.lower().removeprefix(".") in READERS:
+        found = read_rig(rig)
+    else:
+        kind = NotFound if "." in Path(rig).name else InvalidInput
+        raise kind(
+            f"there is no rig {rig!r}",
+            where="rig",
+            hint=f"Reference skeletons: {', '.join(REFERENCES)}. Files: {', '.join('.' + each for each in READERS)}.",
+            argument="rig",
+        )
+    return Body.of(found, map_joints(found, given, where=rig_map))

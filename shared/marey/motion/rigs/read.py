@@ -1,0 +1,51 @@
+"""Read a rig from a file; the name's ending tells the format."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+from marey.core.errors import InvalidInput
+from marey.motion.files import read_limited
+from marey.motion.rigs.rig import MAX_BYTES, Rig
+
+Reader = Callable[[bytes, str], Rig]
+"""Reads the bytes of a file; the second argument names it in errors. Raises `InvalidFile` or `TooLarge`. It makes the
+rig with `marey.motion.rigs.make_rig.make_rig`, which checks what all formats have in common."""
+
+READERS: dict[str, str] = {
+    "glb": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "gltf": "marey.motion.io.rig_gltf:parse_gltf_rig",
+    "vrm": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "vrma": "marey.motion.io.rig_gltf:parse_glb_rig",
+    "bvh": "marey.motion.io.rig_bvh:parse_bvh_rig",
+    "fbx": "marey.motion.io.rig_fbx:parse_fbx_rig",
+    "npz": "marey.motion.io.rig_smplx:parse_smplx_rig",
+    "json": "marey.motion.io.rig_json:parse_json_rig",
+}
+"""Reader by the ending of a file's name, as `module:function`; modules are imported when they are needed."""
+LIMITS = {"npz": 2**28}
+"""Largest file of a format in bytes, where it is not `MAX_BYTES`: the model of SMPL-X holds far more than joints."""
+
+
+def read_rig(path: Path | str) -> Rig:
+    """Read a rig file of a known format.
+
+    Raises:
+        InvalidInput: an unknown format.
+        NotFound: no such file.
+        InvalidFile: broken, or without a skeleton that motion can be put on.
+        TooLarge: over 64 MiB or 2,000 joints.
+    """
+    path = Path(path)
+    extension = path.suffix.lower().removeprefix(".")
+    if extension not in READERS:
+        known = ", ".join(f".{each}" for each in READERS)
+        raise InvalidInput(f"`{path.suffix}` is not a rig format", where=str(path), hint=f"Known: {known}.")
+    return _reader(extension)(read_limited(path, LIMITS.get(extension, MAX_BYTES)), str(path))
+
+
+def _reader(extension: str) -> Reader:
+    module, _, function = READERS[extension].partition(":")
+    return getattr(importlib.import_module(module), function)

@@ -1,0 +1,160 @@
+"""Retargeting onto rigs whose every joint is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidInput
+from marey.motion.export_options import ExportOptions
+from marey.motion.retarget.apply import on_body
+from marey.motion.retarget.load import load_body
+from marey.motion.retarget.reference import REFERENCES, reference_rig
+from marey.motion.retarget.retarget import retarget
+from marey.motion.retarget.source import source_of
+from marey.motion.rigs.body import Body
+from marey.motion.rigs.rigged import RiggedMotion
+from marey.motion.rotations import angle_between
+from marey.motion.skeleton import HUMANML3D
+from tests.support.changed_rigs import Change, lively
+from tests.support.walker import walker
+
+WALK = walker(seconds=3)
+LIVELY = lively(walker(seconds=2, turn=0.3), 5)
+
+
+def worst(change: Change) -> float:
+    """Return the largest distance in metres of a joint of the retargeted copy from the source's."""
+    clip, rig = change.motion(LIVELY), change.rig()
+    places = retarget(source_of(clip), Body.of(rig)).world()[1]
+    names = [name for name in HUMANML3D.joint_names if name in rig.joint_names]
+    own, theirs = ([tree.index(name) for name in names] for tree in (rig, HUMANML3D))
+    return float(np.linalg.norm(places[:, own] - clip.joints[:, theirs], axis=-1).max())
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_changed_copy_of_the_skeleton_moves_as_the_source(seed):
+    assert worst(Change.draw(seed)) <= 1e-3
+
+
+@pytest.mark.slow
+def test_two_hundred_changed_copies_move_as_the_source():
+    assert max(worst(Change.draw(seed)) for seed in range(20, 200)) <= 1e-3
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_feet_on_a_reference_skeleton_stand_where_the_source_stands_at_its_scale(name):
+    source, body = source_of(WALK), load_body(name)
+    places = retarget(source, body).world()[1]
+    scale = body.leg / source.body.leg
+    for side, toe in (("left", "L_foot"), ("right", "R_foot")):
+        own, theirs = places[:, body.map.parts[f"{side}_toes"]], WALK.joints[:, HUMANML3D.index(toe)]
+        stands = WALK.contacts[:, 1 if side == "left" else 3]
+        rest = body.at(f"{side}_toes")[1] - body.floor
+        assert np.abs(own[stands, 1] - rest - scale * theirs[stands, 1]).max() < 0.01
+        steps = [np.linalg.norm(np.diff(each[:, [0, 2]], axis=0), axis=-1) for each in (own, scale * theirs)]
+        held = stands[1:] & stands[:-1]
+        assert steps[0][held].mean() <= steps[1][held].mean() + 1e-4
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_bones_of_a_reference_skeleton_keep_their_length_and_left_stays_left(name):
+    body = load_body(name)
+    motion = on_body(WALK, body)
+    still = [j for j in range(len(body.rig)) if not motion.moving[j]]
+    assert np.allclose(motion.translations[:, still], body.rig.offsets[still])
+    places = motion.world()[1]
+    hands = [places[:, body.map.parts[f"{side}_hand"]] for side in ("left", "right")]
+    assert (hands[0][:, 1] > hands[1][:, 1] + 0.3).all()  # the walker holds up its left hand
+    assert hands[0][0, 0] > hands[1][0, 0]
+
+
+def test_from_one_rig_to_another_and_back_nothing_is_lost():
+    source = source_of(WALK)
+    there = on_body(WALK, Body.of(Change(3, "a", 5, 0.01, "z").rig()))
+    back = retarget(as_source(there), source.body).world()[1]
+    assert np.linalg.norm(back - WALK.joints, axis=-1).max() <= 5e-3
+
+
+def test_to_a_body_of_other_proportions_and_back():
+    source = source_of(LIVELY)
+    there = on_body(LIVELY, load_body("mixamo"))
+    back = retarget(as_source(there), source.body).world()[1]
+    assert np.linalg.norm(back - LIVELY.joints, axis=-1).mean() <= 0.02
+
+
+def as_source(motion: RiggedMotion):
+    """Return a motion on a rig as one to retarget."""
+    from marey.motion.retarget.source import Source
+    from marey.motion.rotations import conjugate, multiply
+
+    body = Body.of(motion.rig)
+    world, places = motion.world()
+    turned = multiply(world, conjugate(multiply(body.upright, motion.rig.orientations)))
+    return Source(body, turned, places, motion.contacts, motion.fps)
+
+
+def test_helpers_of_unreal_follow_hands_and_feet():
+    body = load_body("ue4")
+    motion = on_body(WALK, body)
+    world, places = motion.world()
+    for helper, leader in (("ik_foot_l", "foot_l"), ("ik_hand_gun", "hand_r"), ("ik_hand_l", "hand_l")):
+        own, theirs = body.rig.index(helper), body.rig.index(leader)
+        assert np.abs(places[:, own] - places[:, theirs]).max() < 1e-6
+        assert angle_between(world[:, own], world[:, theirs]).max() < 1e-6
+
+
+def test_the_twist_of_an_arm_is_shared():
+    from marey.motion.rotations import about
+
+    rotations = WALK.rotations.astype(np.float64)
+    rotations[:, HUMANML3D.index("L_wrist")] = about("X", np.full(WALK.frames, 1.0))
+    clip = type(WALK).of(WALK.skeleton, rotations, WALK.root, WALK.contacts, WALK.fps)
+    body = load_body("ue4")
+    rest = body.rig.local_rotations[body.rig.index("lowerarm_twist_01_l")]
+    turned = [on_body(each, body).rotations[:, body.rig.index("lowerarm_twist_01_l")] for each in (WALK, clip)]
+    assert angle_between(turned[0], rest[None]).max() < 1e-3
+    assert np.allclose(angle_between(turned[1], rest[None]), 0.52, atol=0.05)
+
+
+def test_a_root_bone_takes_the_travel_and_no_joint_moves():
+    body = load_body("ue4")
+    plain, rooted = on_body(LIVELY, body), on_body(LIVELY, body, ExportOptions(rig="ue4", root_bone=True))
+    hips, root = body.map.parts["hips"], body.rig.index("root")
+    kept = [j for j in range(len(body.rig)) if body.rig.joint_names[j] not in ("root", "ik_foot_root", "ik_hand_root")]
+    assert np.abs(plain.world()[1][:, kept] - rooted.world()[1][:, kept]).max() < 1e-5
+    travel = rooted.world()[1][:, [root, hips]]
+    assert np.abs(travel[:, 0, 1]).max() < 1e-9
+    assert np.abs(np.diff(travel[:, 0, [0, 2]] - travel[:, 1, [0, 2]], axis=0)).max() < 1e-6
+    with pytest.raises(InvalidInput, match="no bone above the hips"):
+        on_body(LIVELY, load_body("mixamo"), ExportOptions(rig="mixamo", root_bone=True))
+
+
+def test_in_place_and_a_rest_frame():
+    body = load_body("mixamo")
+    motion = on_body(WALK, body, ExportOptions(rig="mixamo", in_place="travel", tpose_frame=True))
+    assert motion.frames == WALK.frames + 1
+    hips = motion.world()[1][:, body.map.parts["hips"]]
+    assert np.abs(hips[0] - body.rig.positions[body.map.parts["hips"]]).max() < 1e-9
+    assert np.ptp(hips[1:, 2]) < 0.1
+    assert motion.removed["travel"]["z"] > 2
+
+
+def test_hands_reach_on_request():
+    body = load_body("mixamo")
+    source = source_of(WALK)
+    scale = body.leg / source.body.leg
+    goal = (WALK.joints[:, HUMANML3D.index("R_wrist")] - WALK.joints[:, [1, 2]].mean(axis=1)) * scale
+    found = []
+    for hands in (False, True):
+        places = retarget(source, body, hands=hands).world()[1]
+        parts = body.map.parts
+        hips = (places[:, parts["left_upper_leg"]] + places[:, parts["right_upper_leg"]]) / 2
+        found.append(np.linalg.norm(places[:, parts["right_hand"]] - hips - goal, axis=-1).max())
+    assert found[1] < 0.01 < found[0]
+
+
+def test_reference_skeletons_are_pinned():
+    assert {name: len(reference_rig(name)) for name in REFERENCES} == {"mixamo": 65, "ue4": 68, "humanik": 72}
+    for name in REFERENCES:
+        assert np.abs(np.linalg.norm(reference_rig(name).orientations, axis=-1) - 1).max() < 1e-9

@@ -1,0 +1,253 @@
+"""Readers of rigs, the map of their joints, and what is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
+from marey.exporters import Coordinates, exporters
+from marey.motion.export_options import ExportOptions
+from marey.motion.io.glb_read import parse_glb
+from marey.motion.io.rig_bvh import parse_bvh_rig
+from marey.motion.io.rig_gltf import parse_glb_rig, parse_gltf_rig
+from marey.motion.io.rig_json import format_json_rig, parse_json_rig
+from marey.motion.io.rigged_glb import format_rigged_glb
+from marey.motion.retarget.apply import on_body
+from marey.motion.retarget.load import load_body
+from marey.motion.retarget.reference import REFERENCES, reference_rig
+from marey.motion.rigs.body import Body
+from marey.motion.rigs.joint_map import map_joints
+from marey.motion.rigs.rename import renamed
+from marey.motion.rotations import angle_between
+from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
+from tests.support.changed_rigs import Change
+from tests.support.walker import walker
+
+WALK = walker(seconds=2)
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_a_rig_read_from_its_own_glb_is_the_rig(name):
+    rig = reference_rig(name)
+    motion = on_body(WALK, Body.of(rig))
+    read = parse_glb_rig(format_rigged_glb(motion), "x.glb")
+    assert read.joint_names == rig.joint_names
+    assert np.abs(read.positions - rig.positions).max() < 1e-6
+    assert angle_between(read.orientations, rig.orientations).max() < 1e-5
+
+
+def test_a_glb_on_a_rig_reads_back_with_its_joints():
+    motion = on_body(WALK, load_body("ue4"))
+    clip = parse_glb(format_rigged_glb(motion), "x.glb")
+    places = motion.world()[1]
+    for joint, name in enumerate(clip.skeleton.joint_names):
+        assert np.linalg.norm(clip.joints[:, joint] - places[:, motion.rig.index(name)], axis=-1).max() < 1e-3
+    assert (clip.contacts == WALK.contacts).all()
+    assert clip.manifest["rig"]["name"] == "ue4"
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_a_bvh_on_a_rig_has_the_joints_of_the_glb(name):
+    export = ExportOptions(rig=name)
+    places = on_body(WALK, load_body(name)).world()[1]
+    from marey.motion.io.bvh import parse_bvh
+
+    data = exporters()["bvh"].write(WALK, Coordinates.of(export, "cm", "y"))
+    read = parse_bvh(data, rest_frame="keep", translation="replace")
+    rig = reference_rig(name)
+    order = [rig.index(joint) for joint in read.skeleton.joint_names]
+    assert np.linalg.norm(read.joints() - places[:, order], axis=-1).max() < 1e-3
+
+
+def test_scaled_nodes_keep_their_own_units():
+    nodes, size = _gltf(reference_rig("mixamo")), 0.01
+    nodes[0]["children"] = [1]
+    for node in nodes[1:]:
+        node["translation"] = [each / size for each in node["translation"]]
+    nodes[0] |= {"scale": [size] * 3, "translation": [0, 0, 0]}
+    rig = parse_gltf_rig(json.dumps({"asset": {"version": "2.0"}, "nodes": nodes, "skins": [_skin(nodes)]}).encode())
+    assert np.abs(rig.positions[1:] - reference_rig("mixamo").positions).max() < 1e-5
+    written = parse_glb_rig(format_rigged_glb(on_body(WALK, Body.of(rig))), "x.glb")
+    assert np.allclose(written.scales, rig.scales)
+
+
+def test_json_keeps_unit_and_axis():
+    rig = Change(4, "a", 4, 0.01, "z").rig()
+    read = parse_json_rig(format_json_rig(rig), "x.json")
+    assert (read.unit, read.up, read.joint_names) == (rig.unit, rig.up, rig.joint_names)
+    assert np.abs(read.positions - rig.positions).max() < 1e-6
+
+
+def test_a_bvh_rig_has_its_unit_told_by_the_body():
+    data = exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "m", "y"))
+    rig = parse_bvh_rig(data, "x.bvh")
+    assert rig.unit == 1.0
+    assert Body.of(rig).leg == pytest.approx(0.8, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_joints_without_telling_names_are_found_by_shape(seed):
+    rig = Change(seed, "a" if seed % 2 else "t", 3, 1.0, "y", twists=False).rig()
+    named, blind = map_joints(rig), map_joints(replace(rig, joint_names=tuple(f"joint{j}" for j in range(len(rig)))))
+    limbs = [part for part in named.parts if not part.startswith(("spine", "neck", "head", "hips"))]
+    assert {part: blind.parts.get(part) for part in limbs} == {part: named.parts[part] for part in limbs}
+
+
+def test_effectors_and_controllers_are_no_parts():
+    rig = reference_rig("humanik")
+    names = tuple("LeftHandEffector" if name == "LeftArmRoll" else name for name in rig.joint_names)
+    found = map_joints(replace(rig, joint_names=names))
+    assert names.index("LeftHandEffector") in found.controls
+    assert rig.joint_names[found.parts["left_hand"]] == "LeftHand"
+
+
+def test_a_map_overrides_what_is_found():
+    rig = reference_rig("mixamo")
+    given = {"left_hand": "mixamorig:LeftHandMiddle1", "right_toes": None}
+    found = map_joints(rig, given)
+    assert rig.joint_names[found.parts["left_hand"]] == "mixamorig:LeftHandMiddle1"
+    assert found.how["left_hand"] == "map"
+    assert "right_toes" not in found.parts
+    for wrong, message in (({"tail": "x"}, "no part of the body"), ({"head": "nose"}, "no joint 'nose'")):
+        with pytest.raises(InvalidInput, match=message):
+            map_joints(rig, wrong)
+
+
+@pytest.mark.parametrize("skeleton", [HUMANML3D, SNAPMOGEN], ids=lambda each: each.name)
+@pytest.mark.parametrize("names", ["mixamo", "ue5", "humanik", "smplx", "vrm"])
+def test_renamed_joints_are_found_again(skeleton, names):
+    before = map_joints(load_skeleton(skeleton.joint_names, skeleton)).parts
+    after = map_joints(load_skeleton(renamed(skeleton.joint_names, skeleton.parents, names), skeleton)).parts
+    assert dict(after) == dict(before)
+
+
+def load_skeleton(names, skeleton):
+    from marey.motion.retarget.source import rig_of
+
+    return replace(rig_of(skeleton), joint_names=names)
+
+
+def _gltf(rig):
+    """Return the nodes of a rig under a node Armature."""
+    nodes = [{"name": "Armature", "children": []}]
+    for joint, name in enumerate(rig.joint_names):
+        w, x, y, z = rig.local_rotations[joint].tolist()
+        node = {"name": name, "translation": rig.offsets[joint].tolist(), "rotation": [x, y, z, w]}
+        nodes.append(
+            {**node, "children": [child + 1 for child in rig.children[joint]]} if rig.children[joint] else node
+        )
+    nodes[0]["children"] = [1]
+    return nodes
+
+
+def _skin(nodes):
+    return {"joints": list(range(1, len(nodes)))}
+
+
+def _document(change):
+    nodes = _gltf(reference_rig("mixamo"))
+    document = {"asset": {"version": "2.0"}, "nodes": nodes, "skins": [_skin(nodes)]}
+    change(document)
+    return json.dumps(document).encode()
+
+
+def _stretch(document):
+    document["nodes"][5]["scale"] = [1, 2, 1]
+
+
+def _mirror(document):
+    document["nodes"][5]["scale"] = [-1, 1, 1]
+
+
+def _circle(document):
+    document["nodes"][2]["children"].append(0)
+
+
+def _no_legs(document):
+    hips = document["nodes"][1]
+    hips["children"] = [child for child in hips["children"] if "Leg" not in document["nodes"][child]["name"]]
+    document["skins"][0]["joints"] = [1, 2, 3, 4, 5]
+
+
+def _giant(document):
+    document["nodes"][0]["scale"] = [100, 100, 100]
+
+
+def _many(document):
+    document["nodes"] += [{"name": f"n{k}"} for k in range(2001)]
+    document["skins"][0]["joints"] += range(len(document["nodes"]) - 2001, len(document["nodes"]))
+
+
+def _outside(document):
+    document["skins"][0]["joints"].append(9999)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "message"),
+    [
+        (_stretch, InvalidFile, "is stretched"),
+        (_mirror, InvalidFile, "is mirrored"),
+        (_circle, InvalidFile, "circle|two parents"),
+        (_no_legs, InvalidInput, "no joint found for"),
+        (_giant, InvalidInput, "83.1 m long: the unit of the file is wrong"),
+        (_many, TooLarge, "over the limit of 2000"),
+        (_outside, InvalidFile, "not there"),
+        (lambda document: document.clear(), InvalidFile, "holds no skeleton"),
+        (lambda document: document["nodes"][3].update(translation=["a"]), InvalidFile, "cannot be read"),
+    ],
+)
+def test_a_bad_rig_is_refused_with_one_clear_message(change, kind, message):
+    with pytest.raises(kind, match=message):
+        Body.of(parse_gltf_rig(_document(change), "hero.gltf"))
+
+
+def test_a_rig_that_is_not_there(tmp_path):
+    with pytest.raises(InvalidInput, match="there is no rig 'mixano'"):
+        load_body("mixano")
+    with pytest.raises(NotFound):
+        load_body(tmp_path / "hero.glb")
+    big = tmp_path / "big.glb"
+    with big.open("wb") as file:
+        file.truncate(64 * 2**20 + 1)
+    with pytest.raises(TooLarge, match="over the limit of 64 MiB"):
+        load_body(big)
+
+
+@pytest.mark.parametrize("extension", ["glb", "json", "bvh"])
+def test_broken_files_give_only_our_errors(extension):
+    rig = reference_rig("mixamo")
+    good = {
+        "glb": lambda: format_rigged_glb(on_body(WALK, Body.of(rig))),
+        "json": lambda: format_json_rig(rig),
+        "bvh": lambda: exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "cm", "y")),
+    }[extension]()
+    parse = {"glb": parse_glb_rig, "json": parse_json_rig, "bvh": parse_bvh_rig}[extension]
+    draw = np.random.default_rng(7)
+    for _ in range(60):
+        data = bytearray(good[: int(draw.integers(20, min(len(good), 20_000)))] if draw.integers(2) else good)
+        for place in draw.integers(0, min(len(data), 4000), 3):
+            data[place] = int(draw.integers(256))
+        with contextlib.suppress(MareyError):
+            parse(bytes(data), "x")
+
+
+def test_a_glb_whose_chunk_claims_more_than_the_file_holds():
+    data = format_rigged_glb(on_body(WALK, load_body("mixamo")))
+    with pytest.raises(InvalidFile, match="cut off"):
+        parse_glb_rig(data[:12] + struct.pack("<I", 2**31) + data[16:], "x.glb")
+
+
+@pytest.mark.parametrize(
+    "options", [{"mesh": True}, {"names": "vrm"}, {"rest_pose": "a"}], ids=lambda each: next(iter(each))
+)
+def test_options_that_contradict_a_rig(options):
+    with pytest.raises(InvalidInput, match="joints and the rest pose of the rig"):
+        ExportOptions(rig="mixamo", **options)
+    with pytest.raises(InvalidInput, match="belongs to a rig"):
+        ExportOptions(rig_map="x.json")
