@@ -80,10 +80,7 @@ class MaskedStage:
         self.tokens, self.captions = tokens, captions
         self.module = MaskedModule(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
-        normalizer = self.module.masked.text.normalizer
-        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
-        normalizer.mean.copy_(mean)
-        normalizer.std.copy_(std)
+        captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 

@@ -40,9 +40,7 @@ class ResidualStage:
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
         self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
-        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
-        self.module.normalizer.mean.copy_(mean)
-        self.module.normalizer.std.copy_(std)
+        captions.standardise(self.module.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
 
@@ -109,7 +107,5 @@ def length_stage(config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, c
     """Return the training stage of the length estimator."""
     pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
     module = LengthEstimator(config).to(tokens.tokens.device)
-    mean, std = captions.statistics(pairs.train.tolist(), config.condition)
-    module.normalizer.mean.copy_(mean)
-    module.normalizer.std.copy_(std)
+    captions.standardise(module.normalizer, pairs.train.tolist(), config.condition)
     return LengthStage(module, config.train_length, pairs, captions, tokens.lengths[:, 0].clamp(max=config.max_tokens))

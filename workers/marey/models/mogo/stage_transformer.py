@@ -42,9 +42,10 @@ class TransformerStage:
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
         self.samples = Samples(clips, tokens, captions, steers, config.max_frames, split=config.split_actions)
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]
-        mean, std = text_statistics(captions.strings, spoken)
-        self.module.prompt.mean.copy_(mean)
-        self.module.prompt.std.copy_(std)
+        if config.condition.standardised:
+            mean, std = text_statistics(captions.strings, spoken)
+            self.module.prompt.mean.copy_(mean)
+            self.module.prompt.std.copy_(std)
         actions, frames = self.samples.captioned_actions(self.pairs.train)
         self.module.pace.fit(self.module.prompt.standardised(captions.sentences(actions)), frames)
         with torch.no_grad():  # the head starts at the codes' frequencies

@@ -16,7 +16,7 @@ from marey.models.mogo.steers import Steers, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.nn.devices import choose_device
 from marey.training.loop import start_process_group
-from marey.training.motions import MotionData, load_tokens
+from marey.training.motions import MotionData, check_layout, load_tokens
 from marey.training.pairs import Pairs
 from marey.training.sentences import SentenceData
 from marey.training.staging import TrainOptions, finish, train_all, use_threads
@@ -78,7 +78,9 @@ def transformer_stage(
 
 def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
     torch.manual_seed(options.seed)
-    return MotionData.load(options.prepared, choose_device(options.device))
+    data = MotionData.load(options.prepared, choose_device(options.device))
+    check_layout(options.config, data.prepared)
+    return data
 
 
 def _steers(
