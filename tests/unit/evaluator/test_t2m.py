@@ -23,10 +23,9 @@ from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncode
 from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors
 from marey.importing import ImportRequest
 from tests.support.prepared import write_prepared
+from tests.support.t2m_evaluator import SMALL, VOCABULARY, write_public_files
 from tests.support.t2m_folder import write_folder
 
-SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
-VOCABULARY = ["a", "person", "walk", "left", "unk", "sos", "eos", "wave"]
 CAPTIONS = {
     "a person walks left": "a/DET person/NOUN walk/VERB left/ADV",
     "a person waves zealously": "a/DET person/NOUN wave/VERB zealously/ADV",
@@ -72,27 +71,8 @@ def import_small(folder: Path, output: Path) -> Bundle:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The public folders in small, with random numbers."""
-    root = tmp_path_factory.mktemp("t2m")
-    torch.manual_seed(0)
-    motion, text = T2MMotionEncoder(SMALL), T2MTextEncoder(SMALL)
-    weights = {
-        "movement_encoder": motion.movement.state_dict(),
-        "motion_encoder": motion.motion.state_dict(),
-        "text_encoder": text.state_dict(),
-        "opt_motion_encoder": torch.optim.Adam(motion.parameters()).state_dict(),
-        "epoch": 55,
-        "iter": 1000,
-    }
-    for folder in ("text_mot_match/model", "Comp_v6_KLD005/meta", "glove", "texts"):
-        (root / folder).mkdir(parents=True)
-    torch.save(weights, root / "text_mot_match" / "model" / "finest.tar")
-    rng = np.random.default_rng(0)
-    np.save(root / "Comp_v6_KLD005" / "meta" / "mean.npy", rng.normal(size=263))
-    np.save(root / "Comp_v6_KLD005" / "meta" / "std.npy", rng.uniform(0.5, 2, 263))
-    np.save(root / "glove" / "our_vab_data.npy", rng.normal(size=(len(VOCABULARY) + 3, 5)))
-    (root / "glove" / "our_vab_words.pkl").write_bytes(pickle.dumps(VOCABULARY))
-    index = {word: len(VOCABULARY) + 2 - row for row, word in enumerate(VOCABULARY)}
-    (root / "glove" / "our_vab_idx.pkl").write_bytes(pickle.dumps(index))
+    root = write_public_files(tmp_path_factory.mktemp("t2m"))
+    (root / "texts").mkdir()
     lines = [f"{caption}#{words}#0.0#0.0" for caption, words in CAPTIONS.items()]
     (root / "texts" / "000000.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return root
