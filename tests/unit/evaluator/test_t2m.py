@@ -18,7 +18,7 @@ from marey.data.prepared import PreparedData
 from marey.data.t2m_folder import HUMANML3D_SET, prepare_t2m
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.t2m import T2MEvaluator
-from marey.evaluator.t2m_import import import_t2m
+from marey.evaluator.t2m_import import import_t2m, published_config
 from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors
 from marey.importing import ImportRequest
@@ -266,6 +266,16 @@ def test_a_folder_without_captions_is_refused(tmp_path: Path) -> None:
 
 
 # -- importing ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_public_sizes_follow_from_the_width_of_the_statistics(tmp_path: Path) -> None:
+    np.save(tmp_path / "mean.npy", np.zeros(251))
+    assert published_config(tmp_path / "mean.npy").layout == "kit-251"
+    np.save(tmp_path / "mean.npy", np.zeros(263))
+    assert published_config(tmp_path / "mean.npy") == T2MConfig()
+    np.save(tmp_path / "mean.npy", np.zeros(296))
+    with pytest.raises(InvalidFile, match=r"has shape \(296,\)"):
+        published_config(tmp_path / "mean.npy")
 
 
 def test_the_bundle_holds_weights_words_and_statistics_in_full_precision(
