@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from typer.testing import CliRunner
 
 from marey.cli.main import app
@@ -18,6 +19,7 @@ from marey.data.sampling import sampling_weights
 from marey.data.t2m_captions import read_caption
 from marey.data.t2m_folder import CMP_SET, HUMANML3D_SET, KIT_SET, joints_of, prepare_t2m
 from marey.motion.features import HUMANML3D_263, KIT_251
+from marey.training.joints import heading_joints, unit_of, world_joints
 from marey.training.tokenizing import tokenizer_clips, tokenizer_weights
 from tests.support.t2m_folder import FRAMES, SPLITS, swaying, write_folder
 
@@ -97,6 +99,16 @@ def test_joints_are_in_metres_and_the_last_pose_follows_from_the_velocities(layo
     np.testing.assert_allclose(found[..., 1], joints[..., 1], atol=1e-4)
     np.testing.assert_allclose(found[-1, :, flat] - found[-1, :1, flat], joints[-1, :, flat] - joints[-1, :1, flat],
                                atol=1e-3)  # fmt: skip
+
+
+@pytest.mark.parametrize("layout", [HUMANML3D_263, KIT_251], ids=lambda each: each.name)
+def test_losses_on_joints_are_in_metres(layout) -> None:
+    features = layout.encode(swaying(layout, 3, 40, turns=0.3))
+    count, unit = len(layout.skeleton), unit_of(layout.name)
+    found = world_joints(torch.from_numpy(features)[None], count, unit)[0]
+    np.testing.assert_allclose(found, layout.decode(features), atol=1e-3)
+    heights = heading_joints(torch.from_numpy(features)[None], count, unit)[0, ..., 1]
+    np.testing.assert_allclose(heights, layout.decode(features)[..., 1], atol=1e-3)
 
 
 def test_measures_are_in_metres_and_degrees_to_the_left(tmp_path: Path) -> None:

@@ -128,7 +128,8 @@ class _Run:
     def __init__(self, stage: TrainingStage, options: RunOptions, config: dict[str, Any]) -> None:
         self.stage, self.options = stage, options
         if options.micro_batch is not None and not isinstance(stage, SplitStage):
-            raise InvalidInput(f"the batches of {stage.name} cannot be split", where="--micro-batch")
+            hint = "Give it to a stage alone, and train the others without."
+            raise InvalidInput(f"the batches of {stage.name} cannot be split", where="--micro-batch", hint=hint)
         self.config: dict[str, Any] = json.loads(json.dumps(config))  # tuples become lists, as in a checkpoint
         o = stage.optimisation
         self.device = next(stage.module.parameters()).device

@@ -58,7 +58,7 @@ class TrainOptions(Generic[C]):
     def options(self, stage: str) -> RunOptions:
         """Return the loop's options for a stage."""
         if self.micro_batch == "auto":
-            hint = "Name a number."
+            hint = "Name a number, and one stage at a time."
             raise InvalidInput("auto is for stages whose memory is estimated", where="--micro-batch", hint=hint)
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet,
