@@ -10,8 +10,8 @@ import torch
 WORDS = ("a", "person", "walks", "forward", "and", "waves", "his", "left", "right", "hand", "slowly", "then", "turns")
 
 
-def write_tiny_clip(folder: Path) -> Path:
-    """CLIP's text tower, 512 wide, two layers."""
+def write_tiny_clip(folder: Path, width: int = 512) -> Path:
+    """CLIP's text tower, 512 (ViT-B/32) or 768 (ViT-L/14) wide, two layers."""
     from transformers import CLIPTextConfig, CLIPTextModelWithProjection, CLIPTokenizer
 
     letters = [chr(c) for c in range(ord("a"), ord("z") + 1)] + list(".,!'0123456789")
@@ -24,7 +24,7 @@ def write_tiny_clip(folder: Path) -> Path:
     tokenizer.save_pretrained(folder)
     torch.manual_seed(0)
     config = CLIPTextConfig(
-        vocab_size=len(vocabulary), hidden_size=512, intermediate_size=64, projection_dim=512, num_hidden_layers=2,
+        vocab_size=len(vocabulary), hidden_size=width, intermediate_size=64, projection_dim=width, num_hidden_layers=2,
         num_attention_heads=8, max_position_embeddings=77, bos_token_id=len(vocabulary) - 2,
         eos_token_id=len(vocabulary) - 1, pad_token_id=len(vocabulary) - 1,
     )  # fmt: skip

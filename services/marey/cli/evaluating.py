@@ -34,6 +34,13 @@ Bundle = Annotated[str, typer.Option("--bundle", "--model", help="Model, bundle 
 Evaluator = Annotated[
     str | None, typer.Option("--evaluator", help="Bundle that measures; none given = the one that the server has.")
 ]
+Evaluators = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--evaluator",
+        help="Bundle that measures; none given = the one that the server has. With --protocol it may be repeated.",
+    ),
+]
 Split = Annotated[
     str,
     typer.Option(
@@ -187,6 +194,28 @@ def repeats_of(repeats: int | None, *, regenerate: bool) -> int | None:
     if regenerate and repeats is not None:
         raise InvalidInput(f"means --repeats {ANEW}", where="--regenerate", hint="Give one of the two.")
     return ANEW if regenerate else repeats
+
+
+def refuse_given(options: Mapping[str, object], reason: str) -> None:
+    """Refuse options that have no meaning here.
+
+    Raises:
+        InvalidInput: one of them is given.
+    """
+    for name, value in options.items():
+        if value:
+            raise InvalidInput(reason, where=name)
+
+
+def single_of(evaluators: Sequence[str] | None) -> str | None:
+    """Return the one evaluator that the server measures with; None = the server's own.
+
+    Raises:
+        InvalidInput: several were given.
+    """
+    if evaluators and len(evaluators) > 1:
+        raise InvalidInput("the server measures with one evaluator", where="--evaluator")
+    return evaluators[0] if evaluators else None
 
 
 def comparison_rows(found: Comparison) -> Iterator[tuple[object, ...]]:

@@ -33,6 +33,29 @@ def broadcast(tensor: Tensor) -> Tensor:
     return tensor
 
 
+def broadcast_any(mine: Tensor | None, like: Tensor) -> Tensor | None:
+    """Return the tensor of the first process that has one, the same everywhere; None if no process has any.
+
+    Every process must call this, with `mine` of the shape and type of `like`, or None.
+    """
+    if not is_distributed():
+        return mine
+    has = torch.zeros(dist.get_world_size(), device=like.device)
+    has[rank()] = float(mine is not None)
+    owners = all_reduce_sum(has).nonzero().flatten().tolist()
+    if not owners:
+        return None
+    shared = torch.empty_like(like) if mine is None else mine
+    dist.broadcast(shared, src=owners[0])
+    return shared
+
+
+def barrier() -> None:
+    """Wait for all processes."""
+    if is_distributed():
+        dist.barrier()  # pyright: ignore[reportUnknownMemberType]
+
+
 def average_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
     """Average gradients over all processes in one collective (a parameter without one counts as zero)."""
     if not is_distributed():

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from marey.nn.distributed import all_reduce_sum, broadcast
+from marey.nn.distributed import all_reduce_sum, broadcast_any
 
 NO_TOKEN = -1
 """Token of a level that was dropped, or of a position beyond the clip: decodes to the zero vector."""
@@ -161,9 +161,12 @@ class ResidualQuantizer(nn.Module):
     @torch.no_grad()
     def _initialize(self, level: int, vectors: Tensor) -> None:
         """Fill a codebook with vectors of the first batch (repeated with a little noise if there are too few)."""
-        if bool(self.initialized) or len(vectors) == 0:
+        if bool(self.initialized):
             return
-        self.codebooks[level] = broadcast(_draw(vectors, self.codes))
+        drawn = self._draw_any(level, vectors)
+        if drawn is None:
+            return
+        self.codebooks[level] = drawn
         self.sums[level] = self.codebooks[level]
         self.counts[level] = 1.0
 
@@ -177,15 +180,22 @@ class ResidualQuantizer(nn.Module):
         self.sums[level].mul_(self.decay).add_(sums, alpha=1 - self.decay)
         alive = self.counts[level] >= self.revive  # (K,)
         self.codebooks[level] = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
-        if len(vectors) == 0 or bool(alive.all()):
+        if bool(alive.all()):  # the same in every process
             return
         # A revived code starts at the limit: it is reset again after the next batch unless vectors enough choose it
         # there. So dead codes are drawn anew in every batch until they lie where vectors are.
-        fresh = broadcast(_draw(vectors, self.codes))
+        fresh = self._draw_any(level, vectors)
+        if fresh is None:
+            return
         dead = ~alive
         self.codebooks[level][dead] = fresh[dead]
         self.sums[level][dead] = fresh[dead] * self.revive
         self.counts[level][dead] = self.revive
+
+    def _draw_any(self, level: int, vectors: Tensor) -> Tensor | None:
+        """Return K of the vectors (N, d) of the first process that has any at this level; None if none has."""
+        mine = _draw(vectors, self.codes) if len(vectors) else None
+        return broadcast_any(mine, self.codebooks[level])
 
 
 def _draw(vectors: Tensor, count: int) -> Tensor:

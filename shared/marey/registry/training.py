@@ -46,6 +46,8 @@ class Training:
         unpack: `(bundle, run) -> configuration`; None = bundles cannot be trained further.
         choices: passed on to `config` by name.
         bundle_help: of the command `bundle`.
+        memory: `(configuration, *, bf16) -> marey.training.memory.MemoryModel` of the stage that needs most; None = no
+            command `memory`.
     """
 
     help: str
@@ -56,6 +58,7 @@ class Training:
     unpack: str | None = None
     choices: tuple[Choice, ...] = ()
     bundle_help: str = "Write the bundle from the parts of a run."
+    memory: str | None = None
 
 
 TRAININGS = PlugIns("marey.trainings", Training)

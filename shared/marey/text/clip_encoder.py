@@ -1,4 +1,7 @@
-"""Text encoder `clip-vit-b32`: the text tower of CLIP ViT-B/32, 512-d (Radford et al. 2021), as in MoMask and HGM³."""
+"""Text encoders `clip-vit-b32` and `clip-vit-l14`: text towers of CLIP (Radford et al. 2021).
+
+ViT-B/32, 512-d, is that of MoMask and HGM³; ViT-L/14, 768-d, that of GraphMotion and of MOGO's public code.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,11 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
 from marey.nn.threads import one_thread
-from marey.text.encoders import WIDTHS, Encoding, weights_sha256
+from marey.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
 from marey.text.pretrained import load_pretrained, read_config
 
 MAX_TOKENS = 77
+NAMES = {"clip-vit-b32": "ViT-B/32", "clip-vit-l14": "ViT-L/14"}
 
 
 class ClipEncoder:
@@ -24,13 +28,12 @@ class ClipEncoder:
     that of the first 75 words' pieces and the end token.
     """
 
-    name = "clip-vit-b32"
-    width = WIDTHS["clip-vit-b32"]
-
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, name: str, folder: Path) -> None:
         from transformers import CLIPTextModelWithProjection, CLIPTokenizer
 
-        check_clip(folder)
+        check_clip(name, folder)
+        self.name = name
+        self.width = WIDTHS[name]
         self.sha256 = weights_sha256(folder)
         self._tokenizer: Any = load_pretrained(CLIPTokenizer, folder)
         self._model: Any = load_pretrained(CLIPTextModelWithProjection, folder, weights=True)
@@ -56,17 +59,17 @@ class ClipEncoder:
         return [self.encode(text).tokens for text in texts]
 
 
-def check_clip(folder: Path) -> None:
-    """Check that the configuration in a folder is that of CLIP ViT-B/32.
+def check_clip(name: str, folder: Path) -> None:
+    """Check that the configuration in a folder is that of this CLIP.
 
     Raises:
         InvalidFile: it is missing, or of another model.
     """
     config = read_config(folder)
     text = config.get("text_config") or config
-    if not str(config.get("model_type", "")).startswith("clip") or text.get("hidden_size") != WIDTHS["clip-vit-b32"]:
+    if not str(config.get("model_type", "")).startswith("clip") or text.get("hidden_size") != WIDTHS[name]:
         raise InvalidFile(
-            "is not the text tower of CLIP ViT-B/32 (hidden size 512)",
+            f"is not the text tower of CLIP {NAMES[name]} (hidden size {WIDTHS[name]})",
             where=str(folder),
-            hint="The folder needs the files of openai/clip-vit-base-patch32.",
+            hint=f"The folder needs the files of {HUB[name]}.",
         )

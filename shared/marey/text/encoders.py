@@ -23,11 +23,12 @@ from marey.core.errors import InvalidBundle, InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.core.settings import Settings, settings
 
-WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
+WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "clip-vit-l14": 768, "t5-base": 768, "t5-v1_1-base": 768}
 BUNDLES = {"minilm": "minilm-l6"}
 """Encoders that are bundles, by name."""
 HUB = {
     "clip-vit-b32": "openai/clip-vit-base-patch32",
+    "clip-vit-l14": "openai/clip-vit-large-patch14",
     "t5-base": "google-t5/t5-base",
     "t5-v1_1-base": "google/t5-v1_1-base",
 }

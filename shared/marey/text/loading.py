@@ -33,10 +33,10 @@ def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
 
         return MiniLMEncoder(find_encoder(name, path))
     folder = path or find_weights(name)
-    if name == "clip-vit-b32":
+    if name.startswith("clip"):
         from marey.text.clip_encoder import ClipEncoder
 
-        return ClipEncoder(folder)
+        return ClipEncoder(name, folder)
     from marey.text.t5_encoder import T5Encoder
 
     return T5Encoder(name, folder)

@@ -281,3 +281,31 @@ def test_the_first_code_is_a_target_like_any_other(prepared: PreparedData) -> No
     assert masked.any()
     assert right[masked].all()
     assert float(losses[masked].detach().max()) < 1e-3
+
+
+def test_validation_keeps_every_condition(prepared: PreparedData) -> None:
+    """The share of dropped conditions is of training alone."""
+    stage = masked_stage(prepared)
+    stage.module.eval()
+    kept = stage.validate()
+    stage.config = replace(stage.config, condition=replace(stage.config.condition, drop=1.0))
+    assert stage.validate() == kept
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_gradients_of_parts_add_up_to_those_of_the_batch(prepared: PreparedData, size: int) -> None:
+    plain = replace(TINY, condition=replace(TINY.condition, dropout=0.0), **{
+        name: replace(getattr(TINY, name), dropout=0.0) for name in ("masked", "predictor", "residual")
+    })  # fmt: skip
+    stage = masked_stage(prepared, replace(plain, train_masked=replace(TINY.train_masked, batch=7)))
+    found: list[dict[str, torch.Tensor]] = []
+    for split in (False, True):
+        stage.module.zero_grad()
+        drawn = StepContext(0, 0.5, np.random.default_rng(0))
+        for loss, _ in stage.parts(drawn, size) if split else [stage.loss(drawn)]:
+            loss.backward()
+        found.append({name: each.grad for name, each in stage.module.named_parameters() if each.grad is not None})
+    whole, parts = found
+    assert whole.keys() == parts.keys()
+    for name, wanted in whole.items():
+        torch.testing.assert_close(parts[name], wanted, atol=1e-6, rtol=1e-4, msg=name)

@@ -18,12 +18,14 @@ from marey.data.build import LAYOUT, build, swap_sides, windows
 from marey.data.compose import Counts
 from marey.data.dataset import known_set
 from marey.data.inspect import summarize
+from marey.data.licences import Terms
 from marey.data.pack import JointsPack, PackClip
 from marey.data.prepared import PreparedData
 from marey.data.retime import held_longer
 from marey.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
 from marey.motion.rotations import about, rotate
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
+from tests.support.walker import walker as drawn_walk
 
 MOTIONS = {
     "2/walk": lambda k: walker(3.0 + 0.5 * k),
@@ -339,3 +341,16 @@ def test_features_do_not_know_which_way_a_clip_faces_or_where_it_is():
     there = rotate(about("y", np.full((len(here), 1), 2.1)), here) + np.array([3.0, 0.0, -2.0])
     encoded = [LAYOUT.encode(LAYOUT.canonicalize(joints)) for joints in (here, there)]
     assert np.abs(encoded[0] - encoded[1]).max() < 1e-6  # so turning clips about would add nothing to training
+
+
+@pytest.mark.parametrize(
+    ("content", "style"), [("1/walk", ""), ("1/walk", "weird"), ("2/wave-left-hand", "normal"), ("flail", "weird")]
+)
+def test_a_foreign_pack_with_labels_that_the_grammar_does_not_know_is_prepared(tmp_path, content, style):
+    terms = Terms("foreign", "Foreign", "CC0", "someone", "", "commercial")
+    clips = [PackClip(f"take{k}", "foreign", content, style, "train", 0, 0) for k in range(2)]
+    pack = JointsPack.of([(clip, drawn_walk(seconds=3.0).joints.astype(np.float32)) for clip in clips], [terms])
+    build([pack], tmp_path / "out")
+    train = PreparedData.open(tmp_path / "out").split("train")
+    assert {clip.dataset for clip in train} == {"foreign"}
+    assert all(clip.captions for clip in train)

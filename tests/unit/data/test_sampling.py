@@ -67,7 +67,7 @@ def test_free_text_after_a_dash_makes_no_class_of_its_own() -> None:
 
 def test_sets_without_a_share_weigh_in_the_tokenizer_what_their_clips_weigh() -> None:
     clips = [clip("walk", "large")] * 96 + [clip("walk", "small")] * 4
-    weights = tokenizer_weights(clips)
+    weights = tokenizer_weights(clips, 64)
     assert weights[96:].sum() == pytest.approx(0.04)
 
 
@@ -75,10 +75,10 @@ def test_sets_with_a_share_have_it_and_all_others_the_rest() -> None:
     (first, share), (second, other) = SHARES.items()
     clips = [clip(f"{name[-1]}/walk", name[:-2]) for name in (first, second)]
     clips += [clip("walk", "large")] * 30 + [clip("sit", "small")]
-    weights = tokenizer_weights(clips)
+    weights = tokenizer_weights(clips, 64)
     assert (weights[0], weights[1]) == (pytest.approx(share), pytest.approx(other))
     assert weights[2:].sum() == pytest.approx(1 - share - other)
-    longer = tokenizer_weights([clip("walk", length=25), clip("walk", length=100)])
+    longer = tokenizer_weights([clip("walk", length=25), clip("walk", length=100)], 64)
     assert longer[1] / longer[0] == pytest.approx(2)
 
 

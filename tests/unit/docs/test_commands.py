@@ -26,7 +26,7 @@ ALL = blocks()
 SYSTEM = {".", "cd", "cp", "cut", "docker", "export", "git", "head", "install", "od", "pip", "printf", "rm", "tr"}
 SYSTEM |= {"base64", "curl", "systemctl", "tensorboard", "torchrun", "umask", "useradd"}
 """Programs that are not ours: a shell parses their lines, nothing more is checked."""
-ENVIRONMENT = re.compile(r"[A-Z_]+=")
+ENVIRONMENT = re.compile(r"[A-Z][A-Z0-9_]*=")
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 
 

@@ -14,15 +14,18 @@ import torch.nn.functional as F
 
 from marey.bundles import Bundle
 from marey.core.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput, MareyError, NotFound
+from marey.data.prepared import PreparedData
+from marey.data.t2m_folder import HUMANML3D_SET, prepare_t2m
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.t2m import T2MEvaluator
-from marey.evaluator.t2m_import import import_t2m
+from marey.evaluator.t2m_import import import_t2m, published_config
 from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
-from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
+from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors
 from marey.importing import ImportRequest
+from tests.support.prepared import write_prepared
+from tests.support.t2m_evaluator import SMALL, VOCABULARY, write_public_files
+from tests.support.t2m_folder import write_folder
 
-SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
-VOCABULARY = ["a", "person", "walk", "left", "unk", "sos", "eos", "wave"]
 CAPTIONS = {
     "a person walks left": "a/DET person/NOUN walk/VERB left/ADV",
     "a person waves zealously": "a/DET person/NOUN wave/VERB zealously/ADV",
@@ -68,27 +71,8 @@ def import_small(folder: Path, output: Path) -> Bundle:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The public folders in small, with random numbers."""
-    root = tmp_path_factory.mktemp("t2m")
-    torch.manual_seed(0)
-    motion, text = T2MMotionEncoder(SMALL), T2MTextEncoder(SMALL)
-    weights = {
-        "movement_encoder": motion.movement.state_dict(),
-        "motion_encoder": motion.motion.state_dict(),
-        "text_encoder": text.state_dict(),
-        "opt_motion_encoder": torch.optim.Adam(motion.parameters()).state_dict(),
-        "epoch": 55,
-        "iter": 1000,
-    }
-    for folder in ("text_mot_match/model", "Comp_v6_KLD005/meta", "glove", "texts"):
-        (root / folder).mkdir(parents=True)
-    torch.save(weights, root / "text_mot_match" / "model" / "finest.tar")
-    rng = np.random.default_rng(0)
-    np.save(root / "Comp_v6_KLD005" / "meta" / "mean.npy", rng.normal(size=263))
-    np.save(root / "Comp_v6_KLD005" / "meta" / "std.npy", rng.uniform(0.5, 2, 263))
-    np.save(root / "glove" / "our_vab_data.npy", rng.normal(size=(len(VOCABULARY) + 3, 5)))
-    (root / "glove" / "our_vab_words.pkl").write_bytes(pickle.dumps(VOCABULARY))
-    index = {word: len(VOCABULARY) + 2 - row for row, word in enumerate(VOCABULARY)}
-    (root / "glove" / "our_vab_idx.pkl").write_bytes(pickle.dumps(index))
+    root = write_public_files(tmp_path_factory.mktemp("t2m"))
+    (root / "texts").mkdir()
     lines = [f"{caption}#{words}#0.0#0.0" for caption, words in CAPTIONS.items()]
     (root / "texts" / "000000.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return root
@@ -255,16 +239,25 @@ def test_a_sentence_is_cut_after_twenty_words_between_its_start_and_end() -> Non
     assert TAGS[int(words.read([("person", "no such tag")])[1][1].argmax())] == "OTHER"
 
 
-def test_a_caption_line_is_read_with_slashes_in_its_words() -> None:
-    caption, words = read_line("he walks/runs.#he/PRON walk/run/VERB#0.0#3.5\n", where="a.txt:1")
-    assert caption == "he walks/runs."
-    assert words == (("he", "PRON"), ("walk/run", "VERB"))
+def test_a_caption_line_is_read_with_slashes_in_its_words(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("he walks/runs.#he/PRON walk/run/VERB#0.0#3.5\n")
+    assert TaggedCaptions.read(tmp_path).tag(" he walks/runs.") == (("he", "PRON"), ("walk/run", "VERB"))
 
 
-@pytest.mark.parametrize("line", ["he walks", "he walks##0.0#0.0", "he walks#he walks#0.0#0.0", "he#he/PRON#0.0"])
-def test_a_line_that_is_no_caption_is_refused(line: str) -> None:
+@pytest.mark.parametrize("line", ["he walks", "he walks#he walks#0.0#0.0", "he#he/PRON#0.0"])
+def test_a_line_that_is_no_caption_is_refused(line: str, tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text(line)
     with pytest.raises(InvalidFile, match=r"a\.txt:1: is not a line"):
-        read_line(line, where="a.txt:1")
+        TaggedCaptions.read(tmp_path)
+
+
+def test_tags_are_those_of_prepared_data_as_well(tmp_path: Path) -> None:
+    prepare_t2m(HUMANML3D_SET, write_folder(tmp_path / "published"), tmp_path / "out")
+    tagger = TaggedCaptions.of(PreparedData.open(tmp_path / "out"))
+    assert tagger.tag("a person crouches") == (("a", "DET"), ("person", "NOUN"), ("crouch", "VERB"))
+    write_prepared(tmp_path / "own", clips=6)
+    with pytest.raises(InvalidFile, match="no captions with parts of speech"):
+        TaggedCaptions.of(PreparedData.open(tmp_path / "own"))
 
 
 def test_a_folder_without_captions_is_refused(tmp_path: Path) -> None:
@@ -273,6 +266,16 @@ def test_a_folder_without_captions_is_refused(tmp_path: Path) -> None:
 
 
 # -- importing ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_public_sizes_follow_from_the_width_of_the_statistics(tmp_path: Path) -> None:
+    np.save(tmp_path / "mean.npy", np.zeros(251))
+    assert published_config(tmp_path / "mean.npy").layout == "kit-251"
+    np.save(tmp_path / "mean.npy", np.zeros(263))
+    assert published_config(tmp_path / "mean.npy") == T2MConfig()
+    np.save(tmp_path / "mean.npy", np.zeros(296))
+    with pytest.raises(InvalidFile, match=r"has shape \(296,\)"):
+        published_config(tmp_path / "mean.npy")
 
 
 def test_the_bundle_holds_weights_words_and_statistics_in_full_precision(

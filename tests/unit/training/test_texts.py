@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
+from typing import cast
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from marey.bundles import TextSpec
+from marey.text.graph import SemanticGraph, build_graph
+from marey.text.pipeline import TextPipeline
+from marey.text.roles import Argument, Frame
 from marey.training import texts as module
 from marey.training.texts import CaptionTexts
 from tests.support.texts import shared_pipeline
@@ -36,3 +44,37 @@ def test_two_processes_read_captions_as_one_does(monkeypatch: pytest.MonkeyPatch
         assert (a == b) if field.name == "spec" else np.array_equal(a, b), field.name
     assert steps == sorted(steps)
     assert steps[-1][1] == 2 * len(captions)
+
+
+class OneGraph:
+    """A pipeline that reads everything as one graph, and encodes a text as its place among the texts."""
+
+    spec = TextSpec(width=1)
+
+    def __init__(self, graph: SemanticGraph) -> None:
+        self.graph = graph
+        self.texts: list[str] = []
+
+    def parse(self, prompts: Sequence[str]) -> list[SemanticGraph]:
+        return [self.graph] * len(prompts)
+
+    def pooled(self, texts: Sequence[str]) -> list[np.ndarray]:
+        self.texts += texts
+        return [np.zeros(1, np.float32)] * len(texts)
+
+
+arguments = st.builds(lambda start, size: Argument("ARG1", start, start + size), st.integers(0, 6), st.integers(1, 2))
+frames = st.builds(lambda verb, said: Frame(verb, tuple(said)), st.integers(0, 7), st.lists(arguments, max_size=5))
+
+
+@given(st.lists(frames, max_size=7, unique_by=lambda frame: frame.predicate))
+def test_slots_are_those_of_the_graph_that_is_built_with_the_smaller_caps(found: list[Frame]):
+    words = " ".join("abcdefgh")
+    pipeline = OneGraph(build_graph(words, found, max_actions=8, max_specifics=16))
+    texts = CaptionTexts.build(((words,),), cast("TextPipeline", pipeline))
+    wanted = build_graph(words, found, max_actions=2, max_specifics=3)
+    strings, adjacency = texts.slots(2, 3)
+    assert [pipeline.texts[k] if k >= 0 else "" for k in strings[0]] == [
+        wanted.nodes[k].text if k >= 0 else "" for k in wanted.slots(2, 3)
+    ]
+    assert np.array_equal(adjacency[0], wanted.adjacency(2, 3))

@@ -16,9 +16,10 @@ from marey.core.errors import InvalidInput
 from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COMPOSED, COUNTS, compose
-from marey.data.describe import ACTIONS, Facts, describe, describe_text
+from marey.data.describe import ACTIONS, STYLE_NAMES, Facts, describe, describe_text
 from marey.data.folder import LEAST_STD, PreparedWriter
 from marey.data.gestures import made_gestures
+from marey.data.grammar import grammar
 from marey.data.lengthen import SHORT, between_idles, closes, repeated, travelling
 from marey.data.licences import check_mix
 from marey.data.manifest import Clip, Manifest, Measured, SourceEntry
@@ -184,8 +185,9 @@ def _said(clip: PackClip, change: Callable[[str], str | None]) -> PackClip:
 
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], name: str, *, mirrored: bool) -> Facts | None:
     """Facts of a clip: captions of its index, and for training the vocabulary's; or the caption grammar if it has the
-    action."""
-    if clip.captions or content not in ACTIONS:
+    action and the style."""
+    told = content in ACTIONS and STYLE_NAMES.get(clip.style, clip.style) in grammar().styles
+    if clip.captions or not told:
         seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
         authors = clip.captions or ((seen,),)
         if mirrored:

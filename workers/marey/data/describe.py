@@ -45,8 +45,8 @@ ACTIONS: dict[str, str] = {
 STRIKES = {"kick": kicks, "punch": punches, "slash": slashes, "dance": is_lively}
 LOCOMOTION = ("walk", "run", "dash", "walk_back", "walk_diagonal", "turn")
 CYCLIC = ("walk", "run", "dash", "walk_back", "walk_diagonal")
-# styles with different names in the two data sets
-STYLE_NAMES = {"masculinity": "masculine", "tired": "exhausted", "old": "elderly"}
+# styles with different names in the two data sets, and that of a set without styles
+STYLE_NAMES = {"": "normal", "masculinity": "masculine", "tired": "exhausted", "old": "elderly"}
 
 
 @dataclass(frozen=True)

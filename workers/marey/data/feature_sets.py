@@ -4,12 +4,14 @@ itself, since sets of different layouts cannot be combined."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from marey.data.manifest import Manifest
 from marey.data.snapmogen import TERMS as SNAPMOGEN
 from marey.data.snapmogen import prepare_snapmogen
+from marey.data.t2m_folder import CMP_SET, HUMANML3D_SET, KIT_SET, prepare_t2m
 
 
 class PrepareFeatures(Protocol):
@@ -18,5 +20,8 @@ class PrepareFeatures(Protocol):
     def __call__(self, path: Path, out: Path, *, progress: Callable[[int, int], None] | None = None) -> Manifest: ...
 
 
-FEATURE_SETS: Mapping[str, PrepareFeatures] = {SNAPMOGEN.name: prepare_snapmogen}
+FEATURE_SETS: Mapping[str, PrepareFeatures] = {
+    SNAPMOGEN.name: prepare_snapmogen,
+    **{kind.terms.name: partial(prepare_t2m, kind) for kind in (HUMANML3D_SET, KIT_SET, CMP_SET)},
+}
 """By the name of the source."""

@@ -142,6 +142,8 @@ def _kind(clip: Clip) -> str:
         return "made"
     if clip.speed != 1:
         return "retimed"
+    if clip.cropped:
+        return "cropped"
     return "mirrored" if clip.mirrored else "captured"
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 from marey.data.licences import Terms, Tier
 
@@ -17,6 +19,8 @@ FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS, MANIFEST, TEXTS = (
     "texts.npz",
 )
 FILES = (FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS)
+ADDED = ("cropped", "tags")
+"""Fields of clips that earlier releases do not know."""
 
 
 class FileEntry(BaseModel):
@@ -63,7 +67,7 @@ class Manifest(BaseModel):
     lengths: dict[str, dict[str, int]]
     """Number of clips by split and length in seconds (`0-1`, `1-2`, …)."""
     kinds: dict[str, int]
-    """Number of clips by kind: captured, mirrored, retimed, made, looped, spliced."""
+    """Number of clips by kind: captured, mirrored, retimed, made, cropped, looped, spliced."""
     captions: int
     caption_files: dict[str, str] = {}
     """sha256 of each file of human captions, by `set/captions-author.csv`."""
@@ -99,7 +103,8 @@ class Clip(BaseModel):
     `sides` the measured side of each: left, right, both, or empty. If several actions are joined, `seams` are the first
     frames of all but the first action, and `act_captions` describe each action separately. `authors` has the number of
     captions of each author, in order; empty: all by one author. `made` marks clips with a synthetic gesture
-    (`marey.data.gestures`).
+    (`marey.data.gestures`). `cropped` marks clips whose frames are a part of another clip of the folder. `tags` are the
+    words of each caption with their parts of speech, `word/TAG word/TAG …`, where they are published.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -123,8 +128,16 @@ class Clip(BaseModel):
     authors: tuple[int, ...] = ()
     seams: tuple[int, ...] = ()
     act_captions: tuple[str, ...] = ()
+    cropped: bool = False
+    tags: tuple[str, ...] = ()
+
+    @model_serializer(mode="wrap")
+    def _serialize(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the defaults of fields that earlier releases refuse."""
+        values: dict[str, Any] = handler(self)
+        return {name: value for name, value in values.items() if name not in ADDED or value}
 
     @property
     def captured(self) -> bool:
-        """Return True for an unchanged capture: not mirrored, joined, made, slower or faster."""
-        return not (self.mirrored or self.spliced or self.made) and self.speed == 1.0
+        """Return True for an unchanged capture: not mirrored, joined, made, cropped, slower or faster."""
+        return not (self.mirrored or self.spliced or self.made or self.cropped) and self.speed == 1.0

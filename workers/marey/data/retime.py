@@ -70,7 +70,7 @@ def stretch(part: Part, target: int, rng: random.Random, *, repeat_share: float 
         return (join_clips(joints, whole[j:], FPS), (part,) * 2, 1) if cost < 0.1 and j - i > 8 else None
     third = max((y - x) // 3, 2)
     i, j, cost = best_cut(part, range(y - third, y + 1), part, range(x, x + third))
-    if cost > 0.05 or i - j < 5:
+    if cost > 0.05 or i - j < 5 or i == last:  # a hand that is up until the end has nothing to fall to
         return None
     joints = whole[: i + 1]
     while len(joints) + (last - i) < target:

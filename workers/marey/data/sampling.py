@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from marey.data.manifest import Clip
 from marey.data.splits import actions_of
 
+UNLABELLED = "motion"
+"""Label of clips that are published with captions and no action: all of them are drawn equally often."""
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Shares of the draws for sequences of two and three actions; the rest goes to clips of one action."""
 

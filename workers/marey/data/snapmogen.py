@@ -19,12 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.core.arrays import check_array, map_npy, read_npy
-from marey.core.documents import read_bytes, read_json
+from marey.core.arrays import check_array, map_npy
+from marey.core.documents import read_json
 from marey.core.errors import InvalidFile, NotFound
-from marey.data.folder import LEAST_STD, PreparedWriter
+from marey.data.folder import PreparedWriter
 from marey.data.licences import Terms
 from marey.data.manifest import Clip, Manifest, Measured, SourceEntry
+from marey.data.published import MAX_TEXT, SPLITS, read_lines, read_statistics
+from marey.data.published import measure as measure_travel
+from marey.data.sampling import UNLABELLED
 from marey.data.wording import mirrored
 from marey.motion.rig_features import SNAPMOGEN_296 as LAYOUT
 
@@ -40,13 +43,9 @@ TERMS = Terms(
     url="https://huggingface.co/datasets/Ericguo5513/SnapMoGen",
     tier="non-commercial",
 )
-SPLITS = ("train", "val", "test")
 AUTHORS = ("manual", "gpt")
 """Captions by people, and captions that a language model made from those."""
 MIRROR = "m_"
-CONTENT = "motion"
-"""Label of every clip, which has captions and no action: all clips are drawn equally often."""
-MAX_JSON = 2**28
 _ID = re.compile(r"(?P<mid>[A-Za-z0-9_.-]+)#(?P<start>\d{1,9})#(?P<end>\d{1,9})")
 
 
@@ -90,7 +89,7 @@ class PublishedFolder:
         seen: dict[str, str] = {}
         for split in SPLITS:
             file = self.path / SPLIT_INFO / f"{split}_ids.txt"
-            for number, name in enumerate(_lines(file), start=1):
+            for number, name in enumerate(read_lines(file), start=1):
                 where = f"{file}, line {number}"
                 if not name:
                     continue
@@ -121,7 +120,7 @@ class PublishedFolder:
     @cached_property
     def _captions(self) -> Mapping[str, tuple[str, ...]]:
         path = self.path / CAPTIONS
-        document = read_json(path, limit=MAX_JSON)
+        document = read_json(path, limit=MAX_TEXT)
         if not isinstance(document, dict):
             raise InvalidFile("is not a JSON object of clips", where=str(path))
         return {str(name): _captions_in(entry, f"{path}: {name}") for name, entry in document.items()}
@@ -147,27 +146,8 @@ class PublishedFolder:
         return check_array(frames, clip.id, str(path), kinds="f", shape=(len(frames), LAYOUT.dim))
 
     def statistics(self) -> tuple[Float32, Float32]:
-        """Return the published mean and deviation (296,); a deviation of zero, that of a constant, becomes
-        `LEAST_STD`.
-
-        Raises:
-            NotFound, InvalidFile: one is missing, or has another shape, NaN or a negative deviation.
-        """
-        mean, std = (self._statistic(name) for name in ("mean", "std"))
-        if (std < 0).any():
-            raise InvalidFile("holds a negative deviation", where=str(self.path / META / "std.npy"))
-        return mean, np.maximum(std, np.float32(LEAST_STD))
-
-    def _statistic(self, name: str) -> Float32:
-        path = self.path / META / f"{name}.npy"
-        return check_array(read_npy(path), name, str(path), kinds="f", shape=(LAYOUT.dim,)).astype(np.float32)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        return [line.strip() for line in read_bytes(path, limit=MAX_JSON).decode("utf-8").splitlines()]
-    except UnicodeDecodeError as error:
-        raise InvalidFile(f"is not UTF-8: {error.reason}", where=str(path)) from None
+        """Return the published mean and deviation (296,); raises as `read_statistics`."""
+        return read_statistics(self.path / META / "mean.npy", self.path / META / "std.npy", LAYOUT.dim)
 
 
 def _captions_in(entry: Any, where: str) -> tuple[str, ...]:
@@ -229,11 +209,11 @@ def _described(clip: PublishedClip, features: Float32, writer: PreparedWriter) -
         **writer.place(features),
         split=clip.split,
         dataset=TERMS.name,
-        content=CONTENT,
+        content=UNLABELLED,
         style="",
         mirrored=clip.mid.startswith(MIRROR),
         spliced=(),
-        acts=(CONTENT,),
+        acts=(UNLABELLED,),
         measured=measure(features),
         captions=clip.captions,
     )
@@ -251,16 +231,6 @@ def joints_of(features: Float32) -> Float32:
 
 def measure(features: Float32) -> Measured:
     """Measure the travel of features (T, 296), and count how often a toe comes to stand."""
-    slices, values = LAYOUT.slices, features.astype(np.float64)
-    seconds = len(values) / LAYOUT.fps
-    path = LAYOUT.unit * float(np.linalg.norm(values[:, slices["velocity"]], axis=1).sum())
-    yaw = values[:, 0] - 2 * np.pi * np.round(values[:, 0] / (2 * np.pi))  # published steps may be a turn too long
-    toes = LAYOUT.contacts(features)[:, 1::2]
-    return Measured(
-        seconds=round(seconds, 2),
-        path=round(path, 2),
-        turn=round(-float(np.degrees(yaw.sum())), 1) + 0.0,
-        speed=round(path / seconds, 2),
-        steps=int((toes[1:] & ~toes[:-1]).sum()),
-        side="",
-    )
+    values = features[:, 0].astype(np.float64)
+    yaw = values - 2 * np.pi * np.round(values / (2 * np.pi))  # published steps may be a turn too long
+    return measure_travel(features, LAYOUT, LAYOUT.unit, -float(np.degrees(yaw.sum())))

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.core.arrays import map_npy
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile
 from marey.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
@@ -32,7 +33,8 @@ from marey.importing import Download, ImportRequest, make_card, provenance
 from marey.motion.features import layout
 from marey.nn.bundling import stored
 
-INSIDE = ("checkpoints/t2m", "checkpoint_dir/humanml3d")
+KIT = T2MConfig(name="public-kit", layout="kit-251", features=251, fps=12.5)
+INSIDE = ("checkpoints/t2m", "checkpoints/kit", "checkpoint_dir/humanml3d")
 """Where the files lie in the downloads of T2M and MoMask, and in that of MoMask++."""
 GLOVE = ("glove", "../glove", "../../glove")
 GLOVE_FILES = ("our_vab_data.npy", "our_vab_words.pkl", "our_vab_idx.pkl")
@@ -52,18 +54,19 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
         InvalidFile: a file is damaged, of another kind, or of other sizes.
         Conflict: the bundle already exists.
     """
-    config = config or T2MConfig()
     download = Download(request.folder, inside=INSIDE)
+    meta = download.find("Comp_v6_KLD005/meta", what="the statistics of the evaluator")
+    config = config or published_config(meta / "mean.npy")
     motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
     file = download.find("text_mot_match/model/finest.tar", what="the evaluator")
     checkpoint = download.checkpoint(file)
     checkpoint.section("movement_encoder").fill(motion.movement)
     checkpoint.section("motion_encoder").fill(motion.motion)
     checkpoint.section("text_encoder").fill(text)
-    meta = download.find("Comp_v6_KLD005/meta", what="the statistics of the evaluator")
     mean, std = download.statistics(meta, config.features)
     words, vectors = _read_words(download, config)
     accounts = download.finish()
+    name = "KIT-ML" if config.layout == KIT.layout else "HumanML3D"
     with BundleWriter(request.output, overwrite=request.overwrite) as writer:
         for name, network in (("motion", motion), ("text", text)):
             state = {k: v.numpy() for k, v in network.state_dict().items() if stored(k)}
@@ -82,10 +85,29 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
             skeleton=layout(config.layout).skeleton.name,
             layout=config.layout,
             fps=config.fps,
-            data=(DataSource(name="HumanML3D", licence=request.licence, credit=CREDIT),),
+            data=(
+                DataSource(
+                    name="KIT-ML" if config.layout == KIT.layout else "HumanML3D",
+                    licence=request.licence,
+                    credit=CREDIT,
+                ),
+            ),
             licence=request.licence,
             training=provenance(request, accounts),
         )
+
+
+def published_config(mean: Path) -> T2MConfig:
+    """Return the public sizes for the data set whose statistics these are: HumanML3D or KIT-ML.
+
+    Raises:
+        NotFound, InvalidFile: the file is missing, or is of neither.
+    """
+    found = map_npy(mean).shape
+    for config in (T2MConfig(), KIT):
+        if found == (config.features,):
+            return config
+    raise InvalidFile(f"has shape {found}; HumanML3D's has 263 numbers, KIT-ML's 251", where=str(mean))
 
 
 def _read_words(download: Download, config: T2MConfig) -> tuple[list[str], NDArray[np.float32]]:
@@ -121,8 +143,8 @@ def _plain(file: Path) -> Any:
 
 
 ABOUT = """The public T2M evaluator: Guo et al. 2022, "Generating Diverse and Natural 3D Human Motions from Text",
-`text_mot_match` with GloVe `our_vab`. Trained on HumanML3D. The code is MIT; the weights have no stated terms, and
-derive from HumanML3D, which is made of AMASS.
+`text_mot_match` with GloVe `our_vab`. Trained on HumanML3D, or on KIT-ML where it reads 251 features. The code is MIT;
+the weights have no stated terms; HumanML3D is made of AMASS.
 
 Before its numbers are believed, its row of real data should be compared with the published one: R@1 .511, matching
 score 2.974."""

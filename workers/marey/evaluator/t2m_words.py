@@ -7,7 +7,7 @@ utils/word_vectorizer.py.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile, InvalidInput
+from marey.data.prepared import PreparedData
+from marey.data.t2m_captions import read_caption
 
 TAGS = (
     "VERB", "NOUN", "DET", "ADP", "NUM", "AUX", "PRON", "ADJ", "ADV",
@@ -67,19 +69,38 @@ class TaggedCaptions:
         Raises:
             InvalidFile: a line is not `caption#words#start#end`, or there are none.
         """
+        captions = (
+            read_caption(line, where=f"{file}:{number}")
+            for file in sorted(folder.glob("*.txt"))
+            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1)
+            if line.strip()
+        )
+        return cls._of(((caption.text, caption.tags) for caption in captions), str(folder))
+
+    @classmethod
+    def of(cls, data: PreparedData) -> TaggedCaptions:
+        """Return the captions of a prepared folder that was made from a published one.
+
+        Raises:
+            InvalidFile: it has no tags.
+        """
+        captions = (pair for clip in data.clips if clip.tags for pair in zip(clip.captions, clip.tags, strict=True))
+        return cls._of(captions, str(data.path))
+
+    @classmethod
+    def _of(cls, captions: Iterable[tuple[str, str]], where: str) -> TaggedCaptions:
         found: dict[str, Tagged] = {}
-        for file in sorted(folder.glob("*.txt")):
-            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
-                if line.strip():
-                    caption, words = read_line(line, where=f"{file}:{number}")
-                    found.setdefault(caption, words)
+        for text, tags in captions:
+            if tags:
+                found.setdefault(text, read_tags(tags))
         if not found:
-            raise InvalidFile("holds no captions", where=str(folder), hint="Give HumanML3D's folder `texts`.")
+            hint = "Give HumanML3D's folder `texts`, or one that `marey data prepare humanml3d` wrote."
+            raise InvalidFile("holds no captions with parts of speech", where=where, hint=hint)
         return cls(found)
 
     def tag(self, sentence: str) -> Tagged:
         """See `Tagger`."""
-        words = self.found.get(sentence.strip())
+        words = self.found.get(" ".join(sentence.split()))
         if words is None:
             raise InvalidInput(
                 "is not one of the captions whose words are tagged",
@@ -89,17 +110,10 @@ class TaggedCaptions:
         return words
 
 
-def read_line(line: str, *, where: str) -> tuple[str, Tagged]:
-    """Parse a caption and its tagged words from a line `caption#word/TAG word/TAG …#start#end`.
-
-    Raises:
-        InvalidFile: another format.
-    """
-    fields = line.strip().split("#")
-    words = [token.rpartition("/") for token in fields[1].split()] if len(fields) == 4 else []
-    if not words or not all(word and tag for word, _, tag in words):
-        raise InvalidFile("is not a line `caption#word/TAG …#start#end`", where=where)
-    return fields[0].strip(), tuple((word, tag) for word, _, tag in words)
+def read_tags(tags: str) -> Tagged:
+    """Split `word/TAG word/TAG …`."""
+    parted = (word.rpartition("/") for word in tags.split())
+    return tuple((word, tag) for word, _, tag in parted)
 
 
 @dataclass(frozen=True, eq=False)

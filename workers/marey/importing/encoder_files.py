@@ -61,6 +61,10 @@ class Published:
     layers: tuple[str, ...]
 
 
+_CLIP = "Radford et al. 2021, Learning Transferable Visual Models From Natural Language Supervision"
+_CLIP_KEEP = r"text_model\.(?!embeddings\.position_ids).*|text_projection\.weight"
+_CLIP_LEFT = "the image tower, or computed anew"
+_CLIP_BLOCKS = r"text_model\.encoder\.layers\.(\d+)\."
 _T5 = "Raffel et al. 2020, Exploring the Limits of Transfer Learning"
 _T5_KEEP = r"shared\.weight|encoder\.(block|final_layer_norm)\..*"
 _T5_LEFT = "the decoder, or a copy of the embedding"
@@ -70,11 +74,20 @@ _T5_FEED_FORWARD = "encoder.block.0.layer.1.DenseReluDense."
 PUBLISHED = {
     "clip-vit-b32": Published(
         licence="MIT",
-        credit="Radford et al. 2021, Learning Transferable Visual Models From Natural Language Supervision",
-        keep=r"text_model\.(?!embeddings\.position_ids).*|text_projection\.weight",
-        left="the image tower, or computed anew",
+        credit=_CLIP,
+        keep=_CLIP_KEEP,
+        left=_CLIP_LEFT,
         markers={"text_model.embeddings.token_embedding.weight": 512, "text_projection.weight": 512},
-        blocks=r"text_model\.encoder\.layers\.(\d+)\.",
+        blocks=_CLIP_BLOCKS,
+        layers=("text_config", "num_hidden_layers"),
+    ),
+    "clip-vit-l14": Published(
+        licence="MIT",
+        credit=_CLIP,
+        keep=_CLIP_KEEP,
+        left=_CLIP_LEFT,
+        markers={"text_model.embeddings.token_embedding.weight": 768, "text_projection.weight": 768},
+        blocks=_CLIP_BLOCKS,
         layers=("text_config", "num_hidden_layers"),
     ),
     "t5-base": Published(
@@ -115,7 +128,7 @@ def write_encoder(
     if name.startswith("t5"):
         check_t5(name, source)
     else:
-        check_clip(source)
+        check_clip(name, source)
     with (
         BundleWriter(output, overwrite=overwrite) as writer,
         TemporaryDirectory(prefix=".", dir=output.parent) as temporary,  # /tmp may not have room for a gigabyte

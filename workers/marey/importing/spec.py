@@ -17,6 +17,12 @@ CLIP = ImportKind(
     run="marey.importing.encoders:import_encoder",
     licence="MIT",
 )
+CLIP_L14 = ImportKind(
+    name="clip-vit-l14",
+    help="Text encoder CLIP ViT-L/14: the folder of openai/clip-vit-large-patch14.",
+    run="marey.importing.encoders:import_encoder",
+    licence="MIT",
+)
 T5 = ImportKind(
     name="t5-base",
     help="Text encoder T5 base: the folder of google-t5/t5-base.",

@@ -5,11 +5,27 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from marey.core.errors import InvalidInput
+from marey.motion.features import HeadingLayout, layout
 
-def heading_joints(features: Tensor, joints: int) -> Tensor:
+
+def unit_of(name: str) -> float:
+    """Return the metres in one unit of the features of a layout whose joints these functions read.
+
+    Raises:
+        NotFound: there is no such layout.
+        InvalidInput: the joints of the layout lie elsewhere.
+    """
+    known = layout(name)
+    if not isinstance(known, HeadingLayout):
+        raise InvalidInput(f"{name} does not hold joints as HumanML3D's layout does", where="layout")
+    return known.unit
+
+
+def heading_joints(features: Tensor, joints: int, unit: float = 1.0) -> Tensor:
     """Convert (B, T, D) to joints (B, T, J, 3) in metres over the root's ground point, in the heading frame; no
-    integration."""
-    features = features.float()
+    integration. `unit` is that of the features, in metres."""
+    features = features.float() * unit
     batch, frames = features.shape[:2]
     root = torch.zeros_like(features[..., :3])
     root[..., 1] = features[..., 3]
@@ -17,15 +33,16 @@ def heading_joints(features: Tensor, joints: int) -> Tensor:
     return torch.cat([root[:, :, None], others], 2)
 
 
-def world_joints(features: Tensor, joints: int) -> Tensor:
+def world_joints(features: Tensor, joints: int, unit: float = 1.0) -> Tensor:
     """Decode positions: (B, T, D) features in their own units to (B, T, J, 3) metres, Y up, facing +Z in frame 0.
 
     Columns: [0] half the yaw delta a frame, [1:3] displacement in the heading frame, [3] root height, [4:4+3(J-1)]
-    the other joints relative to the root's ground point, in the heading frame (HumanML3D, Guo et al. 2022).
+    the other joints relative to the root's ground point, in the heading frame (HumanML3D, Guo et al. 2022). `unit` is
+    that of the features, in metres.
     """
-    features = features.float()
+    half = features[..., 0].float().cumsum(1)
+    features = features.float() * unit
     batch, frames = features.shape[:2]
-    half = features[..., 0].cumsum(1)
     angle = torch.cat([half.new_zeros(batch, 1), half[:, :-1]], 1)  # (B, T): sum over the frames before
     # heading frame to world: rotation about Y by -2 · angle
     cos, sin = torch.cos(2 * angle), torch.sin(2 * angle)

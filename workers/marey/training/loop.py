@@ -10,11 +10,11 @@ import json
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import structlog
@@ -79,6 +79,16 @@ class TrainingStage(Protocol):
         ...
 
 
+@runtime_checkable
+class SplitStage(Protocol):
+    """A stage whose batches can be trained in parts, each with its own backward pass: gradient accumulation."""
+
+    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
+        """Yield the losses of parts of one batch, at most `size` samples each, and values to log; sums over the parts
+        are those of the whole batch."""
+        ...
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """Options of a run; only seed, budget and precision change the trained weights."""
@@ -92,6 +102,7 @@ class RunOptions:
     validate_times: int = 8  # over the whole budget, the end included
     log_every: int = 20
     quiet: bool = False
+    micro_batch: int | None = None  # samples of a forward and backward pass; None = the whole batch
 
 
 def start_process_group() -> None:
@@ -116,6 +127,9 @@ def train(stage: TrainingStage, options: RunOptions, config: dict[str, Any]) -> 
 class _Run:
     def __init__(self, stage: TrainingStage, options: RunOptions, config: dict[str, Any]) -> None:
         self.stage, self.options = stage, options
+        if options.micro_batch is not None and not isinstance(stage, SplitStage):
+            hint = "Give it to a stage alone, and train the others without."
+            raise InvalidInput(f"the batches of {stage.name} cannot be split", where="--micro-batch", hint=hint)
         self.config: dict[str, Any] = json.loads(json.dumps(config))  # tuples become lists, as in a checkpoint
         o = stage.optimisation
         self.device = next(stage.module.parameters()).device
@@ -187,10 +201,8 @@ class _Run:
         torch.manual_seed(int(rng.integers(2**62)))
         context = StepContext(self.step, fraction, rng)
         stage.module.train()
-        with self._autocast():
-            loss, logs = stage.loss(context)
         self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
+        logs = self._backward(context)
         groups = stage.clip_groups()
         for group in groups:
             distributed.average_gradients(group)
@@ -208,6 +220,26 @@ class _Run:
         self._tick(time.monotonic() - started)
         values = {k: float(v) for k, v in logs.items()} if self.step % self.options.log_every in (0, 1) else {}
         return values | {"rate": rate, "gradient_norm": float(norms[0])}
+
+    def _backward(self, context: StepContext) -> Mapping[str, Tensor]:
+        """Compute the gradients of one batch; return values to log."""
+        stage, size = self.stage, self.options.micro_batch
+        if size is None:
+            with self._autocast():
+                loss, logs = stage.loss(context)
+            loss.backward()
+            return logs
+        assert isinstance(stage, SplitStage)  # `_Run` has refused others
+        parts, total = stage.parts(context, size), dict[str, Tensor]()
+        while True:
+            with self._autocast():
+                part = next(parts, None)
+            if part is None:
+                return total
+            loss, logs = part
+            loss.backward()
+            total = {name: total.get(name, torch.zeros_like(value)) + value for name, value in logs.items()}
+            del part, loss  # frees what the part saved before the next one saves its own
 
     def _tick(self, seconds: float) -> None:
         """Advance the training clock, the same on all processes."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -16,7 +17,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, InvalidInput
 from marey.data.manifest import Clip
 from marey.data.prepared import PreparedData
 from marey.nn import distributed
@@ -53,6 +54,30 @@ class MotionData:
         """Return features (B, size, D) from first frames (B,); frames past the end repeat the very last one."""
         index = starts[:, None] + torch.arange(size, device=self.features.device)
         return self.features[index.clamp(max=len(self.features) - 1)]
+
+
+class LayoutConfig(Protocol):
+    """Fields of a model's configuration that say which data it reads."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def layout(self) -> str: ...
+
+
+def check_layout(config: LayoutConfig, data: PreparedData) -> None:
+    """Refuse data of another layout.
+
+    Raises:
+        InvalidInput: the features of the folder are not the configuration's.
+    """
+    found = data.manifest.layout
+    if found != config.layout:
+        raise InvalidInput(
+            f"holds features of the layout {found}; the configuration {config.name!r} reads {config.layout}",
+            where=str(data.path),
+            hint="Prepare the data with this layout, or choose another configuration.",
+        )
 
 
 def dataset_of(clip: Clip) -> str:

@@ -47,10 +47,13 @@ class Pairs:
             yield self.validation[at : at + batch]
 
 
-def pieces_of(lengths: Tensor) -> list[Tensor]:
+def pieces_of(lengths: Tensor, size: int | None = None) -> list[Tensor]:
     """Split rows (B,) of a batch into four pieces of similar length, each padded to its own longest: less padding.
 
-    One piece on an accelerator, where launches cost more than padding.
+    One piece on an accelerator, where launches cost more than padding. With `size`, pieces of at most so many rows,
+    which is for memory.
     """
     order = torch.argsort(lengths, stable=True)
+    if size is not None:
+        return list(order.split(size))
     return list(order.chunk(min(4, len(order)))) if lengths.device.type == "cpu" else [order]

@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 import torch
 from torch import nn
@@ -53,12 +53,18 @@ class TrainOptions(Generic[C]):
     threads: int = 0
     bf16: bool = True
     quiet: bool = False
+    micro_batch: int | Literal["auto"] | None = None  # samples of a pass; auto = as many as fit the device's memory
+    recompute: bool = False  # activations in the backward pass: less memory, more time
 
     def options(self, stage: str) -> RunOptions:
         """Return the loop's options for a stage."""
+        if self.micro_batch == "auto":
+            hint = "Name a number, and one stage at a time."
+            raise InvalidInput("auto is for stages whose memory is estimated", where="--micro-batch", hint=hint)
         return RunOptions(
-            self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet
-        )
+            self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet,
+            micro_batch=self.micro_batch,
+        )  # fmt: skip
 
 
 def choose_budget(config: object, stage: str, prepared: Path, steps: int | None, minutes: float | None) -> Budget:
@@ -135,6 +141,8 @@ class TrainingRecipe(Generic[C]):
             own = [field for field in self.built_from[stage.name] if field != self.grows.get(stage.name)]
             part = self._part(stage.name, options.config, options.run, own)
             stage.module.load_state_dict(grow(part.state, stage.module.state_dict()))
+        if options.recompute:
+            set_recompute(stage.module)
         return train(stage, options.options(stage.name), options.config.to_dict())
 
 
@@ -161,6 +169,7 @@ def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: di
         sources = ancestors(options, name)
         part = TrainedPart(module.state_dict(), options.config.to_dict(), metrics, sha256, budget, sources)
         save_part(options.run / name / "part", part)
+    distributed.barrier()  # the next stage reads the part in every process
 
 
 def train_all(
@@ -190,6 +199,19 @@ def train_all(
         found = train_stage(name, dataclasses.replace(options, budget=budget, resume=started))
         metrics |= {f"{name}/{metric}": value for metric, value in found.items()}
     return metrics
+
+
+def set_recompute(module: nn.Module) -> None:
+    """Let the networks of a stage compute activations again in the backward pass, where they can.
+
+    Raises:
+        InvalidInput: none of them can.
+    """
+    able = [each for each in module.modules() if hasattr(each, "recompute")]
+    if not able:
+        raise InvalidInput("this stage has no network whose activations are computed again", where="--recompute")
+    for each in able:
+        each.recompute = True  # pyright: ignore[reportAttributeAccessIssue, reportArgumentType]
 
 
 def use_threads(threads: int) -> None:

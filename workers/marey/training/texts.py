@@ -30,6 +30,7 @@ from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
 from marey.text.pipeline import TextPipeline
 
 CHUNK = 256
+SPECIFIC = LEVELS.index("specific")
 MAX_BYTES = 8 * 2**30
 KINDS = {
     "strings": "float16",
@@ -63,6 +64,7 @@ class CaptionTexts:
         pipeline: TextPipeline,
         *,
         processes: int = 1,
+        encoder_path: Path | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> CaptionTexts:
         """Parse and encode the captions of each clip; equal texts are encoded once.
@@ -71,11 +73,12 @@ class CaptionTexts:
             captions: captions of each clip.
             pipeline: text pipeline for the single-process case.
             processes: number of parallel processes, each with the weights of its `spec`.
+            encoder_path: folder of the encoder's weights in those processes; None = where they are installed.
             progress: called with the number of done captions and of all.
         """
         flat = [caption for clip in captions for caption in clip]
         unique = list(dict.fromkeys(flat))
-        with _readers(pipeline, processes) as (parse, encode):
+        with _readers(pipeline, processes, encoder_path) as (parse, encode):
             graphs: dict[str, SemanticGraph] = {}
             for found in parse(_chunks(unique)):
                 graphs.update(zip(unique[len(graphs) :], found, strict=False))
@@ -175,7 +178,8 @@ class CaptionTexts:
         return None
 
     def slots(self, max_actions: int, max_specifics: int) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
-        """Put strings and edge types in fixed slots, as `SemanticGraph.slots` and `.adjacency` do.
+        """Put strings and edge types in fixed slots, as the graphs that `build_graph` builds with these caps: specifics
+        that only actions beyond the cap mention are left out.
 
         Returns:
             (K, S) index of the string in each slot, -1 = absent, and (K, S, S) edge type, -1 = none, self-loops in.
@@ -183,18 +187,20 @@ class CaptionTexts:
         count, size = len(self.node_start) - 1, 1 + max_actions + max_specifics
         caption = np.repeat(np.arange(count), np.diff(self.node_start))  # (N,)
         level = self.node_level.astype(np.int64)
+        owner = np.repeat(np.arange(count), np.diff(self.edge_start))  # (E,)
+        begins, ends = (self.node_start[owner] + self.edges[:, side] for side in (0, 1))
         rank = _rank_within(caption * len(LEVELS) + level)
+        wanted = (level != SPECIFIC) | np.isin(np.arange(len(level)), ends[rank[begins] < max_actions])
+        rank = _rank_within((caption * len(LEVELS) + level) * 2 + wanted)  # without those of actions that are left out
         first_slot = np.array([0, 1, 1 + max_actions])[level]
         room = np.array([1, max_actions, max_specifics])[level]
-        slot = np.where(rank < room, first_slot + rank, -1)  # (N,)
+        slot = np.where(wanted & (rank < room), first_slot + rank, -1)  # (N,)
         kept = slot >= 0
         strings = np.full((count, size), -1, np.int32)
         strings[caption[kept], slot[kept]] = self.node_string[kept]
         adjacency = np.full((count, size, size), -1, np.int8)
         adjacency[caption[kept], slot[kept], slot[kept]] = np.where(level[kept] == 0, MA, OTHERS)
-        owner = np.repeat(np.arange(count), np.diff(self.edge_start))  # (E,)
-        source = slot[self.node_start[owner] + self.edges[:, 0]]
-        target = slot[self.node_start[owner] + self.edges[:, 1]]
+        source, target = slot[begins], slot[ends]
         both = (source >= 0) & (target >= 0)
         owner, source, target, kind = owner[both], source[both], target[both], self.edges[both, 2]
         adjacency[owner, source, target] = kind
@@ -211,13 +217,13 @@ Encode = Callable[[Sequence[Sequence[str]]], Iterator[NDArray[np.float16]]]
 
 
 @contextmanager
-def _readers(pipeline: TextPipeline, processes: int) -> Generator[tuple[Read, Encode]]:
+def _readers(pipeline: TextPipeline, processes: int, encoder_path: Path | None) -> Generator[tuple[Read, Encode]]:
     """Return functions that parse and encode chunks of texts, in order."""
     if processes == 1:
         yield lambda chunks: map(pipeline.parse, chunks), lambda chunks: (_encode(pipeline, texts) for texts in chunks)
         return
     spawning = multiprocessing.get_context("spawn")  # torch's threads do not survive a fork
-    with ProcessPoolExecutor(processes, spawning, _load, (pipeline.spec,)) as pool:
+    with ProcessPoolExecutor(processes, spawning, _load, (pipeline.spec, encoder_path)) as pool:
         yield lambda chunks: pool.map(_parse_there, chunks), lambda chunks: pool.map(_encode_there, chunks)
 
 
@@ -228,8 +234,8 @@ def _encode(pipeline: TextPipeline, texts: Sequence[str]) -> NDArray[np.float16]
 _loaded: list[TextPipeline] = []  # in a process of the pool: its own pipeline
 
 
-def _load(spec: TextSpec) -> None:
-    _loaded.append(TextPipeline.load(spec))
+def _load(spec: TextSpec, encoder_path: Path | None) -> None:
+    _loaded.append(TextPipeline.load(spec, encoder_path=encoder_path))
 
 
 def _parse_there(texts: Sequence[str]) -> list[SemanticGraph]:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.data.manifest import Clip
-from marey.data.sampling import sampling_weights
+from marey.data.sampling import UNLABELLED, sampling_weights
 from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
 from marey.nn.quantizer import Quantized
-from marey.training.joints import heading_joints, world_joints
+from marey.training.joints import heading_joints, unit_of, world_joints
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData, dataset_of
 from marey.training.optimisation import StageConfig
@@ -46,6 +46,8 @@ class TokenizerWeights(Protocol):
 class TokenizerTraining(Protocol):
     """Fields of a model's configuration that training reads."""
 
+    @property
+    def layout(self) -> str: ...
     @property
     def features(self) -> int: ...
     @property
@@ -99,11 +101,11 @@ def tokenizer_loss(
     weights = feature_weights(config).to(features.device)  # (D,)
     l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
-    restored = model.restore(output)
-    local = heading_joints(restored, config.joints) - heading_joints(features, config.joints)  # (B, T, J, 3)
+    restored, body = model.restore(output), (config.joints, unit_of(config.layout))
+    local = heading_joints(restored, *body) - heading_joints(features, *body)  # (B, T, J, 3)
     position = _average(local.abs().sum(-1).mean(-1), valid)
     velocity = _average(local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps, valid[:, 1:])
-    drift = world_joints(restored, config.joints) - world_joints(features, config.joints)
+    drift = world_joints(restored, *body) - world_joints(features, *body)
     world = _average(drift.abs().sum(-1).mean(-1), valid)
     total = (
         l1
@@ -153,8 +155,8 @@ class TokenizerStage:
         self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
         rate = module.frames_per_token
-        self.train_clips = [c for c in data.prepared.split("train") if not c.spliced and c.length >= rate]
-        self.weights = tokenizer_weights(self.train_clips)
+        self.train_clips = tokenizer_clips(data.prepared.split("train"), rate)
+        self.weights = tokenizer_weights(self.train_clips, min(config.windows))
         self.first = np.array([c.start for c in self.train_clips])
         self.lengths = np.array([c.length - c.length % rate for c in self.train_clips])
 
@@ -200,9 +202,18 @@ class TokenizerStage:
         return {f"test/{name}": value for name, value in errors.items()}
 
 
-def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
+def tokenizer_clips(clips: Sequence[Clip], rate: int) -> list[Clip]:
+    """Return the clips of at least `rate` frames that are no part of others, and have none as parts."""
+    return [clip for clip in clips if not (clip.spliced or clip.cropped) and clip.length >= rate]
+
+
+def tokenizer_weights(clips: Sequence[Clip], window: int) -> NDArray[np.float64]:
     """Return sampling weights (sum 1): longer clips more often, rare classes raised; data sets with `SHARES` by those,
-    and what they leave to all others together, so that a small set has no more than its clips weigh."""
+    and what they leave to all others together, so that a small set has no more than its clips weigh. Where no clip has
+    a class, every window of `window` frames is drawn equally often, as published."""
+    if all(clip.content == UNLABELLED for clip in clips):
+        windows = np.maximum([clip.length - window + 1.0 for clip in clips], 1.0)
+        return windows / windows.sum()
     weights = sampling_weights(clips) * np.sqrt([c.length for c in clips])
     names = (dataset_of(c) for c in clips)
     groups = np.array([name if name in SHARES else "" for name in names])
@@ -224,7 +235,7 @@ def reconstruction_errors(
     `perplexity/{level}` of the code usage.
     """
     model.eval()
-    rate = model.frames_per_token
+    rate, body = model.frames_per_token, (config.joints, unit_of(config.layout))
     order = sorted((c for c in clips if c.length >= rate), key=lambda c: c.length)
     rows: list[tuple[str, float, float]] = []
     counts = torch.zeros(config.tokenizer.levels, config.tokenizer.codes, device=data.features.device)
@@ -235,7 +246,7 @@ def reconstruction_errors(
         features = data.windows(starts, int(lengths.max()))
         tokens = model.encode(features, lengths)  # (B, n, V)
         output = model.decode(tokens, lengths // rate)
-        truth, joints = world_joints(features, config.joints), world_joints(output, config.joints)
+        truth, joints = world_joints(features, *body), world_joints(output, *body)
         mask = frame_mask(lengths, features.shape[1])
         error = _per_clip((joints - truth).norm(dim=-1).mean(-1), mask)
         local = _per_clip(((joints - joints[:, :, :1]) - (truth - truth[:, :, :1])).norm(dim=-1).mean(-1), mask)

@@ -23,7 +23,8 @@ Sources = Annotated[
     typer.Argument(
         metavar="SOURCE PATH …",
         help="A known set (an unknown name lists them) with its archive or folder; own with a folder that has "
-        "dataset.toml and index.csv; pack with a file of `pack`; snapmogen with its published folder, alone.",
+        "dataset.toml and index.csv; pack with a file of `pack`; humanml3d, kit, cmp or snapmogen with the published "
+        "folder, alone.",
     ),
 ]
 Processes = Annotated[int, typer.Option("--processes", min=1, help="Number of processes that retarget.")]
@@ -135,13 +136,30 @@ def text(
     model: Annotated[
         str | None, typer.Option("--model", help="Bundle whose text specification to use; none = the standard one.")
     ] = None,
+    encoder: Annotated[
+        str | None,
+        typer.Option("--encoder", help="minilm (the standard), clip-vit-b32, clip-vit-l14, t5-base or t5-v1_1-base."),
+    ] = None,
+    labeller: Annotated[
+        str | None,
+        typer.Option("--labeller", help="srl-open (the standard), light, bert-srl, none, or a bundle's name or path."),
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option("--weights", help="Folder of the encoder's weights; none = where they are installed."),
+    ] = None,
+    as_written: Annotated[
+        bool,
+        typer.Option("--as-written", help="Keep the order of words; default: several actions in the order of time."),
+    ] = False,
 ) -> None:
     """Parse and encode the captions, once for all training runs."""
     from marey.cli.roles import data
 
     with console.bar() as bar:
         task = bar.add_task("captions", total=None)
-        count = data.encode_captions(folder, model, lambda done, total: bar.update(task, completed=done, total=total))
+        choice = data.TextChoice(model, encoder, labeller, weights, as_written)
+        count = data.encode_captions(folder, choice, lambda done, total: bar.update(task, completed=done, total=total))
     console.say(f"{count} captions encoded")
 
 

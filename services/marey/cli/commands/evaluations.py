@@ -13,6 +13,7 @@ from marey.cli import bulk, console, evaluating, options
 from marey.cli.commands import schedules
 from marey.cli.evaluating import EvaluationArguments
 from marey.cli.references import FORMS, find, of_view
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.cli.roles.actions import MeasureOptions, RefereeReport
@@ -41,12 +42,18 @@ class EvaluationStateOption(StrEnum):
     CANCELLED = "cancelled"
 
 
+class ProtocolOption(StrEnum):
+    """Published protocols; that of HumanML3D is KIT-ML's as well."""
+
+    HUMANML3D = "humanml3d"
+
+
 @app.command()
 def run(
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
     extra_columns: evaluating.Extra = options.ExtraColumns.REFUSE,
-    evaluator: evaluating.Evaluator = None,
+    evaluator: evaluating.Evaluators = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
     regenerate: evaluating.Regenerate = False,
@@ -57,14 +64,41 @@ def run(
     wait: Annotated[bool, typer.Option("--wait", help="Show progress until it ends; exit 6 if it failed.")] = False,
     fail_on_regression: evaluating.FailOnRegression = False,
     timeout: evaluating.Timeout = None,
+    protocol: Annotated[
+        ProtocolOption | None,
+        typer.Option(
+            "--protocol",
+            help="Measure in this process by a published protocol, without a server: the test captions of --data, "
+            "generated anew in every repeat. --bundle real measures captured motion alone.",
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option("--data", metavar="DATA", help="A prepared folder, for --protocol.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder of the protocol's report; called again, it goes on there."),
+    ] = None,
+    device: Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …, for --protocol.")] = "auto",
     as_json: console.Json = False,
 ) -> None:
     """Measure a model in the background; prints the run's id.
 
     A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
     """
+    if protocol is not None:
+        others = {
+            "--split": split != evaluating.TEST, "--baseline": baseline, "--name": name, "--comment": comment,
+            "--wait": wait, "--fail-on-regression": fail_on_regression, "--timeout": timeout is not None,
+            "--regenerate": regenerate,
+        }  # fmt: skip
+        evaluating.refuse_given(others, "asks the server, and --protocol measures in this process")
+        _run_protocol(bundle, evaluator, data, output, settings, repeats, seed, device, as_json=as_json)
+        return
+    evaluating.refuse_given({"--data": data, "--output": output}, "is for --protocol")
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
-    asked = EvaluationArguments(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
+    single = evaluating.single_of(evaluator)
+    asked = EvaluationArguments(bundle, single, split, settings, repeats, seed, baseline, extra_columns)
     wanted = asked.options()
     from marey.client import Client
 
@@ -78,6 +112,40 @@ def run(
             console.result_json(made.raw)
         if waits:
             _follow(client, made.id, timeout, fail_on_regression=fail_on_regression, as_json=as_json)
+
+
+def _run_protocol(
+    bundle: str,
+    evaluators: list[str] | None,
+    data: Path | None,
+    output: Path | None,
+    settings: list[str] | None,
+    repeats: int | None,
+    seed: int | None,
+    device: str,
+    *,
+    as_json: bool,
+) -> None:
+    from marey.cli.roles.protocol import ProtocolRequest, run_protocol
+
+    if data is None or output is None:
+        raise InvalidInput("needs --data and --output", where="--protocol")
+    request = ProtocolRequest(
+        bundle, evaluators or (), data, output, options.settings_of(settings or ()),
+        evaluating.ANEW if repeats is None else repeats, seed or 0, device,
+    )  # fmt: skip
+    with console.bar() as bar:
+        task = bar.add_task("repeat 1", total=None)
+        report = run_protocol(
+            request,
+            lambda repeat, done, total: bar.update(
+                task, description=f"repeat {repeat + 1}", completed=done, total=total
+            ),
+        )
+    if as_json:
+        console.result_json(report.document)
+    else:
+        console.result(report.markdown.rstrip("\n"))
 
 
 @app.command("wait")

@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from marey.cli import console
+from marey.core.errors import InvalidInput
 from marey.registry import Training, trainings
 
 
@@ -57,6 +58,17 @@ Warm = Annotated[bool, typer.Option("--warm", help="Start from the weights of th
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
 Rate = Annotated[float | None, typer.Option("--learning-rate", help="Default: the configuration's.")]
+MicroBatch = Annotated[
+    str | None,
+    typer.Option(
+        "--micro-batch",
+        metavar="N|auto",
+        help="Samples of a forward and backward pass; gradients are added up over the batch. auto: as many as fit.",
+    ),
+]
+Recompute = Annotated[
+    bool, typer.Option("--recompute", help="Compute activations again in the backward pass: less memory, more time.")
+]
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Use bfloat16 matrices where they are faster.")]
 
 
@@ -65,6 +77,7 @@ Card = Annotated[Path | None, typer.Option("--card", help="A model card for the 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing bundle.")]
 Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
 CONFIG = "Print a configuration as a file: every field with its range and meaning, to change and give to `--config`."
+MEMORY = "Estimate the memory of the stage that needs most, by counting what one pass of a few layers saves."
 UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
 
 
@@ -75,6 +88,8 @@ def _group_of(name: str, training: Training) -> typer.Typer:
         group.command(stage.name, help=stage.help)(_with_choices(_stage_command(training, stage.name), training))
     group.command("bundle", help=training.bundle_help)(_with_choices(_bundle_command(training), training))
     group.command("config", help=CONFIG)(_config_command(training))
+    if training.memory is not None:
+        group.command("memory", help=MEMORY)(_memory_command(training))
     if training.unpack is not None:
 
         def unpack(bundle: Packed, run: Run) -> None:
@@ -100,6 +115,8 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         device: Device = "auto",
         threads: Threads = 0,
         bf16: Bf16 = True,
+        micro_batch: MicroBatch = None,
+        recompute: Recompute = False,
         as_json: console.Json = False,
         **choices: StrEnum | None,
     ) -> None:
@@ -108,6 +125,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         metrics = train_stage(
             training, stage, data, run, config=config, steps=steps, minutes=max_minutes, seed=seed, resume=resume,
             warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16, choices=_given(choices),
+            micro_batch=_micro_batch(micro_batch), recompute=recompute,
         )  # fmt: skip
         if as_json:
             console.result_json(metrics)
@@ -134,6 +152,38 @@ def _bundle_command(training: Training) -> Callable[..., None]:
             training, data, run, output, config=config, card=card, overwrite=overwrite, choices=_given(choices)
         )
         console.result(made)
+
+    return command
+
+
+def _micro_batch(given: str | None) -> int | str | None:
+    if given is None or given == "auto":
+        return given
+    if not given.isdecimal() or int(given) < 1:
+        raise InvalidInput(f"{given!r} is not auto or a number of samples", where="--micro-batch")
+    return int(given)
+
+
+def _memory_command(training: Training) -> Callable[..., None]:
+    def command(
+        config: Config = "starter",
+        micro_batch: MicroBatch = None,
+        recompute: Recompute = False,
+        gigabytes: Annotated[
+            float | None, typer.Option("--gigabytes", help="Memory of the GPU, for auto; none given = this device's.")
+        ] = None,
+        bf16: Bf16 = True,
+        as_json: console.Json = False,
+    ) -> None:
+        from marey.cli.roles.training import estimate_memory
+
+        samples = _micro_batch(micro_batch)
+        found = estimate_memory(training, config, samples, recompute=recompute, gigabytes=gigabytes, bf16=bf16)
+        if as_json:
+            console.result_json(found)
+            return
+        console.result(f"{found['samples']} of {found['batch']} samples a pass of the stage {found['stage']}")
+        console.table(("part", "GiB"), [(name, f"{size:.2f}") for name, size in found["gib"].items()])
 
     return command
 

@@ -13,6 +13,7 @@ from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
+    from marey.bundles import TextSpec
     from marey.data.pack import JointsPack
     from marey.motion.units import Unit
 
@@ -177,23 +178,70 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
     raise NotFound(f"there is no clip {clip!r}", where=str(folder), hint=f"The first is {data.clips[0].id}.")
 
 
-def encode_captions(folder: Path, model: str | None, progress: Callable[[int, int], None]) -> int:
-    """Write `texts.npz` of a prepared folder, and return the number of its captions."""
+@dataclass(frozen=True)
+class TextChoice:
+    """How captions are read; see `marey.bundles.TextSpec`. None = the standard.
+
+    Attributes:
+        model: bundle whose specification is used; excludes all others.
+        encoder, labeller: names.
+        weights: folder of the encoder's weights.
+        as_written: keep captions of several actions in their own order.
+    """
+
+    model: str | None = None
+    encoder: str | None = None
+    labeller: str | None = None
+    weights: Path | None = None
+    as_written: bool = False
+
+
+def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, int], None]) -> int:
+    """Write `texts.npz` of a prepared folder, and return the number of its captions.
+
+    Raises:
+        InvalidInput: options that exclude each other, or an unknown encoder.
+        NotFound, InvalidBundle, InvalidFile: the data or the weights; see `TextPipeline.load`.
+    """
     try:
-        from marey.bundles import TextSpec, choose_bundle
         from marey.data.prepared import PreparedData
         from marey.text.pipeline import TextPipeline
-        from marey.training.texts import CaptionTexts
+        from marey.training.texts import CHUNK, CaptionTexts
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    spec = TextSpec(labeller=LABELLER, in_order=True) if model is None else choose_bundle(model).manifest.text
-    if spec is None:
-        raise InvalidInput(f"{model!r} does not read prompts", where="--model")
+    spec = _text_spec(choice)
     data = PreparedData.open(folder)
     captions = [clip.captions + clip.act_captions for clip in data.clips]
-    processes = os.cpu_count() or 1
-    CaptionTexts.build(captions, TextPipeline.load(spec), processes=processes, progress=progress).save(folder)
+    pipeline = TextPipeline.load(spec, encoder_path=choice.weights)
+    processes = min(os.cpu_count() or 1, -(-sum(map(len, captions)) // CHUNK))  # each loads the weights
+    CaptionTexts.build(captions, pipeline, processes=processes, encoder_path=choice.weights, progress=progress).save(
+        folder
+    )
     return sum(map(len, captions))
+
+
+def _text_spec(choice: TextChoice) -> TextSpec:
+    from marey.bundles import TextSpec, choose_bundle
+    from marey.text.encoders import WIDTHS
+
+    if choice.model is not None:
+        if choice.encoder or choice.labeller or choice.weights or choice.as_written:
+            raise InvalidInput("names encoder and labeller already", where="--model", hint="Leave the others out.")
+        spec = choose_bundle(choice.model).manifest.text
+        if spec is None:
+            raise InvalidInput(f"{choice.model!r} does not read prompts", where="--model")
+        return spec
+    encoder = choice.encoder or "minilm"
+    if encoder not in WIDTHS:
+        raise InvalidInput(f"unknown encoder {encoder!r}", where="--encoder", hint=f"Known: {', '.join(WIDTHS)}.")
+    return TextSpec.model_validate(
+        {
+            "encoder": encoder,
+            "width": WIDTHS[encoder],
+            "labeller": choice.labeller or LABELLER,
+            "in_order": not choice.as_written,
+        }
+    )
 
 
 @dataclass(frozen=True)

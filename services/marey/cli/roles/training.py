@@ -53,6 +53,37 @@ def show_config(training: Training, config: str) -> str:
     return write_toml(open_config(named_config, config), preset_of(config))
 
 
+def estimate_memory(
+    training: Training, config: str, samples: int | str | None, *, recompute: bool, gigabytes: float | None, bf16: bool
+) -> dict[str, Any]:
+    """Estimate the memory of the stage that needs most.
+
+    Args:
+        samples: of a pass; "auto" = as many as fit; None = the whole batch.
+        gigabytes: memory for "auto"; None = that of this device.
+
+    Returns:
+        stage, samples a pass, samples of a batch, and GiB of each part and their sum.
+    """
+    assert training.memory is not None  # else there is no such command
+    try:
+        from marey.nn.devices import choose_device
+        from marey.training.config_file import open_config
+        from marey.training.memory import GIB, device_memory
+
+        named_config, memory_model = resolve(training.config), resolve(training.memory)
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    model = memory_model(open_config(named_config, config), bf16=bf16)
+    if samples == "auto":
+        room = device_memory(choose_device("auto")) if gigabytes is None else 1e9 * gigabytes
+        found = model.fit(room, recompute=recompute)
+    else:
+        found = model.estimate(samples or model.batch, recompute=recompute)
+    parts = {name: size / GIB for name, size in {**found.parts, "sum": found.total}.items()}
+    return {"stage": model.stage, "samples": found.samples, "batch": model.batch, "gib": parts}
+
+
 def assemble_bundle(
     training: Training,
     data: Path,

@@ -48,7 +48,9 @@ def assemble(
         "length": parts["length"].state,
     }
     statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
-    text = gathered.text.model_copy(update={"in_order": config.in_order})
+    condition = config.condition
+    caps = {"max_actions": condition.max_actions, "max_specifics": condition.max_specifics}
+    text = gathered.text.model_copy(update={"in_order": config.in_order, **caps})
     return write_generator(
         bundle, MODEL, config, states, statistics, text=text, card=card, overwrite=overwrite, **gathered.manifest,
     )  # fmt: skip

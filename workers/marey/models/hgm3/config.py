@@ -1,4 +1,5 @@
-"""Configurations of HGM³: `paper` (its published sizes), `starter` and `open` (two CPU cores), `tiny` (tests)."""
+"""Configurations of HGM³: `paper` and `paper-kit` (its published sizes, for HumanML3D and KIT-ML), `starter` and
+`open` (two CPU cores), `tiny` (tests)."""
 
 from __future__ import annotations
 
@@ -66,6 +67,8 @@ class ConditionConfig:
     dropout: Share = 0.1  # on the attention of the graph (GraphMotion)
     drop: Share = 0.1  # share of samples trained without condition, for guidance
     noise: Weight = 0.0  # ours: std of the noise added to standardised text features in training
+    standardised: bool = field(default=True, metadata=ADDED)
+    """Ours: text features have zero mean and unit deviation over the training captions; else they are the encoder's."""
 
     @property
     def slots(self) -> int:
@@ -162,7 +165,17 @@ class HGM3Config(ModelConfig):
             )
 
 
-PAPER = HGM3Config()
+PAPER = HGM3Config(condition=ConditionConfig(standardised=False))
+PAPER_KIT = replace(
+    PAPER,
+    name="paper-kit",
+    layout="kit-251",
+    features=251,
+    joints=21,
+    fps=12.5,
+    train_residual=replace(PAPER.train_residual, batch=32),  # HGM³ Sec. 4.1
+)
+"""`paper` on KIT-ML."""
 
 STARTER = HGM3Config(
     name="starter",
@@ -241,7 +254,7 @@ TINY = HGM3Config(
     train_length=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),
 )
 
-CONFIGS: dict[str, HGM3Config] = {c.name: c for c in (PAPER, STARTER, OPEN, TINY)}
+CONFIGS: dict[str, HGM3Config] = {c.name: c for c in (PAPER, PAPER_KIT, STARTER, OPEN, TINY)}
 
 
 def named_config(name: str, *, mask: Literal["hard", "random"] | None = None) -> HGM3Config:

@@ -80,10 +80,7 @@ class MaskedStage:
         self.tokens, self.captions = tokens, captions
         self.module = MaskedModule(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
-        normalizer = self.module.masked.text.normalizer
-        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
-        normalizer.mean.copy_(mean)
-        normalizer.std.copy_(std)
+        captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 
@@ -93,13 +90,9 @@ class MaskedStage:
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return L_rec + L_pred (eq. 7, 12, 13), averaged over levels."""
-        rng, c = context.rng, self.config
-        clips = self.pairs.draw(rng, self.optimisation.batch)
-        sample = self.sample(clips, rng)
-        mining = c.mining
-        alpha = 0.0
-        if mining.mask == "hard":
-            alpha = mining.alpha_start + context.fraction * (mining.alpha_end - mining.alpha_start)  # eq. 8
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        sample = self.sample(clips, context.rng)
+        alpha = self._alpha(context)
         samples = self._conditioned(sample)
         rec = sample.noise.new_zeros(())
         pred = sample.noise.new_zeros(())
@@ -121,6 +114,28 @@ class MaskedStage:
         }
         return rec + pred, logs
 
+    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
+        """Yield the losses of parts of one batch; see `SplitStage`."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        sample = self.sample(clips, context.rng)
+        alpha = self._alpha(context)
+        samples = self._conditioned(sample)
+        asked = len(samples) * mask_counts(sample.progress, sample.lengths).sum()
+        for piece in (p for s in samples for p in _pieces(s, size)):
+            losses, masked, right, ranking = self._piece(piece, alpha)
+            rec = (losses * masked).sum() / asked
+            pred = ranking.sum() / (self.optimisation.batch * len(samples))
+            accuracy = (right * masked).sum() / asked
+            logs = {"loss": rec + pred, "reconstruction": rec, "ranking": pred, "accuracy": accuracy}
+            yield rec + pred, {name: value.detach() for name, value in logs.items()}
+
+    def _alpha(self, context: StepContext) -> float:
+        """Return the share of hard tokens among the masked ones (eq. 8)."""
+        mining = self.config.mining
+        if mining.mask != "hard":
+            return 0.0
+        return mining.alpha_start + context.fraction * (mining.alpha_end - mining.alpha_start)
+
     def _conditioned(self, sample: MaskedSample) -> list[MaskedSample]:
         """Return the samples under each condition of a step: all, the drawn ones, or the one that is trained."""
         mining = self.config.mining
@@ -133,8 +148,8 @@ class MaskedStage:
         momentum = warm_momentum(self.config.mining.momentum, context.step)
         update_average(self.module.teacher, self.module.predictor, momentum)
 
-    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator) -> MaskedSample:
-        """Draw phase, caption, τ, noise, drop and level for each clip."""
+    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True) -> MaskedSample:
+        """Draw phase, caption, τ, noise, drop and level for each clip; with `drop` False, all keep their condition."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
@@ -145,7 +160,7 @@ class MaskedStage:
             self.captions.graphs(captions),
             torch.from_numpy(rng.random(len(clips), np.float32)).to(device),
             torch.from_numpy(rng.random(tokens.shape[:2], np.float32)).to(device),
-            torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop).to(device),
+            torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop * drop).to(device),
             torch.from_numpy(self._levels(rng, len(clips))).to(device),
         )
 
@@ -204,7 +219,7 @@ class MaskedStage:
         totals = np.zeros((LEVELS, 3))
         ranks = 0.0
         for clips in self.pairs.validation_batches(self.optimisation.batch):
-            sample = self.sample(clips, rng)
+            sample = self.sample(clips, rng, drop=False)
             for level in range(LEVELS):
                 for piece in _pieces(sample.at_level(level)):
                     losses, masked, right, ranking = self._piece(piece, 0.0)
@@ -219,6 +234,6 @@ class MaskedStage:
         return loss | accuracy | {"ranking": ranks}
 
 
-def _pieces(sample: MaskedSample) -> Iterator[MaskedSample]:
-    for rows in pieces_of(sample.lengths):
+def _pieces(sample: MaskedSample, size: int | None = None) -> Iterator[MaskedSample]:
+    for rows in pieces_of(sample.lengths, size):
         yield sample.select(rows)

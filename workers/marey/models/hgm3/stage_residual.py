@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -19,6 +20,24 @@ from marey.training.length import LengthStage
 from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
+
+
+@dataclass(frozen=True)
+class ResidualSample:
+    """A batch of clips with captions, and all random choices made."""
+
+    tokens: Tensor  # (B, n, V), -1 beyond a clip's own length
+    lengths: Tensor  # (B,)
+    sentences: Tensor  # (B, W)
+    levels: Tensor  # (B,) the level that is predicted
+    dropped: Tensor  # (B,) bool: without condition
+
+    def pieces(self, size: int | None) -> Iterator[ResidualSample]:
+        """Yield the samples in `pieces_of` similar length, each cut to its longest."""
+        for rows in pieces_of(self.lengths, size):
+            fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
+            longest = int(self.lengths[rows].max())
+            yield ResidualSample(**{**fields, "tokens": fields["tokens"][:, :longest]})
 
 
 class ResidualStage:
@@ -40,9 +59,7 @@ class ResidualStage:
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
         self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
-        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
-        self.module.normalizer.mean.copy_(mean)
-        self.module.normalizer.std.copy_(std)
+        captions.standardise(self.module.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
 
@@ -57,6 +74,15 @@ class ResidualStage:
         total = counts.sum().clamp(min=1)
         loss = losses.sum() / total
         return loss, {"loss": loss.detach(), "accuracy": right.sum() / total}
+
+    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
+        """Yield the losses of parts of one batch; see `SplitStage`."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        drawn = self._draw(clips, context.rng, None)
+        total = drawn.lengths.sum()
+        for piece in drawn.pieces(size):
+            losses, right, _ = self._piece(piece)
+            yield losses.sum() / total, {"loss": losses.sum().detach() / total, "accuracy": right.sum() / total}
 
     def after_step(self, context: StepContext) -> None:
         """Do nothing: the stage has no state to update."""
@@ -77,28 +103,29 @@ class ResidualStage:
     def _batch(
         self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Return summed loss, correct answers and tokens (B,) of a batch; `level` None = one drawn per sample."""
+        """Return summed loss, correct answers and tokens (B,) of a batch; `level` None = one drawn per sample, some of
+        which lose their condition."""
+        pieces = [self._piece(piece) for piece in self._draw(clips, rng, level).pieces(None)]
+        losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))
+        return losses, right, counts
+
+    def _draw(self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None) -> ResidualSample:
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
         sentences = self.captions.sentences(self.captions.choose(clips, rng))
         drawn = rng.integers(1, self.module.levels, size=len(clips))
         levels = torch.from_numpy(drawn).to(device) if level is None else torch.full_like(lengths, level)
-        dropped = torch.from_numpy(rng.random(len(clips)) < self.config.residual_drop).to(device)
-        pieces = []
-        for rows in pieces_of(lengths):
-            size = int(lengths[rows].max())
-            pieces.append(self._piece(tokens[rows, :size], lengths[rows], sentences[rows], levels[rows], dropped[rows]))
-        losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))
-        return losses, right, counts
+        drop = self.config.residual_drop if level is None else 0.0
+        dropped = torch.from_numpy(rng.random(len(clips)) < drop).to(device)
+        return ResidualSample(tokens, lengths, sentences, levels, dropped)
 
-    def _piece(
-        self, tokens: Tensor, lengths: Tensor, sentences: Tensor, levels: Tensor, dropped: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
+    def _piece(self, sample: ResidualSample) -> tuple[Tensor, Tensor, Tensor]:
+        tokens, levels = sample.tokens, sample.levels
         model = self.module
-        valid = frame_mask(lengths, tokens.shape[1])
+        valid = frame_mask(sample.lengths, tokens.shape[1])
         below = [model.embed(tokens[..., v], v) * (levels > v)[:, None, None].float() for v in range(model.levels - 1)]
-        logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sentences, dropped))
+        logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sample.sentences, sample.dropped))
         targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
         losses = token_losses(logits, targets) * valid
         right = hits(logits.detach(), targets) * valid
@@ -109,7 +136,5 @@ def length_stage(config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, c
     """Return the training stage of the length estimator."""
     pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
     module = LengthEstimator(config).to(tokens.tokens.device)
-    mean, std = captions.statistics(pairs.train.tolist(), config.condition)
-    module.normalizer.mean.copy_(mean)
-    module.normalizer.std.copy_(std)
+    captions.standardise(module.normalizer, pairs.train.tolist(), config.condition)
     return LengthStage(module, config.train_length, pairs, captions, tokens.lengths[:, 0].clamp(max=config.max_tokens))

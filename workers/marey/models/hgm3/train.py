@@ -8,14 +8,14 @@ import torch
 
 from marey.models.hgm3.assembly import RECIPE
 from marey.models.hgm3.config import HGM3Config
-from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.data import CaptionData, check_texts
 from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.stage_residual import ResidualStage, length_stage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.nn.devices import choose_device
 from marey.training.drawn import load_drawn
 from marey.training.loop import start_process_group
-from marey.training.motions import MotionData, load_tokens
+from marey.training.motions import MotionData, check_layout, load_tokens
 from marey.training.staging import TrainOptions, finish, train_all, use_threads
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage
@@ -35,10 +35,12 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     use_threads(options.threads)
     device = choose_device(options.device)
     data = MotionData.load(options.prepared, device)
+    check_layout(options.config, data.prepared)
     torch.manual_seed(options.seed)
     if name == "tokenizer":
         return _train_tokenizer(options, data)
     texts = CaptionTexts.load(data.prepared)
+    check_texts(texts, options.config)
     captions = CaptionData.of(texts, data.prepared.caption_counts, options.config.condition, device)
     tokenizer = load_tokenizer(options, data)
     tokens = load_tokens(options.run, tokenizer, data)

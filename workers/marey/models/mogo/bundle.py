@@ -44,7 +44,9 @@ def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int
         lambda: {"tokenizer": Tokenizer(config), "transformer": RQHCTransformer(config)}, ("transformer",), seed
     )
     width = config.condition.text_width
-    text = TextSpec(encoder="minilm" if width == 384 else "t5-base", width=width, split_actions=config.split_actions)
+    text = TextSpec(
+        encoder="minilm" if width == 384 else "clip-vit-l14", width=width, split_actions=config.split_actions
+    )
     return write_generator(
         path, MODEL, config, parts, standing(config.layout), text=text, random=True, licence="MIT", overwrite=True
     )

@@ -1,8 +1,9 @@
-"""Configurations of MOGO: `paper` (its published sizes), `starter` (trains on two CPU cores), `tiny` (tests)."""
+"""Configurations of MOGO: `paper` and `paper-kit` (its published sizes, for HumanML3D and KIT-ML), `starter` (trains on
+two CPU cores), `tiny` (tests)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
@@ -72,6 +73,8 @@ class ConditionConfig:
     drop: Share = 0.1  # share of samples trained without prompt, for guidance
     every_frame: bool = False  # ours: the current prompt is added to every frame, beside being position 0
     noise: Weight = 0.0  # ours: std of the noise added to standardised text features in training
+    standardised: bool = field(default=True, metadata=ADDED)
+    """Ours: text features have zero mean and unit deviation over the training captions; else they are the encoder's."""
     clock: bool = False  # ours: the time since its action began is added to every frame
     clockless: Share = 0.3  # share of actions without that time in training: a stream outlasts every capture
 
@@ -144,7 +147,9 @@ class MOGOConfig(ModelConfig):
             )
 
 
-PAPER = MOGOConfig(split_actions=False, float_logits=True)
+PAPER = MOGOConfig(split_actions=False, float_logits=True, condition=ConditionConfig(standardised=False))
+PAPER_KIT = replace(PAPER, name="paper-kit", layout="kit-251", features=251, joints=21, fps=12.5)
+"""`paper` on KIT-ML."""
 
 STARTER = MOGOConfig(
     name="starter",
@@ -188,7 +193,7 @@ TINY = MOGOConfig(
     train_transformer=StageConfig(batch=4, learning_rate=1e-3, ema=0.9),
 )
 
-CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, STARTER, TINY)}
+CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, PAPER_KIT, STARTER, TINY)}
 
 
 def named_config(name: str) -> MOGOConfig:

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+from torch.utils.checkpoint import checkpoint
 
 from marey.models.mogo.attention import LookBack, Reach, RelativeAttention, Slots
 from marey.models.mogo.clock import Clock
@@ -153,6 +154,7 @@ class Trunk(nn.Module):
         super().__init__()
         self.blocks = nn.ModuleList(TrunkBlock(config) for _ in range(config.layers))
         self.norm = nn.LayerNorm(config.width)
+        self.recompute = False  # the activations of a block in the backward pass
         table = sinusoidal_positions(max_distance + 1, config.width)
         self.register_buffer("sinusoids", table, persistent=False)
 
@@ -160,10 +162,17 @@ class Trunk(nn.Module):
         """Map [prompts | frames] (N, P + n, w) to states of the same shape, float32."""
         kind = x.device.type
         x = x.to(torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else x.dtype)
+        through = self._through_again if self.recompute and torch.is_grad_enabled() else self._through
         for block in self.layers:
-            terms = block.attention.terms(self.sinusoids)
-            x = block(x, lambda h, b=block, t=terms: b.attention(h, t, reach))
+            x = through(x, block, reach)
         return self.norm(x).float()
+
+    def _through_again(self, x: Tensor, block: TrunkBlock, reach: Reach) -> Tensor:
+        return checkpoint(self._through, x, block, reach, use_reentrant=False)
+
+    def _through(self, x: Tensor, block: TrunkBlock, reach: Reach) -> Tensor:
+        terms = block.attention.terms(self.sinusoids)
+        return block(x, lambda h: block.attention(h, terms, reach))
 
     @property
     def layers(self) -> list[TrunkBlock]:

@@ -50,9 +50,9 @@ class SequenceSample:
         fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
         return SequenceSample(**{**fields, "tokens": fields["tokens"][:, :size]})
 
-    def pieces(self) -> Iterator[SequenceSample]:
+    def pieces(self, size: int | None = None) -> Iterator[SequenceSample]:
         """Yield the samples in `pieces_of` similar length, each padded to its own longest."""
-        return map(self.select, pieces_of(self.lengths))
+        return map(self.select, pieces_of(self.lengths, size))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from operator import add
 
@@ -10,10 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from marey.core.errors import InvalidInput
 from marey.data.manifest import Clip
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums
-from marey.models.mogo.model import RQHCTransformer, next_targets
+from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.samples import MIN_FRAMES, Samples, SequenceSample
 from marey.models.mogo.steers import Steers
 from marey.training.loop import StepContext
@@ -42,9 +43,10 @@ class TransformerStage:
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
         self.samples = Samples(clips, tokens, captions, steers, config.max_frames, split=config.split_actions)
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]
-        mean, std = text_statistics(captions.strings, spoken)
-        self.module.prompt.mean.copy_(mean)
-        self.module.prompt.std.copy_(std)
+        if config.condition.standardised:
+            mean, std = text_statistics(captions.strings, spoken)
+            self.module.prompt.mean.copy_(mean)
+            self.module.prompt.std.copy_(std)
         actions, frames = self.samples.captioned_actions(self.pairs.train)
         self.module.pace.fit(self.module.prompt.standardised(captions.sentences(actions)), frames)
         with torch.no_grad():  # the head starts at the codes' frequencies
@@ -66,6 +68,25 @@ class TransformerStage:
         shown = {"loss": loss.detach(), "level_0": means[0], "level_last": means[-1], "ahead": ahead.detach()}
         return loss + self.config.ahead_weight * ahead, shown
 
+    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
+        """Yield the losses of parts of one batch; see `SplitStage`.
+
+        Raises:
+            InvalidInput: a loss whose mean is known only at the end.
+        """
+        config = self.config
+        if config.ahead or config.depth.share < 1:
+            raise InvalidInput("excludes `ahead` and `depth.share`, whose frames are drawn", where="--micro-batch")
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        pieces = list(self.samples.collate(self.samples.draw(clips, context.rng)).pieces(size))
+        targets = (next_targets(p.tokens, p.lengths, self.module.end, ends=p.ends, skipped=p.skipped) for p in pieces)
+        asked = torch.stack([(each != NOT_ASKED).sum((0, 2)) for each in targets]).sum(0)
+        for piece in pieces:
+            sums, _ = self._losses(piece, 1.0)
+            part = LevelSums(sums.losses, sums.right, asked)
+            loss, means = part.loss(config.first_level), part.means.detach()
+            yield loss, {"loss": loss.detach(), "level_0": means[0], "level_last": means[-1]}
+
     def after_step(self, context: StepContext) -> None:
         """Do nothing: the stage has no state to update."""
 
@@ -84,7 +105,12 @@ class TransformerStage:
         return metrics | {f"accuracy/{level}": float(share) for level, share in enumerate(sums.right / sums.asked)}
 
     def _losses(self, piece: SequenceSample, share: float) -> tuple[LevelSums, Tensor]:
-        states = self.module.states(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
-        targets = next_targets(piece.tokens, piece.lengths, self.module.end, ends=piece.ends, skipped=piece.skipped)
-        ahead = ahead_loss(self.module, states, targets, piece.seam, share)
-        return level_sums(self.module, states, targets, share), ahead
+        return piece_losses(self.module, piece, share)
+
+
+def piece_losses(model: RQHCTransformer, piece: SequenceSample, share: float) -> tuple[LevelSums, Tensor]:
+    """Return the sums of the losses of samples, and the loss of `ahead`; arguments as those of `level_sums`."""
+    states = model.states(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
+    targets = next_targets(piece.tokens, piece.lengths, model.end, ends=piece.ends, skipped=piece.skipped)
+    ahead = ahead_loss(model, states, targets, piece.seam, share)
+    return level_sums(model, states, targets, share), ahead

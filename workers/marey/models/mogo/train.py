@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
 from marey.models.mogo.assembly import RECIPE
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.losses import scale_penalty
+from marey.models.mogo.memory import memory_model
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.rollouts import Rollouts
 from marey.models.mogo.samples import MIN_FRAMES
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.steers import Steers, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
-from marey.nn.devices import choose_device
+from marey.nn.devices import choose_device, fast_bf16
 from marey.training.loop import start_process_group
-from marey.training.motions import MotionData, load_tokens
+from marey.training.memory import device_memory
+from marey.training.motions import MotionData, check_layout, load_tokens
 from marey.training.pairs import Pairs
 from marey.training.sentences import SentenceData
 from marey.training.staging import TrainOptions, finish, train_all, use_threads
@@ -50,10 +54,19 @@ def _train_tokenizer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
 
 
 def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    if options.micro_batch == "auto":
+        options = replace(options, micro_batch=_fitting(options))
     stage, sha256 = transformer_stage(options)
     metrics = RECIPE.train(stage, options)
     finish(stage.module, options, stage.name, metrics, sha256)
     return metrics
+
+
+def _fitting(options: TrainOptions[MOGOConfig]) -> int:
+    """Return the samples of a pass that fit the device's memory."""
+    device = choose_device(options.device)
+    model = memory_model(options.config, bf16=options.bf16 and fast_bf16(device))
+    return model.fit(device_memory(device), recompute=options.recompute).samples
 
 
 def transformer_stage(
@@ -78,7 +91,9 @@ def transformer_stage(
 
 def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
     torch.manual_seed(options.seed)
-    return MotionData.load(options.prepared, choose_device(options.device))
+    data = MotionData.load(options.prepared, choose_device(options.device))
+    check_layout(options.config, data.prepared)
+    return data
 
 
 def _steers(

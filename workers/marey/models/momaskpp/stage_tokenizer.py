@@ -15,10 +15,10 @@ from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.motion.features import layout
 from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import ROOT, biased_std
-from marey.training.joints import heading_joints, world_joints
+from marey.training.joints import heading_joints, unit_of, world_joints
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData
-from marey.training.tokenizing import feature_weights, reconstruction_errors, tokenizer_weights
+from marey.training.tokenizing import feature_weights, reconstruction_errors, tokenizer_clips, tokenizer_weights
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,16 @@ def tokenizer_loss(
 def _joint_losses(restored: Tensor, features: Tensor, valid: Tensor, config: MoMaskPPConfig, fraction: float) -> Tensor:
     """Return the weighted sum of the terms on joints; 0 where none has a weight."""
     t, total = config.tokenizer, features.new_zeros(())
+    if not (t.position_weight or t.velocity_weight or t.world_weight):
+        return total
+    body = config.joints, unit_of(config.layout)
     if t.position_weight or t.velocity_weight:
-        local = heading_joints(restored, config.joints) - heading_joints(features, config.joints)
+        local = heading_joints(restored, *body) - heading_joints(features, *body)
         total = total + t.position_weight * _average(local.abs().sum(-1).mean(-1), valid)
         speed = local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps
         total = total + t.velocity_weight * _average(speed, valid[:, 1:])
     if t.world_weight:
-        drift = world_joints(restored, config.joints) - world_joints(features, config.joints)
+        drift = world_joints(restored, *body) - world_joints(features, *body)
         weight = t.world_weight * min(1.0, 2 * fraction) ** 2  # drift adds up: at first it would dominate
         total = total + weight * _average(drift.abs().sum(-1).mean(-1), valid)
     return total
@@ -104,8 +107,8 @@ class ScaleTokenizerStage:
         self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
         rate = module.frames_per_token
-        self.clips = [c for c in data.prepared.split("train") if not c.spliced and c.length >= rate]
-        self.weights = tokenizer_weights(self.clips)
+        self.clips = tokenizer_clips(data.prepared.split("train"), rate)
+        self.weights = tokenizer_weights(self.clips, min(config.windows))
         self.first = np.array([c.start for c in self.clips])
         self.lengths = np.array([c.length - c.length % rate for c in self.clips])
 

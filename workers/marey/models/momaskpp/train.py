@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import torch
 
-from marey.core.errors import InvalidInput
 from marey.models.momaskpp.assembly import recipe_of
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
@@ -15,7 +14,7 @@ from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import load_scale_tokens
 from marey.nn.devices import choose_device
 from marey.training.loop import TrainingStage, start_process_group
-from marey.training.motions import MotionData
+from marey.training.motions import MotionData, check_layout
 from marey.training.staging import TrainOptions, finish, train_all, use_threads
 
 
@@ -33,7 +32,7 @@ def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, f
     start_process_group()
     use_threads(options.threads)
     data = MotionData.load(options.prepared, choose_device(options.device))
-    check_layout(options.config, data)
+    check_layout(options.config, data.prepared)
     torch.manual_seed(options.seed)
     stage = _stage(name, options, data)
     metrics = recipe.train(stage, options)
@@ -55,21 +54,6 @@ def _stage(name: str, options: TrainOptions[MoMaskPPConfig], data: MotionData) -
     clips = data.prepared.clips
     kind = ScaleStage if name == "masked" else length_stage
     return kind(config, clips, tokens, words)
-
-
-def check_layout(config: MoMaskPPConfig, data: MotionData) -> None:
-    """Refuse data of another layout.
-
-    Raises:
-        InvalidInput: the features of the folder are not the configuration's.
-    """
-    found = data.prepared.manifest.layout
-    if found != config.layout:
-        raise InvalidInput(
-            f"holds features of the layout {found}; the configuration {config.name!r} reads {config.layout}",
-            where=str(data.prepared.path),
-            hint="Prepare the data with this layout, or choose another configuration.",
-        )
 
 
 def load_tokenizer(options: TrainOptions[MoMaskPPConfig], data: MotionData) -> Tokenizer:
