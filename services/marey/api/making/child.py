@@ -11,6 +11,7 @@ import signal
 import sys
 import traceback
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from marey.api.making.wire import read_message, write_message
@@ -36,6 +37,8 @@ def main(seconds: int, memory: int) -> None:
     os.nice(NICENESS)
     with suppress(OSError, ValueError):  # macOS has no such limit
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    with suppress(OSError):  # where memory runs out, Linux ends this process before the API
+        Path("/proc/self/oom_score_adj").write_text("1000")
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what an exporter prints is no answer
     with suppress(EOFError, BrokenPipeError):

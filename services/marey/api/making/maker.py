@@ -90,21 +90,20 @@ class FileMaker:
         """
         loop = asyncio.get_running_loop()
         until = loop.time() + WAIT_SECONDS
-        while (made := await self._look(order)) is None or made.file is None:
+        while True:
+            made = await self._look(order)
+            if made is not None and made.file is not None:
+                return made.file
             if made is not None and made.problem is not None:
                 raise _error(made.problem)
+            task = None if made is not None else await self._start(order)
             left = until - loop.time()
             if left <= 0:
                 return None
-            task = None if made is not None else await self._start(order)
             if task is None:
                 await asyncio.sleep(min(LOOK_SECONDS, left))
-                continue
-            await asyncio.wait([task], timeout=left)
-            if not task.done():
-                return None
-            task.result()
-        return made.file
+            elif (await asyncio.wait([task], timeout=left))[0]:
+                task.result()
 
     async def close(self) -> None:
         """Stop: files in the making are left to the next request."""

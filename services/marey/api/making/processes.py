@@ -23,7 +23,7 @@ MOST = 2
 """Files that are made at a time: making is CPU-bound."""
 FILE_SECONDS = 120
 """Of one file."""
-MEMORY = 2**30
+MEMORY = 768 * 2**20
 """Bytes of address space of one process."""
 IDLE_SECONDS = 60.0
 
@@ -82,6 +82,8 @@ class MakingProcess:
         if code == -signal.SIGALRM:
             return FailureReason.of(TooLarge(f"the file takes longer than {self._seconds} s to make", where="format"))
         log.error("making_process_died", code=code)
+        if code == -signal.SIGKILL:
+            return FailureReason.of(TooLarge("the file takes more memory than this server gives", where="format"))
         return FailureReason.of(MareyError("an internal error"))
 
 
