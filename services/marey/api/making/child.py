@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from marey.api.making.wire import read_message, write_message
+from marey.api.making.messages import read_message, write_message
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.core.extras import MissingExtra
 from marey.exporters.making import FileRecipe

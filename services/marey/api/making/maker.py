@@ -50,7 +50,7 @@ log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True)
-class Order:
+class FileOrder:
     """A file that a request asks for.
 
     Attributes:
@@ -80,7 +80,7 @@ class FileMaker:
         self._making: dict[MakingClaim, asyncio.Task[None]] = {}
         self._renewing: asyncio.Task[None] | None = None
 
-    async def get(self, order: Order) -> MotionFile | None:
+    async def get(self, order: FileOrder) -> MotionFile | None:
         """Return a file, made if it is not there; None if that takes longer than `WAIT_SECONDS`: it goes on.
 
         Raises:
@@ -117,14 +117,14 @@ class FileMaker:
         with suppress(Unreachable):  # then they expire
             await _in_thread(lambda: release_makings(self._engine, [claim.token for claim in tasks]))
 
-    async def _look(self, order: Order) -> MadeFile | None:
+    async def _look(self, order: FileOrder) -> MadeFile | None:
         def look() -> MadeFile | None:
             with transaction(self._engine) as conn:
                 return find_made(conn, order.motion, order.identity)
 
         return await _in_thread(look)
 
-    async def _start(self, order: Order) -> asyncio.Task[None] | None:
+    async def _start(self, order: FileOrder) -> asyncio.Task[None] | None:
         """Claim a file and begin to make it; None if another request or process was faster."""
 
         def claim() -> MakingClaim | None:
@@ -156,7 +156,7 @@ class FileMaker:
         if not task.cancelled():
             task.exception()  # asyncio complains about errors that no request waits for any more
 
-    async def _hold(self, order: Order, claim: MakingClaim, slot: ExitStack) -> None:
+    async def _hold(self, order: FileOrder, claim: MakingClaim, slot: ExitStack) -> None:
         """Make a file; give up the claim if that fails otherwise than by the file's fault."""
         with slot:
             try:
@@ -168,7 +168,7 @@ class FileMaker:
                     await _in_thread(lambda: release_makings(self._engine, [claim.token]))
                 raise
 
-    async def _make(self, order: Order, claim: MakingClaim) -> None:
+    async def _make(self, order: FileOrder, claim: MakingClaim) -> None:
         npz = await _in_thread(lambda: self._store.get(asset_key(claim.tenant, claim.source)))
         made = await self._processes.make(order.recipe, npz, f"motion {claim.motion}")
         if isinstance(made, FailureReason):

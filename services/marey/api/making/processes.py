@@ -14,7 +14,7 @@ from typing import IO
 import structlog
 from anyio import CapacityLimiter, to_thread
 
-from marey.api.making.wire import read_message, write_message
+from marey.api.making.messages import read_message, write_message
 from marey.core.errors import MareyError, TooLarge
 from marey.exporters.making import FileRecipe
 from marey.jobs import FailureReason

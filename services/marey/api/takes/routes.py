@@ -16,7 +16,7 @@ from marey.api.audit import note
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
 from marey.api.files import CHECKED, FILE_RESPONSES, FOR_EVER, FileRequest, FileView, file_response
-from marey.api.making.maker import Order
+from marey.api.making.maker import FileOrder
 from marey.api.making.query import GivenOptions, Rate
 from marey.api.takes.files import MAKING_RESPONSES, being_made, motion_of, recipe, source_of, stored_file
 from marey.api.takes.schemas import (
@@ -136,7 +136,7 @@ async def get_file(
     file = stored_file(row, wanted := recipe(row, format, options, fps))
     caching = FOR_EVER if file is not None else CHECKED
     if file is None:
-        file = await shared.maker.get(Order(key, motion, source_of(row), wanted))
+        file = await shared.maker.get(FileOrder(key, motion, source_of(row), wanted))
     if file is None:
         return being_made(format)
     name, view = download_name(file_stem(row), extension_of(format)), FileView(**vars(file))
