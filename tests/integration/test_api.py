@@ -302,8 +302,8 @@ def test_a_file_comes_whole_with_its_sha256_as_etag(http: httpx2.Client, motion:
         assert head.headers[name] == response.headers[name]
     seed = http.get(f"/v1/motions/{motion}").json()["seed"]
     assert head.headers["content-disposition"] == f'attachment; filename="00000_a-person-walks_{seed}.npz"'
-    assert http.head(f"/v1/motions/{motion}/files/glb").status_code == 404
-    refused(http.get(f"/v1/motions/{motion}/files/glb"), 404, "not-found")
+    assert http.head(f"/v1/motions/{motion}/files/xyz").status_code == 404
+    refused(http.get(f"/v1/motions/{motion}/files/xyz"), 404, "not-found")
     refused(http.get(f"/v1/motions/{motion}/files/..%2f..%2fetc"), 404, "not-found")
     refused(http.get(f"/v1/motions/{uuid4()}/files/npz"), 404, "not-found")
 

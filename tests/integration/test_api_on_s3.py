@@ -12,15 +12,20 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
+from marey.api.making import maker
+from marey.client import Client
 from marey.client.fetching import ATTEMPTS, FileToFetch, download_all
-from marey.core.errors import Unreachable
+from marey.core.errors import InvalidInput, Unreachable
 from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction
+from marey.exporters.making import FileRecipe
 from marey.jobs import asset_key
+from marey.motion.export_options import ExportOptions
 from marey.storage import open_store
 from marey.storage.s3 import S3Store
 from marey.tenants import DEFAULT_TENANT, create_key
 from tests.support.live_api import ApiThread, LiveApi, settings_of
+from tests.support.walker import walker
 
 
 @pytest.fixture
@@ -67,6 +72,27 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
         download_all(client, [target], overwrite=False, done=lambda _: None)
     assert sha256_of(tmp_path / "x.npz") == digest["sha256"]
     assert parsedate_to_datetime(answer.headers["expires"]) > parsedate_to_datetime(answer.headers["date"])
+
+
+def test_a_file_made_on_request_is_fetched_from_the_bucket(
+    api: LiveApi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(maker, "WAIT_SECONDS", 0.05)  # so that the client has to ask again
+    npz = walker(seconds=0.3).to_npz()
+    with api.client() as transport:
+        job = transport.submit([{"prompt": "a person walks"}])
+        api.work(npz)
+        (motion,) = transport.pages(f"/v1/jobs/{job['id']}/motions")
+    with Client(api.url, api.key) as client:
+        path = client.motions.make_file(motion["id"], tmp_path / "walk.glb", fps=24, root_bone=True)
+        wanted = FileRecipe("glb", ExportOptions(root_bone=True), 24.0).make(npz, "motion")
+        assert path.read_bytes() == wanted
+        with pytest.raises(InvalidInput, match="unknown parameter 'rooty_bone'"):
+            client.motions.make_file(motion["id"], tmp_path / "other.glb", rooty_bone=True)
+    with api.http() as http:
+        answer = http.get(f"/v1/motions/{motion['id']}/files/glb?fps=24&root_bone=true")
+    assert answer.status_code == 307
+    assert httpx2.get(answer.headers["location"]).content == wanted
 
 
 def test_signed_urls_that_expired_are_asked_for_anew(

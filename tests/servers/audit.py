@@ -64,6 +64,10 @@ CHECKS = {
         SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
         WHERE asset.state <> 'stored'
     """,
+    "a file made on request is not stored": """
+        SELECT made_file.motion_id, asset.sha256 FROM made_file JOIN asset ON asset.id = made_file.asset_id
+        WHERE asset.state <> 'stored' OR asset.size <> made_file.size OR asset.tenant_id <> made_file.tenant_id
+    """,
     "a generated item has no text features": """
         SELECT item.id FROM item
         WHERE stage = 'generate' AND text_key <> ''

@@ -101,6 +101,7 @@ def _jobs(engine: sa.Engine) -> None:
         review(conn, DEFAULT_TENANT, motions[:1], Review.KEPT, by="ann", comment="good")
         review(conn, DEFAULT_TENANT, motions[1:2], Review.REJECTED, by="ann")
         reroll(conn, DEFAULT_TENANT, motions[2:3], lambda item: new_item(item.index, item.prompt), by="ann")
+    _made_files(engine, motions[0])
     _end(engine, retryable=False)
     _end(engine, retryable=True)
     _die(engine)
@@ -110,6 +111,25 @@ def _jobs(engine: sa.Engine) -> None:
     held = claim_some(engine, limit=1, worker="busy")
     with transaction(engine) as conn:
         begin_assets(conn, held.lease_token, [AssetDigest("a" * 64, 7, "application/x-npz")])
+
+
+def _made_files(engine: sa.Engine, motion: UUID) -> None:
+    """A file made on request, one that is being made, and one that cannot be made."""
+    file, asset, row = job_tables.motion_file.c, job_tables.asset.c, {"motion_id": motion, "tenant_id": DEFAULT_TENANT}
+    late = {"expires_at": sa.func.now()}
+    with transaction(engine) as conn:
+        stored = conn.execute(
+            sa.select(asset.id, asset.size)
+            .join(job_tables.motion_file, file.asset_id == asset.id)
+            .where(file.motion_id == motion)
+        ).first()
+        assert stored is not None
+        for name, values in (
+            ("made", {"asset_id": stored.id, "size": stored.size}),
+            ("making", {"claim": motion, **late}),
+            ("refused", {"problem": {"type": "invalid-input", "message": "no"}, **late}),
+        ):
+            conn.execute(sa.insert(job_tables.made_file).values(**row, key=name, format="glb", **values))
 
 
 def _end(engine: sa.Engine, *, retryable: bool) -> None:

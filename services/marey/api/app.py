@@ -128,6 +128,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     finally:
         readiness.stop()
         broadcaster.stop()
+        await shared.maker.close()
         await texts.close()
         app.state.context.rates.close()
         if hub is not None:

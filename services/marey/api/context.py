@@ -13,6 +13,7 @@ from starlette.requests import HTTPConnection
 
 from marey.api.broadcaster import EventBroadcaster
 from marey.api.catalogue import Catalogue
+from marey.api.making.maker import FileMaker
 from marey.api.rates import RateLimiter
 from marey.api.readiness import Readiness
 from marey.api.stream_hub import Hub
@@ -50,11 +51,14 @@ class Context:
     """Threads for such bodies; other requests keep their threads."""
     event_streams: SlotCounter = field(init=False)
     """Open streams of server-sent events."""
+    maker: FileMaker = field(init=False)
+    """Files that are made on request."""
 
     def __post_init__(self) -> None:
         config = self.config
         shares = SlotLimits(config.event_streams, config.event_streams_per_tenant, config.event_streams_per_key)
         self.event_streams = SlotCounter("event streams", shares, EVENT_STREAMS)
+        self.maker = FileMaker(config, self.engine, self.store)
 
 
 async def context(asked: HTTPConnection) -> Context:

@@ -19,6 +19,9 @@ from marey.jobs import asset_key
 from marey.storage import CHUNK, PRESIGN_SECONDS, AssetStore, Opened
 
 MARGIN_SECONDS = 60
+FOR_EVER = "private, immutable, max-age=86400"
+CHECKED = "private, no-cache"
+"""Cache-Control of files whose content may differ after an upgrade of the server: caches ask, and get a 304."""
 
 FILE_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
@@ -54,11 +57,14 @@ class RequestedFile:
 FileRequest = Annotated[RequestedFile, Depends()]
 
 
-def file_response(shared: Context, tenant: str, name: str, file: FileView, part: RequestedFile) -> Response:
+def file_response(
+    shared: Context, tenant: str, name: str, file: FileView, part: RequestedFile, *, caching: str = FOR_EVER
+) -> Response:
     """Answer a request for a file. Its ETag is its SHA-256; HEAD reports the whole file's size.
 
     Args:
         name: name of the download (`download_name`).
+        caching: Cache-Control of the content.
     """
     etag = f'"{file.sha256}"'
     if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
@@ -66,7 +72,7 @@ def file_response(shared: Context, tenant: str, name: str, file: FileView, part:
     headers = {
         "ETag": etag,
         "Accept-Ranges": "bytes",
-        "Cache-Control": "private, immutable, max-age=86400",
+        "Cache-Control": caching,
         "Content-Disposition": attachment(name),
     }
     if part.request.method == "HEAD":  # also for a bucket, whose URLs are signed for GET only

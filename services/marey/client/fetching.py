@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marey.client.making import SOURCE, Making, making_of
+from marey.client.making import SOURCE, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
 from marey.exporters import check_options, exporters, extension_of
+from marey.exporters.making import FileRecipe
 from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.files import write_atomically
 
@@ -39,13 +40,13 @@ class FileToFetch:
     sha256: str
     size: int
     path: Path
-    making: Making | None = None
+    making: FileRecipe | None = None
     """How the file is made of what the server sends; None = it is that."""
 
     @property
     def format(self) -> str:
         """The format of the file, such as `npz`."""
-        return self.url.rpartition("/")[2] if self.making is None else self.making.exporter.format
+        return self.url.rpartition("/")[2] if self.making is None else self.making.format
 
 
 Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
@@ -212,7 +213,7 @@ def plan(
         for file, making in _wanted(motion["files"], formats, export, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
-            wanted = file["format"] if making is None else making.exporter.format
+            wanted = file["format"] if making is None else making.format
             name = names.of(item["id"], naming(item), extension_of(wanted))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
             downloads.append(FileToFetch(url, file["sha256"], file["size"], folder / name, making))
@@ -269,7 +270,7 @@ def download_all(
 
 def _wanted(
     files: list[dict[str, Any]], formats: Sequence[str] | None, export: ExportOptions, item: str
-) -> Iterator[tuple[dict[str, Any], Making | None]]:
+) -> Iterator[tuple[dict[str, Any], FileRecipe | None]]:
     """Yield the file to fetch for each format, with how the wanted one is made of it."""
     by_format = {file["format"]: file for file in files}
     for name in by_format if formats is None else formats:

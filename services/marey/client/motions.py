@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from marey.client.fetching import FORMAT, FileToFetch, check_folder, download_all
+from marey.client.made import format_of, made_file
 from marey.client.resources import Resource, identifier, identifiers
 from marey.client.types.jobs import Job
 from marey.client.types.motions import Motion, MotionDetail, Reroll
@@ -120,6 +121,45 @@ class Motions(Resource):
         found = motion if isinstance(motion, Motion) else self.get(motion)
         download = _download(found, path.suffix.removeprefix(".").lower(), path)
         check_folder(path.parent)
+        download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
+        return path
+
+    def make_file(
+        self,
+        motion: Motion | str,
+        path: str | Path,
+        *,
+        file_format: str | None = None,
+        fps: float | None = None,
+        timeout: float = 600.0,
+        overwrite: bool = False,
+        **options: str | bool,
+    ) -> Path:
+        """Have the server make a file of a motion, and fetch it: in a format that is not stored, at another rate, or
+        with options. This machine needs neither numpy nor the extra `video`.
+
+        Args:
+            path: where to write it; its ending names the format, such as `.glb`.
+            file_format: the format, where the ending does not name it.
+            fps: frames a second; None = the motion's.
+            timeout: seconds to wait until the file is made.
+            overwrite: replace a file with other content.
+            options: of the format, such as `root_bone=True` or `in_place="heading"`; the reference of the HTTP API
+                lists them.
+
+        Raises:
+            NotFound: there is no such motion, or the server does not make such files.
+            InvalidInput: the server does not know an option, the motion cannot be written like this, or the folder
+                cannot be written.
+            TimedOut: the file is not made in time.
+            Conflict: the file exists with other content.
+            InvalidFile: the data that arrived has another sha256, or cannot be written.
+        """
+        path = Path(path)
+        wanted = file_format or format_of(path)
+        url = f"/v1/motions/{identifier(motion)}/files/{wanted}"
+        check_folder(path.parent)
+        download = made_file(self._transport, url, path, {"fps": fps, **options}, timeout=timeout)
         download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
         return path
 

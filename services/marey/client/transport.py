@@ -97,6 +97,10 @@ class Transport:
         """Return the JSON at `path`."""
         return _json(self._send("GET", path, params=_given(params)))
 
+    def probe(self, path: str, **params: Any) -> httpx2.Response:
+        """Ask for the first byte of a file, for its size and ETag; the answer may be a 202: it is being made."""
+        return self._send("GET", path, params=_given(params), headers={"Range": "bytes=0-0"})
+
     def post(self, path: str, body: Any = None, **params: Any) -> Any:
         """POST a JSON body (None = none) and return the answer's JSON; only for requests that may be repeated."""
         return _json(self._send("POST", path, params=_given(params), json=body))

@@ -35,7 +35,7 @@ from marey.scheduler.servers import CHECK_SECONDS, server_check
 from marey.scheduler.webhooks import Deliverer
 from marey.storage import open_store
 from marey.streams import abandoned_streams, end_stream
-from marey.takes import delete_expired, remove_stale_assets, rewrite_files
+from marey.takes import delete_expired, remove_expired_makings, remove_stale_assets, rewrite_files
 from marey.webhooks.vault import Vault
 
 log = logger(__name__)
@@ -170,6 +170,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
         removed = remove_stale_assets(engine, store)
         if removed:
             log.info("stale_assets_removed", assets=removed)
+        remove_expired_makings(engine)
         with transaction(engine) as conn:
             unused = remove_unused_prompts(conn)
         if unused:

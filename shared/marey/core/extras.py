@@ -5,9 +5,23 @@ from __future__ import annotations
 from marey.core.errors import InvalidInput
 
 
-def needs_extra(extra: str, error: ImportError) -> InvalidInput:
+class MissingExtra(InvalidInput):
+    """An extra that is needed and not installed."""
+
+    def __init__(self, extra: str, missing: str) -> None:
+        """Set the message.
+
+        Args:
+            extra: its name.
+            missing: the module that was not found.
+        """
+        super().__init__(
+            f"this needs what the extra {extra!r} installs ({missing} is missing)",
+            hint=f"pip install 'marey[{extra}]', or use a server: `marey submit`.",
+        )
+        self.extra = extra
+
+
+def needs_extra(extra: str, error: ImportError) -> MissingExtra:
     """Return the error for what the installed extras cannot run."""
-    return InvalidInput(
-        f"this needs what the extra {extra!r} installs ({error.name or error} is missing)",
-        hint=f"pip install 'marey[{extra}]', or use a server: `marey submit`.",
-    )
+    return MissingExtra(extra, error.name or str(error))

@@ -35,6 +35,12 @@ HTTP_REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", 
 HTTP_SECONDS = Histogram("marey_http_seconds", "Time to the end of an answer.", ("method", "route"), registry=API)
 SOCKETS = Gauge("marey_open_sockets", "Clients that watch a live stream.", registry=API)
 EVENT_STREAMS = Gauge("marey_open_event_streams", "Clients that follow a job.", registry=API)
+MADE_FILES = Counter(
+    "marey_made_files",
+    "Files made on request: made, refused (the motion cannot be written like this) or failed.",
+    ("format", "outcome"),
+    registry=API,
+)
 
 # --- the API: database figures, read at each scrape ---
 

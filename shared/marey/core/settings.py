@@ -179,6 +179,8 @@ class Settings(BaseSettings):
     """Streams of server-sent events that may be open at one API process."""
     event_streams_per_tenant: int = Field(default=2000, ge=1, le=100_000)
     event_streams_per_key: int = Field(default=1000, ge=1, le=100_000)
+    made_files_bytes: int = Field(default=2**30, ge=0, le=2**50)
+    """Bytes of the files of one tenant that the API made on request and keeps; the oldest are removed first."""
     text_url: TextService | None = None
     """URL of the text service (`marey text serve`) for the API; `marey serve` starts its own."""
     text_key: SecretStr | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache
+from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any
 
@@ -59,6 +60,17 @@ def exporter_of(format: str) -> Exporter[Any]:
             hint=f"Install the plug-in that wrote such files. Installed: {', '.join(exporters())}.",
         )
     return found
+
+
+@cache
+def version_of(format: str) -> str:
+    """Return the versions of the package that has the exporter, and of Marey: files of others may differ.
+
+    Raises:
+        PluginError: the format is not installed here.
+    """
+    exporter_of(format)
+    return f"{EXPORTERS.owner(format)} {EXPORTERS.version(format)}, marey {version('marey')}"
 
 
 def extension_of(format: str) -> str:

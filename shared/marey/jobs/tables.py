@@ -333,3 +333,32 @@ motion_file = sa.Table(
     sa.Index("ix_motion_file_asset_id", "asset_id"),
     sa.Index("ix_motion_file_erasing", "motion_id", postgresql_where=sa.text("erasing")),
 )
+
+# Files that the API made of a motion's npz on request: a cache, which loses its oldest files. A row has an asset; or,
+# until `expires_at`, the claim of the process that makes the file, or the reason why it cannot be made. A trigger
+# (migration 0019) removes the rows of a motion whose prompt is erased.
+made_file = sa.Table(
+    "made_file",
+    metadata,
+    sa.Column("motion_id", Id, sa.ForeignKey("motion.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("key", sa.Text, primary_key=True),  # `marey.exporters.making.FileRecipe.key`
+    sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
+    sa.Column("format", sa.Text, nullable=False),
+    # An earlier release, which does not know these references, may remove the asset as unused.
+    sa.Column("asset_id", Id, sa.ForeignKey("asset.id", ondelete="CASCADE")),
+    sa.Column("size", sa.BigInteger, nullable=False, server_default="0"),  # of the asset
+    sa.Column("claim", Id),
+    sa.Column("problem", JSONB),
+    sa.Column("expires_at", Time),
+    sa.Column("made_at", Time, nullable=False, server_default=NOW),
+    sa.CheckConstraint("num_nonnulls(asset_id, claim, problem) = 1", name="state"),
+    sa.CheckConstraint("(expires_at IS NULL) = (asset_id IS NOT NULL)", name="expires"),
+    sa.Index("ix_made_file_asset_id", "asset_id", postgresql_where=sa.text("asset_id IS NOT NULL")),
+    sa.Index(
+        "ix_made_file_tenant_id",
+        *("tenant_id", "made_at"),
+        postgresql_include=["size"],
+        postgresql_where=sa.text("asset_id IS NOT NULL"),
+    ),
+    sa.Index("ix_made_file_expires_at", "expires_at", postgresql_where=sa.text("expires_at IS NOT NULL")),
+)

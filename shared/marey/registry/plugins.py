@@ -63,6 +63,11 @@ class PlugIns(Generic[T]):
         entry = self._found()[name]
         return entry.value if entry.dist is None else entry.dist.name
 
+    def version(self, name: str) -> str:
+        """The version of the package that registers a name; empty where its package is not known."""
+        entry = self._found()[name]
+        return "" if entry.dist is None else entry.dist.version
+
     def clear(self) -> None:
         """Read the entry points again at the next look-up, for tests that install plug-ins."""
         self._entries = None

@@ -1,7 +1,19 @@
-"""User actions on motions: search, reviews and re-rolls, references, retention, erasure, garbage collection."""
+"""User actions on motions: search, reviews and re-rolls, references, retention, erasure, files
+made on request, garbage collection."""
 
 from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
+from marey.takes.made import (
+    MadeFile,
+    MakingClaim,
+    claim_making,
+    fail_making,
+    find_made,
+    keep_made,
+    release_makings,
+    remove_expired_makings,
+    renew_makings,
+)
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
 from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
@@ -11,17 +23,26 @@ __all__ = [
     "MAX_REVIEWED",
     "Erasure",
     "GarbageReport",
+    "MadeFile",
+    "MakingClaim",
     "MotionFilter",
     "ReferenceKind",
     "ReferenceMatch",
     "Reroll",
+    "claim_making",
     "collect_garbage",
     "delete",
     "delete_expired",
     "erase",
+    "fail_making",
+    "find_made",
+    "keep_made",
     "list_motions",
+    "release_makings",
+    "remove_expired_makings",
     "remove_stale_assets",
     "remove_unused_assets",
+    "renew_makings",
     "reroll",
     "resolve_reference",
     "review",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Protocol
 from uuid import UUID
 
@@ -76,10 +76,22 @@ def remove_unused_assets(engine: sa.Engine, store: ObjectStore) -> int:
     return _remove_unreferenced(engine, store, _unreferenced() & (job_tables.asset.c.state == "stored"))
 
 
+def remove_assets(engine: sa.Engine, store: ObjectStore, assets: Collection[UUID]) -> int:
+    """Remove those of these assets that have no references; return their number.
+
+    Raises:
+        Unreachable: the store or the database does not answer; `collect_garbage` removes the rest.
+    """
+    if not assets:
+        return 0
+    return _remove_unreferenced(engine, store, _unreferenced() & among(job_tables.asset.c.id, assets))
+
+
 def _unreferenced() -> sa.ColumnElement[bool]:
     asset = job_tables.asset.c.id
     return ~(
         sa.exists().where(job_tables.motion_file.c.asset_id == asset)
+        | sa.exists().where(job_tables.made_file.c.asset_id == asset)
         | sa.exists().where(evaluation_tables.evaluation_report.c.asset_id == asset)
         | sa.exists().where(job_tables.asset_writer.c.asset_id == asset)
     )

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 from uuid import UUID
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Conflict, InvalidFile, NotFound, Unreachable
 from marey.db.database import EVENT_CHANNEL, transaction
 from marey.db.deadlines import BULK, MAINTENANCE
-from marey.db.ids import new_id
-from marey.db.sql import CLOCK, notify
+from marey.db.sql import notify
 from marey.evaluations import tables as evaluation_tables
 from marey.evaluations.repository import refuse_needed
 from marey.exporters import Coordinates, Exporter, exporter_of, exporters
@@ -25,6 +22,7 @@ from marey.jobs.journal import LockedJob, NewEvent, lock_job_of, record
 from marey.jobs.states import ENDED
 from marey.jobs.submit import TEXTS_LOCK
 from marey.jobs.types import NO_TEXT
+from marey.takes.assets import keep_content, write_content
 from marey.takes.gc import ObjectStore, remove_unused_assets
 from marey.takes.types import Erasure
 
@@ -68,7 +66,8 @@ FORGET = (
     "DELETE FROM idempotency WHERE job_id = :job",
     "UPDATE job SET erased_at = clock_timestamp() WHERE id = :job",
 )
-"""All columns of the database with words of a prompt, or a hash from which they could be guessed."""
+"""All columns of the database with words of a prompt, or a hash from which they could be guessed. Files made on request
+go with the update of `motion_file`, by a trigger."""
 
 FORGET_TEXTS = sa.text("""
     DELETE FROM text_features
@@ -278,22 +277,9 @@ def _rewrite(engine: sa.Engine, store: FileStore, file: _File, exporter: Exporte
         with transaction(engine, MAINTENANCE) as conn:
             conn.execute(sa.delete(job_tables.motion_file).where(_row_of(file)))
         return True
-    sha256 = hashlib.sha256(data).hexdigest()
-    values = {"tenant_id": file.tenant, "sha256": sha256, "size": len(data), "media_type": file.media_type}
+    sha256 = write_content(engine, store, file.tenant, data, file.media_type)
     with transaction(engine, MAINTENANCE) as conn:
-        announced = insert(job_tables.asset).values(id=new_id(), state="writing", announced_at=CLOCK, **values)
-        conn.execute(
-            announced.on_conflict_do_update(index_elements=["tenant_id", "sha256"], set_={"announced_at": CLOCK})
-        )
-    store.put(asset_key(file.tenant, sha256), data)
-    table = job_tables.asset.c
-    with transaction(engine, MAINTENANCE) as conn:
-        ours = conn.execute(
-            sa.update(job_tables.asset)
-            .where(table.tenant_id == file.tenant, table.sha256 == sha256)
-            .values(state="stored")
-            .returning(table.id)
-        ).scalar_one_or_none()
+        ours = keep_content(conn, file.tenant, sha256)
         if ours is None:
             return False
         conn.execute(sa.update(job_tables.motion_file).where(_row_of(file)).values(asset_id=ours, erasing=False))

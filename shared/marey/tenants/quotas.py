@@ -28,7 +28,17 @@ OPEN_ITEMS = sa.text("""
 
 OPEN_STREAMS = sa.text("SELECT count(*) FROM stream WHERE tenant_id = :tenant AND ended_at IS NULL")
 
-STORED = sa.text("SELECT coalesce(sum(size), 0)::bigint FROM asset WHERE tenant_id = :tenant AND state = 'stored'")
+STORED = sa.text("""
+    SELECT coalesce(sum(size), 0)::bigint - (
+        SELECT coalesce(sum(size), 0)::bigint FROM asset
+        WHERE state = 'stored'
+          AND id IN (SELECT asset_id FROM made_file WHERE tenant_id = :tenant AND asset_id IS NOT NULL)
+          AND NOT EXISTS (SELECT FROM motion_file WHERE motion_file.asset_id = asset.id)
+          AND NOT EXISTS (SELECT FROM evaluation_report WHERE evaluation_report.asset_id = asset.id)
+    )
+    FROM asset WHERE tenant_id = :tenant AND state = 'stored'
+""")
+"""Without files that were made on request, which have a quota of their own."""
 
 OF_A_MOTION = sa.text("""
     SELECT avg(bytes) FROM (

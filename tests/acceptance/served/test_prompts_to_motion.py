@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from marey.exporters.making import FileRecipe
 from marey.motion.clip import load_npz
+from marey.motion.export_options import ExportOptions
 from marey.motion.io.bvh import read_bvh
 from tests.support.marey import TINY, Marey, tiny
 from tests.support.models import another_model
@@ -152,3 +155,18 @@ def test_a_dry_run_submits_nothing(marey: Marey) -> None:
     ran = marey("submit", "a person waves", "--variants", 5, "--dry-run", "--json").ok()
     assert ran.lines[0]["items"] == 5
     assert marey.jobs() == before
+
+
+def test_the_server_makes_files_for_a_machine_without_numpy(
+    fetched: list[dict[str, object]], elsewhere: Marey, tmp_path: Path
+) -> None:
+    (tmp_path / "without").mkdir()
+    (tmp_path / "without" / "numpy.py").write_text("raise ImportError('numpy is not installed')")
+    small = replace(elsewhere, environment={**elsewhere.environment, "PYTHONPATH": str(tmp_path / "without")})
+    line, target = fetched[0], tmp_path / "walk.glb"
+    small("motions", "file", line["motion"], "glb", "-o", target, "--fps", 30, "--mesh", timeout=300).ok()
+    wanted = FileRecipe("glb", ExportOptions(mesh=True), 30.0).make(Path(line["files"]["npz"]).read_bytes(), "walk")
+    assert target.read_bytes() == wanted
+    refused = small("motions", "file", line["motion"], "mp4", "-o", tmp_path / "walk.mp4", "--root-bone")
+    refused.refused(2, "root_bone", "mp4 files have no such option")
+    assert not (tmp_path / "walk.mp4").exists()

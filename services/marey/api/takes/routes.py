@@ -7,6 +7,7 @@ from typing import Annotated
 from uuid import UUID
 
 from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi.concurrency import run_in_threadpool
 from pydantic import Field
 
 from marey import db, jobs
@@ -14,7 +15,10 @@ from marey import takes as takes_store
 from marey.api.audit import note
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
-from marey.api.files import FILE_RESPONSES, FileRequest, file_response
+from marey.api.files import CHECKED, FILE_RESPONSES, FOR_EVER, FileRequest, FileView, file_response
+from marey.api.making.maker import FileOrder
+from marey.api.making.query import GivenOptions, Rate
+from marey.api.takes.files import MAKING_RESPONSES, being_made, motion_of, recipe, source_of, stored_file
 from marey.api.takes.schemas import (
     MotionDetailView,
     MotionView,
@@ -26,7 +30,6 @@ from marey.api.takes.schemas import (
 )
 from marey.api.takes.service import file_stem, made_again
 from marey.core.disposition import download_name
-from marey.core.errors import NotFound
 from marey.exporters import extension_of
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
@@ -114,19 +117,27 @@ def get_motion(motion: UUID, conn: Connection, key: Reader) -> MotionDetailView:
 
 
 @router.head("/{motion}/files/{format}", include_in_schema=False)
-@router.get("/{motion}/files/{format}", response_class=Response, responses=FILE_RESPONSES)
-def get_file(
+@router.get("/{motion}/files/{format}", response_class=Response, responses={**FILE_RESPONSES, **MAKING_RESPONSES})
+async def get_file(
     motion: UUID,
-    format: Annotated[str, Path(pattern=r"^[a-z0-9]{1,16}$", description="`npz`, `bvh`, …")],
+    format: Annotated[str, Path(pattern=r"^[a-z0-9]{1,16}$", description="`npz`, `bvh`, `glb`, `mp4`, …")],
     shared: Shared,
-    conn: Connection,
     key: Reader,
     part: FileRequest,
+    options: GivenOptions,
+    fps: Rate = None,
 ) -> Response:
-    """Get a file of a motion; its ETag is its SHA-256."""
-    row = jobs.get_motion(conn, key.tenant, motion)
-    file = next((f for f in MotionView.of(row).files if f.format == format), None)
+    """Get a file of a motion; its ETag is its SHA-256.
+
+    A file in a format that was not stored, or with a rate or options of its own, is made on request and kept for a
+    while; 202 if that takes longer than 5 s: ask again.
+    """
+    row = await run_in_threadpool(motion_of, shared, key.tenant, motion)
+    file = stored_file(row, wanted := recipe(row, format, options, fps))
+    caching = FOR_EVER if file is not None else CHECKED
     if file is None:
-        made = ", ".join(f.format for f in row.files)
-        raise NotFound(f"the motion was not made as {format}", where=str(motion), hint=f"It has {made}.")
-    return file_response(shared, key.tenant, download_name(file_stem(row), extension_of(format)), file, part)
+        file = await shared.maker.get(FileOrder(key, motion, source_of(row), wanted))
+    if file is None:
+        return being_made(format)
+    name, view = download_name(file_stem(row), extension_of(format)), FileView(**vars(file))
+    return await run_in_threadpool(file_response, shared, key.tenant, name, view, part, caching=caching)

@@ -5,18 +5,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from marey.cli import console
+from marey.cli import console, options
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.client import Client
 
-app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
+app = typer.Typer(help="Motions on the server: find, keep, reject and re-roll them, get files.", no_args_is_help=True)
 
 MOST = 1000
 """Motions of one request."""
@@ -103,6 +104,34 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
                 else:
                     when = "" if take.made else f" (asked for before; it is {take.state})"
                     console.result(f"{take.motion} item {take.item} seed {take.seed} job {take.job}{when}")
+
+
+@app.command("file")
+def make_file(
+    motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
+    file_format: Annotated[str, typer.Argument(metavar="FORMAT", help="Format of the file, such as glb or mp4.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
+    fps: options.Fps = None,
+    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
+    root_bone: options.RootBone = False,
+    in_place: options.InPlace = None,
+    tpose_frame: options.TPoseFrame = False,
+    rest_pose: options.RestPose = options.RestPoseOption.T,
+    placement: options.Placement = options.PlacementOption.ORIGIN,
+    mesh: options.Mesh = False,
+    overwrite: options.Overwrite = False,
+) -> None:
+    """Have the server make a file of a motion, and fetch it; nothing is computed on this machine."""
+    from marey.client import Client
+
+    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
+    chosen = {name: getattr(export, name) for name in export.chosen}
+    with Client() as client:
+        found = find(client, "motion", motion)
+        path = client.motions.make_file(
+            found.id, output, file_format=file_format, fps=fps, overwrite=overwrite, **chosen
+        )
+    console.result(console.home_relative(path))
 
 
 def _review(

@@ -1,0 +1,1 @@
+"""Files of stored motions that are made on request, in child processes."""

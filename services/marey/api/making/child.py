@@ -1,0 +1,82 @@
+"""A process that makes files: `python -m marey.api.making.child SECONDS BYTES` reads requests from stdin until its end.
+
+It has neither a database nor a store: the API sends the npz, and gets the file back.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+import traceback
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from marey.api.making.messages import read_message, write_message
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
+from marey.core.extras import MissingExtra
+from marey.exporters.making import FileRecipe
+from marey.motion.export_options import ExportOptions
+
+NICENESS = 5
+"""Behind the API, which answers others meanwhile."""
+MAX_FILE = 64 * 2**20
+"""Bytes of a file."""
+
+
+def main(seconds: int, memory: int) -> None:
+    """Answer requests.
+
+    Args:
+        seconds: of one file; then the process ends by SIGALRM.
+        memory: bytes of address space.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the group; the end of stdin ends this process
+    os.nice(NICENESS)
+    with suppress(OSError, ValueError):  # macOS has no such limit
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    with suppress(OSError):  # where memory runs out, Linux ends this process before the API
+        Path("/proc/self/oom_score_adj").write_text("1000")
+    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what an exporter prints is no answer
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            request, npz = read_message(requests)
+            signal.alarm(seconds)
+            _answer(answers, request, npz)
+            signal.alarm(0)
+
+
+def _answer(answers: BinaryIO, request: dict[str, Any], npz: bytes) -> None:
+    try:
+        recipe = FileRecipe(request["format"], ExportOptions(**request["options"]), request["fps"])
+        content = recipe.make(npz, request["where"])
+        if len(content) > MAX_FILE:
+            raise TooLarge(f"the file would have {len(content) / 2**20:.0f} MiB, over {MAX_FILE // 2**20}")
+    except MemoryError:
+        error: MareyError = TooLarge("the file takes more memory than this server gives")
+        write_message(answers, _problem(error, request))
+    except MareyError as error:
+        write_message(answers, _problem(error, request))
+    except Exception:
+        traceback.print_exc()
+        write_message(answers, {"type": MareyError.problem_type, "message": "an internal error"})
+    else:
+        write_message(answers, {}, content)
+
+
+def _problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
+    """Describe an error for the API's client: in terms of the request, never of this machine."""
+    if isinstance(error, MissingExtra):
+        hint = f"Ask its operator for the extra {error.extra!r}, or make the file where you have it: `marey convert`."
+        error = InvalidInput(f"this server makes no {request['format']} files", where="format", hint=hint)
+    elif isinstance(error, InvalidFile):
+        error = Conflict(f"the npz of the motion cannot be read: {error.message}", where=request["where"])
+    where = error.where if error.where in {*request["options"], "fps", request["where"]} else "format"
+    return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

@@ -1,0 +1,109 @@
+"""Files of a motion: stored ones, and what a request for others asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from uuid import UUID
+
+from fastapi.responses import JSONResponse, Response
+from pydantic import Field
+
+from marey import jobs
+from marey.api.context import Context
+from marey.api.making.query import export_options
+from marey.core.errors import NotFound
+from marey.db import transaction
+from marey.exporters import check_options, exporters
+from marey.exporters.making import FileRecipe
+from marey.exporters.registry import CANONICAL
+from marey.http.schemas import View
+from marey.jobs.types import MotionFile
+
+RETRY_SECONDS = 2
+
+
+class MakingView(View):
+    """A file that is being made."""
+
+    format: str
+    retry_after: int = Field(description="Seconds after which to ask again, as in `Retry-After`.")
+
+
+MAKING_RESPONSES: dict[int | str, dict[str, Any]] = {
+    202: {"model": MakingView, "description": "It is being made; ask again after `Retry-After` seconds"},
+}
+
+
+def motion_of(shared: Context, tenant: str, motion: UUID) -> jobs.MotionRow:
+    """Return a motion.
+
+    Raises:
+        NotFound: the tenant has no such motion.
+    """
+    with transaction(shared.engine) as conn:
+        return jobs.get_motion(conn, tenant, motion)
+
+
+def recipe(row: jobs.MotionRow, format: str, given: Mapping[str, Any], fps: float | None) -> FileRecipe:
+    """Return the file that a request asks for.
+
+    Args:
+        given: options, by name.
+        fps: frames a second; None = the motion's.
+
+    Raises:
+        NotFound: the motion has no such file, and no installed exporter makes it.
+        InvalidInput: options that contradict each other, or that the format does not have.
+    """
+    exporter = exporters().get(format)
+    if exporter is None and not any(file.format == format for file in row.files):
+        raise _no_file(row, format)
+    export = export_options(given)
+    if exporter is not None:
+        check_options([exporter], export)
+    return FileRecipe(format, export, None if fps == row.fps else fps)
+
+
+def stored_file(row: jobs.MotionRow, wanted: FileRecipe) -> MotionFile | None:
+    """Return the stored file that is the wanted one; None if it is to be made.
+
+    Raises:
+        NotFound: it cannot be made, because its format is not installed here.
+    """
+    file = next((file for file in row.files if file.format == wanted.format), None)
+    if wanted.plain and file is not None:
+        return file
+    if wanted.format not in exporters():
+        raise _no_file(row, wanted.format)
+    return None
+
+
+def source_of(row: jobs.MotionRow) -> str:
+    """Return the sha256 of the npz that files are made of.
+
+    Raises:
+        NotFound: there is none.
+    """
+    source = next((file for file in row.files if file.format == CANONICAL), None)
+    if source is None:
+        hint = "If its prompt is being erased, wait a moment."
+        raise NotFound(f"the motion has no {CANONICAL} to make the file of", where=str(row.id), hint=hint)
+    return source.sha256
+
+
+def being_made(format: str) -> Response:
+    """Return the answer for a file that is not there yet."""
+    body = MakingView(format=format, retry_after=RETRY_SECONDS)
+    headers = {"Retry-After": str(RETRY_SECONDS), "Cache-Control": "no-store"}
+    return JSONResponse(body.model_dump(), 202, headers=headers)
+
+
+def _no_file(row: jobs.MotionRow, format: str) -> NotFound:
+    have = ", ".join(file.format for file in row.files)
+    made = ", ".join(exporters())
+    return NotFound(
+        f"the motion was not made as {format}, and this server does not make such files",
+        where=str(row.id),
+        hint=f"It has {have}; the server makes {made}.",
+    )
