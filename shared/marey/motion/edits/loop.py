@@ -21,7 +21,7 @@ from marey.motion.edits.place import heading_of, posed
 from marey.motion.feet import need_feet
 from marey.motion.rotations import about, rotate
 
-TRIED = 80
+TRIED = 120
 """Candidates."""
 
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from marey.motion.clip import MotionClip
 from marey.motion.edits.loop_blend import Bool, Closed
-from marey.motion.edits.loop_search import standing_spans, stands
+from marey.motion.edits.loop_search import PERCENTILE, standing_spans, stands
 from marey.motion.feet import find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array
 
 PLAYED = 3
 """Cycles."""
-PERCENTILE = 95.0
-"""Of the steps of a joint in the source: the largest step at a seam."""
 SKATE = 1.1
 """Skating of a loop over that of its source."""
 SLACK = 0.002

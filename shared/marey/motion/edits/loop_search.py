@@ -30,7 +30,12 @@ STRAIGHT = 0.1
 """Metres of cost a radian that a cycle turns more or less than its source in the same time."""
 AHEAD = 0.1
 """Seconds that a velocity counts for beside a place."""
-NEIGHBOURS = 2
+HASTE = 0.3
+"""Metres of cost for a beginning at which a joint moves twice as far as in `PERCENTILE` percent of the frames: a seam
+there would miss the bars."""
+PERCENTILE = 95.0
+"""Of the steps of a joint in the source: the largest step at a seam."""
+NEIGHBOURS = 1
 """Frames within which only the best of two beginnings or ends is tried."""
 
 
@@ -80,7 +85,7 @@ def cycles(clip: MotionClip, contacts: Bool, window: int, most: int) -> Iterator
             f"{clip.frames} frames are too many to search; the most is {LONGEST_SOURCE}", hint="Trim the motion first."
         )
     steps = has_steps(clip, contacts)
-    cost = _distances(clip, window) + STRAIGHT * _extra_turn(clip)
+    cost = _distances(clip, window) + STRAIGHT * _extra_turn(clip) + HASTE * _haste(clip)[:, None]
     allowed = _lengths(clip, SHORTEST_GAIT if steps else SHORTEST_STILL)
     if steps:
         allowed &= _whole_gaits(contacts) & _travelling(clip)
@@ -121,6 +126,20 @@ def _extra_turn(clip: MotionClip) -> Array:
     time = np.arange(clip.frames) - (clip.frames - 1) / 2
     even = angles - time * float(time @ angles) / max(float(time @ time), 1.0)
     return np.abs(even[None, :] - even[:, None])
+
+
+def _haste(clip: MotionClip) -> Array:
+    """Return by how much the fastest joint exceeds its usual step, or change of step, at each frame (T,): 0 or more, as
+    a share."""
+    joints = clip.joints.astype(np.float64)
+    step, change = (np.linalg.norm(np.diff(joints, n, axis=0), axis=-1) for n in (1, 2))
+    excess = np.zeros(clip.frames)
+    for values, places in ((step, (slice(1, None), slice(0, -1))), (change, (slice(1, -1),))):
+        usual = np.percentile(values, PERCENTILE, axis=0)
+        ratio = (values / np.maximum(usual, 1e-5)).max(axis=1) - 1.0
+        for place in places:
+            excess[place] = np.maximum(excess[place], ratio)
+    return excess
 
 
 def _whole_gaits(contacts: Bool) -> Bool:
