@@ -75,10 +75,10 @@ def _seams(clip: MotionClip, loop: MotionClip, played: MotionClip) -> Iterator[s
     step, change = (np.linalg.norm(np.diff(clip.joints, n, axis=0), axis=-1) for n in (1, 2))
     mine, bend = (np.linalg.norm(np.diff(played.joints, n, axis=0), axis=-1) for n in (1, 2))
     for seam in (loop.frames - 1, 2 * (loop.frames - 1)):
-        around = mine[seam - 1 : seam + 1] / (np.percentile(step, 95, axis=0) + 2e-5)
+        around = mine[seam - 1 : seam + 1] / (np.percentile(step, 95, axis=0) + 1.1e-4)
         if around.max() > 1:
             yield f"step {around.max():.2f} of the bar"
-        if (most := float((bend[seam - 1] / (np.percentile(change, 95, axis=0) + 2e-5)).max())) > 1:
+        if (most := float((bend[seam - 1] / (np.percentile(change, 95, axis=0) + 1.1e-4)).max())) > 1:
             yield f"change of step {most:.2f} of the bar"
 
 
@@ -105,8 +105,11 @@ def _kept(clip: MotionClip, loop: MotionClip) -> Iterator[str]:
     first, last = about["source_frames"]
     turn, shift = placement_of(loop)
     placed = rotate(turn, loop.joints.astype(np.float64)) + shift
-    kept = last - first + 1 - round(0.3 * clip.fps)
-    if (off := float(np.abs(placed[:kept] - clip.joints[first : first + kept]).max(initial=0.0))) > 1e-4:
+    blend = about["blend_frames"]
+    if sum(blend.values()) > 0.3 * clip.fps + 1e-6:
+        yield f"a blend of {sum(blend.values())} frames"
+    own = slice(blend["first"], last - first + 1 - blend["last"])
+    if (off := float(np.abs(placed[own] - clip.joints[first : last + 1][own]).max(initial=0.0))) > 1e-4:
         yield f"frames outside the blend differ by {1000 * off:.2f} mm"
     feet = [find_contacts(clip.joints, clip.skeleton, clip.fps)[:, s].any(axis=1) for s in (slice(2), slice(2, 4))]
     steps = [sum(first < begin <= last for begin, _ in runs(each)) for each in feet]
@@ -131,7 +134,9 @@ def captured() -> Iterator[tuple[str, str, str, MotionClip]]:
         for kind, each in _of_set(CaptureSet.known(name, folder / name)):
             found[kind].append(each)
     for kind, all_clips in found.items():
-        picked = np.unique(np.linspace(0, len(all_clips) - 1, min(EACH["captured"], len(all_clips))).round().astype(int))
+        picked = np.unique(
+            np.linspace(0, len(all_clips) - 1, min(EACH["captured"], len(all_clips))).round().astype(int)
+        )
         for index in picked:
             yield "captured", kind, all_clips[index].name, _solved(all_clips[index].joints)
 
@@ -156,9 +161,7 @@ def _of_set(captures: CaptureSet) -> Iterator[tuple[str, _Found]]:
 
 def _solved(joints: np.ndarray) -> MotionClip:
     pose = solve_pose(joints, HUMANML3D, fps=FPS)
-    return MotionClip.of(
-        pose.skeleton, pose.rotations, pose.root, find_contacts(pose.joints, pose.skeleton, FPS), FPS
-    )
+    return MotionClip.of(pose.skeleton, pose.rotations, pose.root, find_contacts(pose.joints, pose.skeleton, FPS), FPS)
 
 
 def generated() -> Iterator[tuple[str, str, str, MotionClip]]:

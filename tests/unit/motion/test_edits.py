@@ -161,9 +161,7 @@ def test_motions_join_where_the_last_pose_stands_and_nothing_jumps():
     change = np.linalg.norm(np.diff(whole.joints, 2, axis=0), axis=-1)[38].max()
     assert change < 0.5 * np.linalg.norm(np.diff(blunt.joints, 2, axis=0), axis=-1)[38].max()
     tail = one(whole, {"op": "trim", "from": "f44"})  # after 5 frames of blending: the second motion
-    np.testing.assert_allclose(
-        one(second, {"op": "trim", "from": "f5"}).joints, tail.joints, atol=EXACT
-    )
+    np.testing.assert_allclose(one(second, {"op": "trim", "from": "f5"}).joints, tail.joints, atol=EXACT)
 
 
 def test_joined_motions_keep_both_prompts_and_the_strictest_licence():

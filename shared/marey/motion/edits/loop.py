@@ -9,19 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.edits.feet import found_contacts
-from marey.motion.edits.loop_bars import Fault, fault_of
+from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import Closed, closed
 from marey.motion.edits.loop_search import SHORTEST_STILL, Cycle, cycles, has_steps
 from marey.motion.edits.place import heading_of, posed
 from marey.motion.feet import need_feet
 from marey.motion.rotations import about, rotate
 
-TRIED = 120
+TRIED = 100
 """Candidates."""
 
 
@@ -34,8 +32,8 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
             `blend`, the seconds before the end in which the result may differ from the source.
 
     Returns:
-        The loop; `loop` of its manifest has the frames of the source, the kind of its end, the seconds of the blend and
-        the travel of a cycle: metres, radians and seconds.
+        The loop; `loop` of its manifest has the frames of the source, the kind of its end, how many of its first and
+        last frames are blended, and the travel of a cycle: metres, radians and seconds.
 
     Raises:
         InvalidInput: no cycle keeps the bars; the message says which bar the nearest one misses.
@@ -43,13 +41,13 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     need_feet(clip.skeleton)
     contacts = clip.contacts if clip.contacts.any() else found_contacts(clip)
     window = max(int(values["blend"] * clip.fps + 1e-6), 1)
-    best: Fault | None = None
+    bars, best = Bars(clip, window), None
     for cycle in cycles(clip, contacts, window, TRIED):
         done = closed(clip, contacts, cycle, window)
-        fault = fault_of(clip, done, window)
-        if fault is None:
-            return _result(clip, done, cycle, values)
-        best = fault if best is None or fault.excess < best.excess else best
+        found = bars.best(done)
+        if isinstance(found, Closed):
+            return _result(clip, found, cycle, values)
+        best = found if best is None or found.excess < best.excess else best
     raise _refused(clip, contacts, best)
 
 
@@ -72,23 +70,24 @@ def _refused(clip: MotionClip, contacts: Any, best: Fault | None) -> InvalidInpu
 
 def _result(clip: MotionClip, done: Closed, cycle: Cycle, values: Mapping[str, Any]) -> MotionClip:
     """Return the loop, and write it down."""
-    back = rotate(about("Y", -heading_of(clip, cycle.first)), done.root[-1] - done.root[0])
     frames = cycle.last - cycle.first
+    whole = posed(clip, done.rotations, done.root, contacts=done.contacts)
+    way = rotate(about("Y", -heading_of(whole, 0)), done.root[-1] - done.root[0])
     record = {
         "end": values["end"],
-        "source_frames": [cycle.first, cycle.last],
-        "blend_seconds": round(min(int(values["blend"] * clip.fps + 1e-6), frames - 1) / clip.fps, 6),
+        "source_frames": [cycle.first - done.earlier, cycle.last - done.earlier],
+        "blend_frames": {"first": done.earlier, "last": done.blend - done.earlier},
         "cycle": {
             "seconds": round(frames / clip.fps, 6),
-            "x": round(float(back[0]), 6) + 0.0,
-            "z": round(float(back[2]), 6) + 0.0,
+            "x": round(float(way[0]), 6) + 0.0,
+            "z": round(float(way[2]), 6) + 0.0,
             "heading": round(done.travel.angle, 6) + 0.0,
         },
     }
     kept = slice(None) if values["end"] == "closed" else slice(-1)
     return posed(
-        clip,
-        np.asarray(done.rotations[kept]),
+        whole,
+        done.rotations[kept],
         done.root[kept],
         contacts=done.contacts[kept],
         manifest={**clip.manifest, "loop": record},

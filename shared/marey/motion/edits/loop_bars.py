@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +20,7 @@ SKATE = 1.1
 """Skating of a loop over that of its source."""
 SLACK = 0.002
 """Metres a second that standing feet may skate more: a source whose feet are locked skates by rounding alone."""
-ROUNDING = 1e-5
+ROUNDING = 1e-4
 """Metres."""
 
 
@@ -39,43 +38,16 @@ class Fault:
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
-    """Steps of joints from frame to frame, and their changes, metres.
-
-    Attributes:
-        joints: (T, J, 3).
-    """
-
-    joints: Array = field(repr=False)
-
-    @cached_property
-    def step(self) -> Array:
-        """(T - 1, J): from frame t to t + 1."""
-        return np.linalg.norm(np.diff(self.joints, axis=0), axis=-1)
-
-    @cached_property
-    def change(self) -> Array:
-        """(T - 2, J): of the step to frame t + 1 to the next."""
-        return np.linalg.norm(np.diff(self.joints, n=2, axis=0), axis=-1)
-
-    def usual(self) -> tuple[Array, Array]:
-        """Return the percentile of both for each joint (J,)."""
-        return np.percentile(self.step, PERCENTILE, axis=0), np.percentile(self.change, PERCENTILE, axis=0)
-
-
-@dataclass(frozen=True, eq=False)
 class Played:
     """Cycles of a loop, one after another.
 
     Attributes:
         joints: (T, J, 3) metres.
         seams: frames at which a cycle ends and the next begins.
-        contacts: (T, 4), found in the joints.
     """
 
     joints: Array = field(repr=False)
     seams: tuple[int, ...]
-    contacts: Bool = field(repr=False)
 
 
 def played(clip: MotionClip, loop: Closed, cycles: int = PLAYED) -> Played:
@@ -85,53 +57,68 @@ def played(clip: MotionClip, loop: Closed, cycles: int = PLAYED) -> Played:
     for _ in range(cycles - 1):
         joints = loop.travel.places(joints)
         parts.append(joints[1:])
-    whole = np.concatenate(parts)
-    seams = tuple(count * number for number in range(1, cycles))
-    return Played(whole, seams, find_contacts(whole, clip.skeleton, clip.fps))
+    return Played(np.concatenate(parts), tuple(count * number for number in range(1, cycles)))
 
 
-def fault_of(clip: MotionClip, loop: Closed, window: int) -> Fault | None:
-    """Return the bar that a loop misses by most, None if it keeps all of them."""
-    source = clip.joints.astype(np.float64)
-    play = played(clip, loop)
-    names = clip.skeleton.joint_names
-    faults = [*_jumps(Steps(source), play, names), *_double_stands(play, window), *_skating(clip, source, play)]
-    return max(faults, key=lambda fault: fault.excess, default=None)
+class Bars:
+    """The bars that the loops of a clip have to keep."""
+
+    def __init__(self, clip: MotionClip, window: int) -> None:
+        """Measure the source; `window` is the number of frames of the blend."""
+        self._clip, self._window = clip, window
+        joints = clip.joints.astype(np.float64)
+        self._step, self._change = (np.percentile(values, PERCENTILE, axis=0) for values in steps_of(joints))
+        self._skate = self._skating(joints, find_contacts(joints, clip.skeleton, clip.fps))
+
+    def best(self, loop: Closed) -> Closed | Fault:
+        """Return the loop, with its seam where joints jump least in the blend, or the bar that it misses even there."""
+        play = played(self._clip, loop)
+        jumps = [self._jump(play, earlier) for earlier in range(loop.room + 1)]
+        earlier = min(range(len(jumps)), key=lambda number: jumps[number].excess)
+        if jumps[earlier].excess > 1.0:
+            return jumps[earlier]
+        return self._foot_fault(play) or loop.begun(earlier)
+
+    def _jump(self, play: Played, earlier: int) -> Fault:
+        """Return the joint whose step, or change of step, at a seam is the largest beside what is usual in the source.
+
+        Args:
+            play: cycles of a loop.
+            earlier: frames before its end at which the seam is.
+        """
+        step, change = steps_of(play.joints)
+        seams = np.array(play.seams) - earlier
+        faults = [
+            self._excess("moves", np.maximum(step[seams - 1], step[seams]).max(axis=0), self._step),
+            self._excess("changes its step by", change[seams - 1].max(axis=0), self._change),
+        ]
+        return max(faults, key=lambda fault: fault.excess)
+
+    def _excess(self, verb: str, found: Array, usual: Array) -> Fault:
+        allowed = usual + ROUNDING
+        joint = int((found / allowed).argmax())
+        name, is_, may = self._clip.skeleton.joint_names[joint], 1000 * found[joint], 1000 * usual[joint]
+        excess = float(found[joint] / allowed[joint])
+        return Fault(excess, f"{name} {verb} {is_:.1f} mm at the seam, {may:.1f} allowed")
+
+    def _foot_fault(self, play: Played) -> Fault | None:
+        """Return the fault of feet: one stands twice in a row at a seam, or they slide more than in the source."""
+        contacts = find_contacts(play.joints, self._clip.skeleton, self._clip.fps)
+        for (_, end, foot), (begin, _, other) in pairwise(standing_spans(stands(contacts))):
+            around = (end - 1 <= seam + self._window and begin >= seam - self._window for seam in play.seams)
+            if foot == other and any(around):
+                return Fault(2.0, f"the {('left', 'right')[foot]} foot stands twice in a row at the seam")
+        found, allowed = self._skating(play.joints, contacts), SKATE * self._skate + SLACK
+        if found <= allowed:
+            return None
+        reason = f"standing feet slide at {1000 * found:.1f} mm/s, {1000 * allowed:.1f} allowed"
+        return Fault(found / allowed, reason)
+
+    def _skating(self, joints: Array, contacts: Bool) -> float:
+        return skate(joints, contacts, self._clip.skeleton, self._clip.fps)
 
 
-def _jumps(source: Steps, play: Played, names: tuple[str, ...]) -> list[Fault]:
-    """Return the joints whose step, or change of step, at a seam is larger than usual in the source."""
-    usual, steps = source.usual(), Steps(play.joints)
-    seams = np.array(play.seams)
-    at = {
-        "moves": (np.maximum(steps.step[seams - 1], steps.step[seams]).max(axis=0), usual[0]),
-        "changes its step by": (steps.change[seams - 1].max(axis=0), usual[1]),
-    }
-    faults: list[Fault] = []
-    for verb, (found, allowed) in at.items():
-        joint = int((found / (allowed + ROUNDING)).argmax())
-        if found[joint] > allowed[joint] + ROUNDING:
-            reason = (
-                f"{names[joint]} {verb} {1000 * found[joint]:.1f} mm at the seam, {1000 * allowed[joint]:.1f} allowed"
-            )
-            faults.append(Fault(float(found[joint] / (allowed[joint] + ROUNDING)), reason))
-    return faults
-
-
-def _double_stands(play: Played, window: int) -> list[Fault]:
-    """Return the seams at which a foot leaves the floor and stands again before the other foot has stood."""
-    spans = standing_spans(stands(play.contacts))
-    for (_, end, foot), (begin, _, next_foot) in pairwise(spans):
-        if foot == next_foot and any(end - 1 <= seam + window and begin >= seam - window for seam in play.seams):
-            return [Fault(2.0, f"the {('left', 'right')[foot]} foot stands twice in a row at the seam")]
-    return []
-
-
-def _skating(clip: MotionClip, source: Array, play: Played) -> list[Fault]:
-    tree = clip.skeleton
-    usual = skate(source, find_contacts(source, tree, clip.fps), tree, clip.fps)
-    found = skate(play.joints, play.contacts, tree, clip.fps)
-    allowed = SKATE * usual + SLACK
-    if found <= allowed:
-        return []
-    return [Fault(found / allowed, f"standing feet slide at {1000 * found:.1f} mm/s, {1000 * allowed:.1f} allowed")]
+def steps_of(joints: Array) -> tuple[Array, Array]:
+    """Return the steps (T - 1, J) of joints (T, J, 3) from frame to frame, and the changes of step (T - 2, J)."""
+    step = np.diff(joints, axis=0)
+    return np.linalg.norm(step, axis=-1), np.linalg.norm(np.diff(step, axis=0), axis=-1)

@@ -1,13 +1,14 @@
 """A cycle of a motion whose end meets its beginning: before its last frame it fades into the movement before its first.
 
 The frame after the last is the one after the first, moved on by the travel of a cycle. So the last frames fade from the
-source to the frames before `first`, moved on in the same way: at the seam places, speeds and accelerations agree. Where
-the source begins too late for that, the difference at the seam fades in by a Hermite curve.
+source to the frames before `first`, moved on in the same way: at the end places, speeds and accelerations agree. Where
+the source begins too late for that, the difference at the end fades in by a Hermite curve. The seam of the loop may be
+anywhere in the blend.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,10 @@ class Travel:
         """(4,) quaternion."""
         return about("Y", self.angle)
 
+    def back(self) -> Travel:
+        """Return the way from a cycle to the one before."""
+        return Travel(-self.angle, -rotate(about("Y", -self.angle), self.shift))
+
     def places(self, places: Array) -> Array:
         """Move places (..., 3)."""
         return rotate(self.turn, places) + self.shift
@@ -72,12 +77,29 @@ class Closed:
     Attributes:
         rotations, root, contacts: of its frames from `first` to `last`, both included; the last is the first, moved.
         travel: from a cycle to the next.
+        blend: number of frames before the last that differ from the source.
+        room: largest number of frames by which the cycle can begin earlier: there are no more in the source.
+        earlier: number of frames by which the seam is before the end of the blend.
     """
 
     rotations: Array = field(repr=False)
     root: Array = field(repr=False)
     contacts: Bool = field(repr=False)
     travel: Travel
+    blend: int
+    room: int
+    earlier: int = 0
+
+    def begun(self, earlier: int) -> Closed:
+        """Return the cycle with its seam some frames earlier: they come before the first one, moved back."""
+        if not earlier:
+            return self
+        back = self.travel.back()
+        own = slice(len(self.root) - 1 - earlier, len(self.root) - 1)
+        rotations = unroll(np.concatenate([back.turns(self.rotations[own]), self.rotations[:-earlier]]))
+        root = np.concatenate([back.places(self.root[own]), self.root[:-earlier]])
+        contacts = np.concatenate([self.contacts[own], self.contacts[:-earlier]])
+        return replace(self, rotations=rotations, root=root, contacts=contacts, earlier=earlier)
 
 
 def travel_of_cycle(clip: MotionClip, contacts: Bool, cycle: Cycle) -> Travel:
@@ -119,7 +141,7 @@ def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int) -> Close
     rotations[end], root[end] = blended
     rotations[-1], root[-1] = travel.turns(rotations[0]), travel.places(root[0])
     feet[-1] = feet[0]
-    return Closed(unroll(rotations), root, feet, travel)
+    return Closed(unroll(rotations), root, feet, travel, window, min(window, cycle.first))
 
 
 def _cross_faded(clip: MotionClip, travel: Travel, rotations: Array, root: Array, before: slice) -> tuple[Array, Array]:

@@ -132,7 +132,7 @@ def _haste(clip: MotionClip) -> Array:
     """Return by how much the fastest joint exceeds its usual step, or change of step, at each frame (T,): 0 or more, as
     a share."""
     joints = clip.joints.astype(np.float64)
-    step, change = (np.linalg.norm(np.diff(joints, n, axis=0), axis=-1) for n in (1, 2))
+    step, change = (np.linalg.norm(np.diff(joints, number, axis=0), axis=-1) for number in (1, 2))
     excess = np.zeros(clip.frames)
     for values, places in ((step, (slice(1, None), slice(0, -1))), (change, (slice(1, -1),))):
         usual = np.percentile(values, PERCENTILE, axis=0)
