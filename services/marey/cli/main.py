@@ -13,6 +13,7 @@ from marey.cli.commands import (
     admin,
     convert,
     data,
+    edit,
     evaluations,
     fetch,
     generate,
@@ -28,6 +29,7 @@ from marey.cli.commands import (
     train,
     webhooks,
 )
+from marey.cli.operations import OperationsCommand
 from marey.core import tracing
 from marey.core.errors import MareyError
 
@@ -129,6 +131,7 @@ app.add_typer(evaluations.app, name="eval")
 app.add_typer(webhooks.app, name="webhooks")
 app.command("convert")(convert.convert)
 app.command("render")(convert.render)
+app.command("edit", cls=OperationsCommand)(edit.edit)
 app.command("doctor")(admin.doctor)
 app.add_typer(admin.app, name="admin")
 

@@ -16,6 +16,7 @@ from marey.core.lazy import lazy_names
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip, load_npz
+    from marey.motion.edits.editing import edit
     from marey.motion.io.bvh import BvhClip, read_bvh, write_bvh
     from marey.motion.io.convert import clip_from_bvh
     from marey.motion.io.fbx_read import read_fbx
@@ -29,6 +30,7 @@ __getattr__ = lazy_names(
     __name__,
     {
         "marey.motion.clip": "MotionClip load_npz",
+        "marey.motion.edits.editing": "edit",
         "marey.motion.io.bvh": "BvhClip read_bvh write_bvh",
         "marey.motion.io.convert": "clip_from_bvh",
         "marey.motion.io.fbx_read": "read_fbx",
@@ -43,6 +45,7 @@ __all__ = [
     "MotionClip",
     "__version__",
     "clip_from_bvh",
+    "edit",
     "load_npz",
     "read_bvh",
     "read_fbx",

@@ -92,7 +92,7 @@ def moved(clip: Posed, options: ExportOptions) -> tuple[Array, Array, Array, dic
     heading = headings(rotations[:, 0]) if options.in_place or options.root_bone else IDENTITY[None]
     removed: dict[str, Any] = {}
     if options.in_place:
-        removed = _travel(root, heading, clip.fps)
+        removed = travel_of(root, heading, clip.fps)
         root[:, [0, 2]] = root[:1, [0, 2]]
     if options.in_place == "heading":
         rotations[:, 0] = multiply(conjugate(heading), rotations[:, 0])
@@ -150,7 +150,7 @@ def _standing(skeleton: Skeleton) -> Array:
     return np.array([0.0, float(rest[0, 1] - rest[:, 1].min()), 0.0])
 
 
-def _travel(root: Array, heading: Array, fps: float) -> dict[str, Any]:
+def travel_of(root: Array, heading: Array, fps: float) -> dict[str, Any]:
     """Describe travel and heading of a motion, in all and per second: metres and radians."""
     seconds = max(len(root) - 1, 1) / fps
     x, _, z = (root[-1] - root[0]).tolist()

@@ -13,8 +13,9 @@ import pytest
 from marey.checks.judge import Expectation, judge
 from marey.checks.rates import LabelledClip
 from marey.core.errors import Conflict, InvalidFile, NotFound
+from marey.core.sides import swap_sides
 from marey.data import compose
-from marey.data.build import LAYOUT, build, swap_sides, windows
+from marey.data.build import LAYOUT, build, windows
 from marey.data.compose import Counts
 from marey.data.dataset import known_set
 from marey.data.inspect import summarize

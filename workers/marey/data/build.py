@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.core.sides import swap_sides
 from marey.data import wording
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COMPOSED, COUNTS, compose
@@ -42,11 +43,6 @@ COMPOSITIONAL_SPLIT = "compositional"
 LARGEST_SPEED = 0.5
 
 Progress = Callable[[int, int], None]
-
-
-def swap_sides(label: str) -> str:
-    """Exchange left and right in a label: `walk-turn-left` becomes `walk-turn-right`."""
-    return label.replace("left", "\0").replace("right", "left").replace("\0", "right")
 
 
 def windows(frames: int) -> list[slice]:

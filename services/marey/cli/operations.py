@@ -1,0 +1,107 @@
+"""Options of the command line for operations on motions: those of the table, in the order in which they are given."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from marey.core.errors import InvalidInput
+from marey.motion.edits.operation import value_of_text
+from marey.motion.edits.table import OPERATIONS
+
+GIVEN = "marey.operations"
+"""Key of the context: the options of operations with their values, in order."""
+
+
+class OperationsCommand(TyperCommand):
+    """A command that keeps the order of the options of operations; the parser gives each option apart."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Note the options of operations, then parse."""
+        ctx.meta[GIVEN] = [*_given(args)]
+        return super().parse_args(ctx, args)
+
+
+def with_operations(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of all operations in place of its `**operations`."""
+    signature = inspect.signature(command, eval_str=True)
+    common = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+    options = [
+        inspect.Parameter(
+            option.strip("-").replace("-", "_") + "_",
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None if metavar else False,
+            annotation=Annotated[
+                list[str] | None if metavar else bool,
+                typer.Option(option, metavar=metavar or None, help=about, show_default=False),
+            ],
+        )
+        for option, (metavar, about) in _options().items()
+    ]
+    command.__signature__ = signature.replace(parameters=[*common, *options])  # pyright: ignore[reportFunctionMemberAccess]
+    return command
+
+
+def operations_of(context: typer.Context) -> list[dict[str, Any]]:
+    """Return the operations that were given on the command line, as in JSON.
+
+    Raises:
+        InvalidInput: a value of another form, or an option without an operation before it that has it.
+    """
+    found: list[dict[str, Any]] = []
+    for option, value in context.meta[GIVEN]:
+        operation = OPERATIONS.get(option.removeprefix("--"))
+        if operation is None:
+            _add(found, option, value)
+            continue
+        try:
+            values = operation.values_of_text(value) if operation.metavar else {}
+        except ValueError as error:
+            raise InvalidInput(f"{value!r} is not {error}", where=option) from None
+        found.append({"op": operation.name, **values})
+    return found
+
+
+def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:
+    """Set a parameter with an option of its own in the last operation that has it."""
+    for row in reversed(found):
+        for parameter in OPERATIONS[row["op"]].parameters:
+            if parameter.option == option:
+                row[parameter.name] = value_of_text(value)
+                return
+    having = [each.name for each in OPERATIONS.values() if option in {p.option for p in each.parameters}]
+    raise InvalidInput(
+        "stands before every operation that has it",
+        where=option,
+        hint=f"Write it after {' or '.join(f'--{name}' for name in having)}.",
+    )
+
+
+def _options() -> Mapping[str, tuple[str, str]]:
+    """Return placeholder and help of each option: of operations, then of their parameters with options of their own."""
+    own = {f"--{each.name}": (each.metavar, each.about) for each in OPERATIONS.values()}
+    extra: dict[str, tuple[str, str]] = {}
+    for each in OPERATIONS.values():
+        for parameter in each.parameters:
+            if parameter.option:
+                _, before = extra.get(parameter.option, ("", ""))
+                about = f"{before} After --{each.name}: {parameter.about}".strip()
+                extra[parameter.option] = (parameter.metavar, about)
+    return own | extra
+
+
+def _given(args: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield the options of operations in arguments, with their values; flags have an empty one."""
+    options = _options()
+    rest = iter(args)
+    for argument in rest:
+        if argument == "--":
+            return
+        option, assigned, value = argument.partition("=")
+        if option in options:
+            metavar, _ = options[option]
+            yield option, value if assigned or not metavar else next(rest, "")

@@ -1,0 +1,121 @@
+"""Edits of motion files, for `marey edit`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from marey.core.errors import Conflict, InvalidInput
+from marey.core.extras import needs_extra
+from marey.motion.export_options import ExportOptions
+
+if TYPE_CHECKING:
+    from marey.exporters import Exporter
+    from marey.motion.clip import MotionClip
+    from marey.motion.edits.editing import Source
+
+
+def edit_files(
+    sources: Sequence[Path],
+    output: Path,
+    ops: Sequence[Mapping[str, Any]],
+    *,
+    file_format: str,
+    export: ExportOptions,
+    overwrite: bool,
+) -> Iterator[dict[str, Any]]:
+    """Edit motion files, and yield a line for each file that was written. All are edited before the first is written.
+
+    Args:
+        sources: files that `marey convert` reads.
+        output: a motion file, or a folder.
+        ops: as of `marey.motion.edit`; files in `with` are read like the sources.
+        file_format: of files in a folder.
+        export: options of the files.
+        overwrite: replace existing files.
+
+    Raises:
+        InvalidInput: an operation that is unknown or cannot be done, several sources for one file, or a format that is
+            unknown.
+        Conflict: a file exists.
+        NotFound, InvalidFile, TooLarge: of a source.
+    """
+    try:
+        from marey.editing.judge import judged
+        from marey.exporters import Coordinates, check_options
+        from marey.motion.edits.editing import edit
+        from marey.motion.files import write_atomically
+    except ImportError as error:
+        raise needs_extra("motion", error) from error
+    writer, is_file = _writer(output, file_format)
+    if is_file and len(sources) > 1:
+        raise InvalidInput(f"is one file for {len(sources)} motions", where=str(output), hint="Name a folder with -o.")
+    check_options([writer], export)
+    made: list[tuple[Path, Path, MotionClip]] = []
+    for source in sources:
+        clips = edit(_read(source), ops, load=lambda name: _read(Path(name)))
+        target = output if is_file else output / f"{source.stem}.{writer.extension}"
+        made += [(source, path, judged(clip)) for path, clip in zip(_numbered(target, len(clips)), clips, strict=True)]
+    _check_targets([path for _, path, _ in made], overwrite=overwrite)
+    for source, path, clip in made:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, writer.write(clip, Coordinates.of(export)))
+        yield _line(source, path, clip)
+
+
+def _writer(output: Path, file_format: str) -> tuple[Exporter[Any], bool]:
+    """Return the exporter of the results, and whether the output names one file."""
+    from marey.exporters import exporters
+
+    known = exporters()
+    extension = output.suffix.lower().removeprefix(".")
+    named = next((each for each in known.values() if each.extension == extension), None)
+    if named is not None and not output.is_dir():
+        return named, True
+    if file_format not in known:
+        raise InvalidInput(
+            f"{file_format!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
+        )
+    return known[file_format], False
+
+
+def _read(path: Path) -> Source:
+    from marey.exporters import Coordinates
+    from marey.exporters.convert import read_motion
+    from marey.motion.clip import MAX_UNPACKED
+    from marey.motion.edits.editing import Source
+    from marey.motion.files import read_limited
+
+    clip = read_motion(path, Coordinates())
+    return Source(clip, path.name, hashlib.sha256(read_limited(path, MAX_UNPACKED)).hexdigest())
+
+
+def _numbered(target: Path, count: int) -> list[Path]:
+    """Return the paths of the pieces of a motion."""
+    if count == 1:
+        return [target]
+    return [target.with_name(f"{target.stem}-{number}{target.suffix}") for number in range(1, count + 1)]
+
+
+def _check_targets(paths: Sequence[Path], *, overwrite: bool) -> None:
+    if len(set(paths)) < len(paths):
+        twice = next(path for path in paths if paths.count(path) > 1)
+        raise InvalidInput("two motions would have this name", where=str(twice), hint="Edit them into other folders.")
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise Conflict("already exists", where=str(path), hint="Choose another name, or --overwrite.")
+
+
+def _line(source: Path, path: Path, clip: MotionClip) -> dict[str, Any]:
+    about = clip.manifest
+    shown = ("placement", "loop", "travel", "travel_per_second", "licence", "edited_from")
+    return {
+        "source": str(source),
+        "file": str(path.absolute()),
+        "frames": clip.frames,
+        "fps": clip.fps,
+        "quality": about.get("quality"),
+        **{name: about[name] for name in shown if name in about},
+    }

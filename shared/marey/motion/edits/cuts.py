@@ -1,0 +1,43 @@
+"""Cuts in time: `trim`. `split` is two trims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from marey.core.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.edits.operation import frame_number
+from marey.motion.edits.place import posed
+
+
+def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
+    """Keep the frames between two moments, both included.
+
+    Raises:
+        InvalidInput: a moment is outside the motion, or the second is before the first.
+    """
+    last = clip.frames - 1
+    first = _frame(values["from"], clip)
+    end = last if values["to"] is None else _frame(values["to"], clip)
+    if end < first:
+        raise InvalidInput(f"the end, frame {end}, is before the beginning, frame {first}")
+    return part(clip, first, end)
+
+
+def part(clip: MotionClip, first: int, last: int) -> MotionClip:
+    """Return the frames from `first` to `last`, both included, without features."""
+    kept = slice(first, last + 1)
+    return posed(clip, clip.rotations[kept], clip.root[kept], contacts=clip.contacts[kept])
+
+
+def _frame(moment: float | str, clip: MotionClip) -> int:
+    frame = frame_number(moment, clip.fps)
+    if frame >= clip.frames:
+        given = moment if isinstance(moment, str) else f"{moment:g} s"
+        raise InvalidInput(
+            f"{given} is after the end of the motion",
+            hint=f"It has {clip.frames} frames, 0 to {clip.frames - 1}, at {clip.fps:g} a second: "
+            f"to {(clip.frames - 1) / clip.fps:.3f} s.",
+        )
+    return frame

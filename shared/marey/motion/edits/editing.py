@@ -1,0 +1,131 @@
+"""`marey.motion.edit`: operations applied to a motion in their order."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+from marey.core.errors import InvalidInput
+from marey.motion.clip import MotionClip, load_npz
+from marey.motion.edits.licences import strictest
+from marey.motion.edits.place import settled
+from marey.motion.edits.steps import Step, pieces_of, read_steps
+
+EDITED_FROM = "edited_from"
+CYCLE = "loop"
+"""Key of the record of a loop in a motion's manifest."""
+OUTDATED = ("quality", "selection", "travel", "travel_per_second")
+"""Keys of a manifest that describe the frames of the source."""
+MOST_FRAMES = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A motion to edit, as its file.
+
+    Attributes:
+        clip: the motion.
+        name: of its file, or the id of a stored motion; empty if it has neither.
+        sha256: of its file; by default of the npz file that the clip would be.
+    """
+
+    clip: MotionClip
+    name: str = ""
+    sha256: str = field(default="")
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """Return its entry in the manifest of the result; edits of edits are nested."""
+        manifest = self.clip.manifest
+        digest = self.sha256 or hashlib.sha256(self.clip.to_npz()).hexdigest()
+        kept = {name: manifest[name] for name in ("bundle", "seed", "licence", EDITED_FROM) if name in manifest}
+        return {**({"name": self.name} if self.name else {}), "sha256": digest, **kept}
+
+
+Load = Callable[[str], "MotionClip | Source"]
+
+
+def edit(
+    clip: MotionClip | Source, ops: Sequence[Mapping[str, Any]], *, load: Load = load_npz
+) -> tuple[MotionClip, ...]:
+    """Apply operations in their order; the clip itself does not change.
+
+    Results are kinematic: they have no features. In frame 0 they face +Z at the origin; where they were in the source
+    stands in the manifest as `placement`, metres and radians. `edited_from` names the sources by their SHA-256, the
+    operations and the version of Marey, and `licence` is that of the strictest source.
+
+    Args:
+        clip: metres, Y up.
+        ops: operations as in JSON, such as `[{"op": "trim", "from": 0.5}, {"op": "loop"}]`; see
+            `docs/reference/edits.md`.
+        load: reads the motion that `with` of `concat` names, an npz file by default; a clip may stand there too.
+
+    Returns:
+        One motion, or two for each `split`.
+
+    Raises:
+        InvalidInput: an unknown operation or parameter, a moment outside the motion, skeletons that differ, a motion
+            that cannot become a loop, or licences that exclude each other.
+        NotFound, InvalidFile: from reading another motion.
+    """
+    source = clip if isinstance(clip, Source) else Source(clip)
+    loaded: dict[int, Source] = {}
+
+    def other(step: Step) -> Source:
+        key = id(step.values["with"])
+        if key not in loaded:
+            loaded[key] = _loaded(step.values["with"], load)
+        return loaded[key]
+
+    return tuple(_apply(source, steps, other) for steps in pieces_of(read_steps(ops)))
+
+
+def _loaded(named: Any, load: Load) -> Source:
+    found = named if isinstance(named, MotionClip | Source) else load(named)
+    if isinstance(found, Source):
+        return found
+    return Source(found, name=named if isinstance(named, str) else "")
+
+
+def _apply(source: Source, steps: Sequence[Step], other: Callable[[Step], Source]) -> MotionClip:
+    """Return the result of operations without a split."""
+    manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
+    clip = settled(replace(source.clip, manifest=manifest))
+    sources, done = [source], list[dict[str, Any]]()
+    for step in steps:
+        values, record = dict(step.values), step.as_json()
+        if "with" in values:
+            joined = other(step)
+            values["with"] = joined.clip
+            record["with"] = joined.record["sha256"]
+            sources.append(joined)
+        clip = _run(step, clip, values)
+        done.append(record)
+    clip = replace(clip, manifest={**clip.manifest, **_provenance(sources, done)})
+    return MotionClip.of(
+        clip.skeleton, clip.rotations, clip.root, clip.contacts, clip.fps, manifest=clip.manifest
+    )  # without features
+
+
+def _run(step: Step, clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
+    if not step.operation.keeps_cycle:
+        clip = replace(clip, manifest={name: value for name, value in clip.manifest.items() if name != CYCLE})
+    try:
+        result = settled(step.operation.function()(clip, values))
+    except InvalidInput as error:
+        where = f"{step.where} ({step.operation.name})"
+        raise type(error)(error.message, where=where, hint=error.hint) from None
+    if result.frames > MOST_FRAMES:
+        raise InvalidInput(f"the result has {result.frames} frames; the most is {MOST_FRAMES}", where=step.where)
+    return result
+
+
+def _provenance(sources: Sequence[Source], done: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    licence = strictest(each.clip.manifest.get("licence") for each in sources)
+    unique = {each.record["sha256"]: each.record for each in sources}
+    record = {"sources": [*unique.values()], "ops": [*done], "software": {"marey": version("marey")}}
+    return {EDITED_FROM: record, **({} if licence is None else {"licence": licence})}

@@ -1,0 +1,201 @@
+"""A cycle of a motion whose end meets its beginning: before its last frame it fades into the movement before its first.
+
+The frame after the last is the one after the first, moved on by the travel of a cycle. So the last frames fade from the
+source to the frames before `first`, moved on in the same way: at the end places, speeds and accelerations agree. Where
+the source begins too late for that, the difference at the end fades in by a Hermite curve. The seam of the loop may be
+anywhere in the blend.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.motion.clip import MotionClip
+from marey.motion.edits.concat import fade
+from marey.motion.edits.loop_search import Cycle
+from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.legs import foot_chain, two_bone_knee
+from marey.motion.pose import aim_bones
+from marey.motion.rotations import (
+    Array,
+    about,
+    conjugate,
+    from_rotvec,
+    length,
+    multiply,
+    normalize,
+    rotate,
+    slerp,
+    to_rotvec,
+    unroll,
+)
+
+Bool = NDArray[np.bool_]
+STANDING = 30.0
+"""Weight of a standing joint beside the others in the travel of a cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Way of a cycle: a turn about the vertical axis of the origin, then a shift on the floor.
+
+    Attributes:
+        angle: radians.
+        shift: (3,) metres.
+    """
+
+    angle: float
+    shift: Array = field(repr=False)
+
+    @property
+    def turn(self) -> Array:
+        """(4,) quaternion."""
+        return about("Y", self.angle)
+
+    def back(self) -> Travel:
+        """Return the way from a cycle to the one before."""
+        return Travel(-self.angle, -rotate(about("Y", -self.angle), self.shift))
+
+    def places(self, places: Array) -> Array:
+        """Move places (..., 3)."""
+        return rotate(self.turn, places) + self.shift
+
+    def turns(self, rotations: Array) -> Array:
+        """Turn local rotations (..., J, 4) of bodies in the world."""
+        moved = np.array(rotations, np.float64)
+        moved[..., 0, :] = multiply(self.turn, moved[..., 0, :])
+        return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Closed:
+    """A closed cycle.
+
+    Attributes:
+        rotations, root, contacts: of its frames from `first` to `last`, both included; the last is the first, moved.
+        travel: from a cycle to the next.
+        blend: number of frames before the last that differ from the source.
+        room: largest number of frames by which the cycle can begin earlier: there are no more in the source.
+        earlier: number of frames by which the seam is before the end of the blend.
+    """
+
+    rotations: Array = field(repr=False)
+    root: Array = field(repr=False)
+    contacts: Bool = field(repr=False)
+    travel: Travel
+    blend: int
+    room: int
+    earlier: int = 0
+
+    def begun(self, earlier: int) -> Closed:
+        """Return the cycle with its seam some frames earlier: they come before the first one, moved back."""
+        if not earlier:
+            return self
+        back = self.travel.back()
+        own = slice(len(self.root) - 1 - earlier, len(self.root) - 1)
+        rotations = unroll(np.concatenate([back.turns(self.rotations[own]), self.rotations[:-earlier]]))
+        root = np.concatenate([back.places(self.root[own]), self.root[:-earlier]])
+        contacts = np.concatenate([self.contacts[own], self.contacts[:-earlier]])
+        return replace(self, rotations=rotations, root=root, contacts=contacts, earlier=earlier)
+
+
+def travel_of_cycle(clip: MotionClip, contacts: Bool, cycle: Cycle) -> Travel:
+    """Return the way from the first pose to the last: standing feet stay where they are.
+
+    The turn fits all joints on the floor plane, the shift those feet that stand in both frames, or else all joints.
+    """
+    first, last = (clip.joints[frame][:, [0, 2]].astype(np.float64) for frame in (cycle.first, cycle.last))
+    weights = np.ones(len(first))
+    both = contacts[cycle.first] & contacts[cycle.last]
+    held = [joint for joint, stays in zip(clip.skeleton.feet, both, strict=True) if stays]
+    weights[held] = STANDING
+    weights /= weights.sum()
+    a, b = (points - weights @ points for points in (first, last))
+    cosine, sine = (weights @ (a * b)).sum(), (weights @ (a[:, 1] * b[:, 0] - a[:, 0] * b[:, 1]))
+    angle = float(np.arctan2(sine, cosine))
+    from_, to = (clip.joints[frame].astype(np.float64) for frame in (cycle.first, cycle.last))
+    gaps = to - rotate(about("Y", angle), from_)
+    shift = (gaps[held] if held else gaps).mean(axis=0) * np.array([1.0, 0.0, 1.0])
+    return Travel(angle, shift)
+
+
+def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int) -> Closed:
+    """Return the cycle with its last `window` frames blended."""
+    travel = travel_of_cycle(clip, contacts, cycle)
+    window = min(window, cycle.last - cycle.first - 1)
+    whole = slice(cycle.first, cycle.last + 1)
+    rotations = unroll(clip.rotations[whole].astype(np.float64))
+    root = clip.root[whole].astype(np.float64)
+    feet = contacts[whole].copy()
+    end = slice(len(root) - 1 - window, len(root))
+    if cycle.first >= window:
+        before = slice(cycle.first - window, cycle.first + 1)
+        blended = _cross_faded(clip, travel, rotations[end], root[end], before)
+        later = np.arange(window + 1) > window / 2
+        feet[end] = np.where(later[:, None], contacts[before], feet[end])
+    else:
+        blended = _faded_in(clip, travel, rotations, root, cycle, window)
+    rotations[end], root[end] = blended
+    rotations[-1], root[-1] = travel.turns(rotations[0]), travel.places(root[0])
+    feet[-1] = feet[0]
+    return Closed(unroll(rotations), root, feet, travel, window, min(window, cycle.first))
+
+
+def _cross_faded(clip: MotionClip, travel: Travel, rotations: Array, root: Array, before: slice) -> tuple[Array, Array]:
+    """Fade from the poses to those of the frames `before`, moved by the travel; feet keep to the paths of both."""
+    t = np.linspace(0.0, 1.0, len(root))
+    share = t**3 * (t * (6 * t - 15) + 10)
+    theirs, place = travel.turns(clip.rotations[before]), travel.places(clip.root[before].astype(np.float64))
+    mixed = slerp(rotations, theirs, share[:, None])
+    middle = root + share[:, None] * (place - root)
+    joints = [forward_kinematics(clip.skeleton, r, p) for r, p in ((rotations, root), (theirs, place))]
+    wanted = joints[0] + share[:, None, None] * (joints[1] - joints[0])
+    return with_feet(clip, mixed, middle, wanted), middle
+
+
+def _faded_in(
+    clip: MotionClip, travel: Travel, rotations: Array, root: Array, cycle: Cycle, window: int
+) -> tuple[Array, Array]:
+    """Add the difference at the seam to the last frames, from nothing: in place and speed it meets the beginning."""
+    begin = slice(cycle.first, cycle.first + 2)
+    theirs, place = travel.turns(clip.rotations[begin]), travel.places(clip.root[begin].astype(np.float64))
+    after = min(cycle.last + 1, clip.frames - 1)
+    ours = clip.rotations[[after - 1, after]].astype(np.float64)
+    path = clip.root[[after - 1, after]].astype(np.float64)
+    turn = to_rotvec(multiply(theirs[0], conjugate(rotations[-1])))
+    bend = to_rotvec(multiply(theirs[1], conjugate(theirs[0]))) - to_rotvec(multiply(ours[1], conjugate(ours[0])))
+    k = np.arange(window, -1, -1, dtype=np.float64)[:, None]
+    turns = from_rotvec(fade(turn, -bend, k[..., None], window))
+    shifts = fade(place[0] - root[-1], -(place[1] - place[0] - path[1] + path[0]), k, window)
+    end = slice(len(root) - 1 - window, len(root))
+    mixed, middle = multiply(turns, rotations[end]), root[end] + shifts
+    joints = forward_kinematics(clip.skeleton, rotations[end], root[end])
+    goal = travel.places(clip.joints[cycle.first].astype(np.float64))
+    share = fade(np.ones(1), np.zeros(1), k, window)[..., None]
+    return with_feet(clip, mixed, middle, joints + share * (goal - joints[-1])), middle
+
+
+def with_feet(clip: MotionClip, rotations: Array, root: Array, wanted: Array) -> Array:
+    """Return the rotations (n, J, 4) with legs that put the feet at wanted places, as far as they reach.
+
+    Args:
+        wanted: (n, J, 3) metres; only the joints of the feet are read.
+    """
+    tree = clip.skeleton
+    joints = forward_kinematics(tree, rotations, root)
+    ahead = facing(joints, tree)
+    for hip, toe in zip((tree.facing[1], tree.facing[0]), tree.feet[1::2], strict=True):
+        chain = foot_chain(tree, toe)
+        knee, ankle = tree.children[hip][0], chain[-1]
+        leg = joints[:, [hip, knee, ankle]]
+        bent = two_bone_knee(leg, leg[:, 0], wanted[:, ankle], ahead)
+        shank = length(leg[:, 2] - leg[:, 1])[:, None]
+        joints[:, knee] = bent
+        joints[:, ankle] = bent + shank * normalize(wanted[:, ankle] - bent)
+        for child in chain[-2::-1]:
+            parent, bone = tree.parents[child], float(np.linalg.norm(tree.offsets[child]))
+            joints[:, child] = joints[:, parent] + bone * normalize(wanted[:, child] - wanted[:, parent])
+    return aim_bones(joints, rotations, tree)

@@ -1,0 +1,131 @@
+"""`marey edit`: operations in the order of the command line, files in and out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from marey.cli.main import app
+from marey.cli.operations import with_operations
+from marey.core.sides import swap_sides, swap_sides_in
+from marey.editing.judge import judged
+from marey.motion import edit, load_npz, read_glb
+from marey.motion.arrange import placement_of
+from marey.motion.edits.table import OPERATIONS
+from marey.motion.io.bvh import read_bvh
+from tests.support.walker import walker
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    clip = walker(seconds=3.0, turn=0.5, prompt="a person walks and raises the left hand")
+    clip.save_npz(tmp_path / "walk.npz")
+    return tmp_path / "walk.npz"
+
+
+def run(*args: object, code: int = 0) -> str:
+    result = CliRunner().invoke(app, ["edit", *map(str, args)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def test_operations_apply_in_the_order_of_the_line(walk: Path):
+    first, second = walk.with_name("a.npz"), walk.with_name("b.npz")
+    run(walk, "-o", first, "--trim", "0:1", "--reverse")
+    run(walk, "-o", second, "--reverse", "--trim=0:1")
+    a, b, source = load_npz(first), load_npz(second), load_npz(walk)
+    assert a.frames == b.frames == 21
+    turn, shift = placement_of(a)
+    assert placement_of(b)[1][2] > shift[2] + 0.5  # from the end of the walk, not from 1 s
+    assert [each["op"] for each in b.manifest["edited_from"]["ops"]] == ["reverse", "trim"]
+    assert a.manifest["edited_from"]["sources"][0]["name"] == "walk.npz"
+    assert np.abs(source.root[20] - shift)[[0, 2]].max() < 1e-4
+    assert turn[0] < 1
+
+
+def test_an_option_of_an_operation_acts_on_the_one_before_it(walk: Path):
+    out = walk.with_name("out.npz")
+    run(walk, "-o", out, "--concat", walk, "--blend", "0.5", "--concat", walk, "--blend=0", "--mirror")
+    ops = load_npz(out).manifest["edited_from"]["ops"]
+    assert [each.get("blend") for each in ops] == [0.5, 0.0, None]
+    said = run(walk, "-o", walk.with_name("x.npz"), "--blend", "0.2", "--concat", walk, code=2)
+    assert "--blend: stands before every operation that has it" in said
+
+
+def test_pieces_are_numbered_and_fit_where_they_were(walk: Path):
+    run(walk, "-o", walk.with_name("piece.bvh"), "--split", "f20", "--placement", "keep")
+    first, second = (read_bvh(walk.with_name(f"piece-{number}.bvh")) for number in (1, 2))
+    np.testing.assert_allclose(first.joints()[-1, 0], second.joints()[0, 0], atol=1e-4)
+
+
+def test_several_motions_go_into_a_folder(walk: Path):
+    other = walk.with_name("other.npz")
+    other.write_bytes(walk.read_bytes())
+    lines = run(walk, other, "-o", walk.with_name("edited"), "--format", "glb", "--mirror", "--json").splitlines()
+    rows = [json.loads(line) for line in lines if line.startswith("{")]
+    assert [Path(row["file"]).name for row in rows] == ["walk.glb", "other.glb"]
+    assert rows[0]["quality"]["support"] == ["feet"]
+    assert "right hand" in read_glb(walk.parent / "edited" / "walk.glb").manifest["prompt"]
+    assert "is one file for 2 motions" in run(walk, other, "-o", walk.with_name("one.npz"), "--mirror", code=2)
+
+
+def test_a_file_of_operations_is_the_same(walk: Path):
+    ops = walk.with_name("ops.json")
+    ops.write_text(json.dumps([{"op": "trim", "from": 0.5}, {"op": "in-place"}]))
+    run(walk, "-o", walk.with_name("a.npz"), "--ops", ops)
+    run(walk, "-o", walk.with_name("b.npz"), "--trim", "0.5:", "--in-place", "travel")
+    assert walk.with_name("a.npz").read_bytes() == walk.with_name("b.npz").read_bytes()
+    assert "cannot be combined" in run(walk, "-o", walk.with_name("c.npz"), "--ops", ops, "--mirror", code=2)
+    ops.write_text('{"op": "mirror"')
+    assert "ops.json" in run(walk, "-o", walk.with_name("c.npz"), "--ops", ops, code=2)
+
+
+def test_nothing_is_written_when_something_cannot_be_done(walk: Path):
+    out = walk.with_name("out.npz")
+    assert "no operation is given" in run(walk, "-o", out, code=2)
+    assert "after the end" in run(walk, "-o", out, "--trim", "1:9", code=2)
+    assert "'1' is not A:B" in run(walk, "-o", out, "--trim", "1", code=2)
+    assert "no such file" in run(walk, "-o", out, "--concat", walk.with_name("none.npz"), code=3)
+    assert "two motions would have this name" in run(walk, walk, "-o", walk.with_name("twice"), "--mirror", code=2)
+    out.write_text("mine")
+    assert "already exists" in run(walk, "-o", out, "--mirror", code=2)
+    assert out.read_text() == "mine"
+    assert sorted(path.name for path in walk.parent.iterdir()) == ["out.npz", "walk.npz"]
+
+
+def test_every_operation_of_the_table_has_its_option():
+    def command(**operations: object) -> None: ...
+
+    import inspect
+
+    given = inspect.signature(with_operations(command)).parameters
+    assert {f"{name.replace('-', '_')}_" for name in OPERATIONS} <= set(given)
+
+
+def test_the_quality_of_a_result_is_measured_anew():
+    clip = walker(seconds=4.0)
+    (mirrored,) = edit(clip, [{"op": "mirror"}])
+    assert judged(mirrored).manifest["quality"]["match"]["value"] is not None
+    (lifted,) = edit(clip, [{"op": "concat", "with": walker(prompt="a person bows")}])
+    record = judged(lifted).manifest["quality"]
+    assert record["match"]["value"] is None  # two prompts
+    assert judged(edit(walker(seconds=0.1), [{"op": "mirror"}])[0]).manifest.get("quality") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "swapped"),
+    [
+        ("turns left, then RIGHT", "turns right, then LEFT"),
+        ("Left-handed, upright, bright", "Right-handed, upright, bright"),
+        ("walk-turn-left", "walk-turn-right"),
+        ("leftwards and clockwise", "rightwards and counterclockwise"),
+    ],
+)
+def test_left_and_right_are_exchanged_in_words(text: str, swapped: str):
+    assert swap_sides(text) == swapped
+    assert swap_sides(swapped) == text
+    assert swap_sides_in({"left": [text, 1, None]}) == {"left": [swapped, 1, None]}

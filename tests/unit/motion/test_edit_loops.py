@@ -1,0 +1,149 @@
+"""Loops: cycles of a walk and of an idle, and motions that have none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidInput
+from marey.motion import MotionClip, edit
+from marey.motion.arrange import placement_of
+from marey.motion.feet import find_contacts, skate
+from marey.motion.pose import solve_pose
+from marey.motion.rotations import about, from_rotvec, multiply, rotate
+from marey.motion.skeleton import HUMANML3D
+from tests.support import bodies
+from tests.support.motions import drift
+
+LOOP = {"op": "loop"}
+
+
+@pytest.fixture(scope="module")
+def walk() -> MotionClip:
+    return walked()
+
+
+def walked(seconds: float = 6.0) -> MotionClip:
+    """A walk that sways a little, so that no two cycles are equal."""
+    body = bodies.Body(seconds, speed=lambda t: 1.1 + 0 * t)
+    pose = solve_pose(body.joints(), HUMANML3D, fps=bodies.FPS)
+    rotations, phase = pose.rotations.copy(), 2 * np.pi * 0.9 * np.arange(len(pose.root)) / bodies.FPS
+    for number, name in enumerate(("spine1", "spine2", "neck", "L_shoulder", "R_shoulder", "L_elbow", "R_elbow")):
+        joint = HUMANML3D.index(name)
+        swing = np.outer(np.sin(phase + (np.pi if name[0] == "L" else 0.0)), [0.4, 0.1, 0.1])
+        rotations[:, joint] = multiply(rotations[:, joint], from_rotvec(swing + drift(number, len(rotations), 3, 0.01)))
+    root = pose.root + np.outer(np.sin(2 * phase), [0.0, 0.01, 0.02])
+    contacts = find_contacts(pose.joints, pose.skeleton, bodies.FPS)
+    return MotionClip.of(pose.skeleton, rotations, root, contacts, bodies.FPS)
+
+
+def idle(seconds: float) -> MotionClip:
+    """A body that sways on standing feet."""
+    frames = round(20 * seconds)
+    rotations = np.zeros((frames, 22, 4))
+    rotations[..., 0] = 1.0
+    arms = from_rotvec(drift(3, frames, 3, 0.08))
+    for name in ("spine2", "L_shoulder", "R_shoulder"):
+        joint = HUMANML3D.index(name)
+        rotations[:, joint] = multiply(arms, rotations[:, joint])
+    root = np.tile([0.0, 0.94, 0.0], (frames, 1))
+    return MotionClip.of(HUMANML3D, rotations, root, np.ones((frames, 4), bool), 20.0)
+
+
+def thrice(loop: MotionClip) -> MotionClip:
+    (played,) = edit(loop, [{"op": "concat", "with": loop}] * 2)
+    return played
+
+
+def test_a_walk_is_played_on_without_a_seam(walk):
+    (loop,) = edit(walk, [LOOP])
+    first, last = loop.manifest["loop"]["source_frames"]
+    assert loop.frames == last - first + 1
+    played = thrice(loop)
+    step, change = (np.linalg.norm(np.diff(walk.joints, n, axis=0), axis=-1) for n in (1, 2))
+    mine, bend = (np.linalg.norm(np.diff(played.joints, n, axis=0), axis=-1) for n in (1, 2))
+    for seam in (loop.frames - 1, 2 * (loop.frames - 1)):
+        assert (mine[seam - 1 : seam + 1] <= np.percentile(step, 95, axis=0) + 1e-4).all()
+        assert (bend[seam - 1] <= np.percentile(change, 95, axis=0) + 1e-4).all()
+    contacts = find_contacts(played.joints, played.skeleton, 20.0)
+    assert (
+        skate(played.joints, contacts, played.skeleton, 20.0)
+        <= 1.1 * skate(walk.joints, walk.contacts, walk.skeleton, 20.0) + 3e-3
+    )
+
+
+def test_a_loop_is_its_source_outside_the_blend(walk):
+    (loop,) = edit(walk, [LOOP])
+    (first, last), blend = loop.manifest["loop"]["source_frames"], loop.manifest["loop"]["blend_frames"]
+    assert blend["first"] + blend["last"] == 6  # 0.3 s
+    turn, shift = placement_of(loop)
+    placed = rotate(turn, loop.joints.astype(np.float64)) + shift
+    source = walk.joints[first : last + 1]
+    own = slice(blend["first"], loop.frames - blend["last"])
+    np.testing.assert_allclose(placed[own], source[own], atol=2e-5)
+    assert np.abs(placed - source).max() > 1e-3
+
+
+def test_the_last_frame_is_the_first_after_the_travel(walk):
+    (closed,) = edit(walk, [LOOP])
+    (open_,) = edit(walk, [{"op": "loop", "end": "open"}])
+    assert open_.frames == closed.frames - 1
+    np.testing.assert_allclose(open_.joints, closed.joints[:-1], atol=1e-5)
+    cycle = closed.manifest["loop"]["cycle"]
+    way = closed.root[-1] - closed.root[0]
+    assert (way[0], way[2]) == pytest.approx((cycle["x"], cycle["z"]), abs=1e-5)
+    assert cycle["z"] / cycle["seconds"] == pytest.approx(1.1, abs=0.1)
+    moved = rotate(about("Y", cycle["heading"]), closed.joints[0] - closed.root[0]) + closed.root[-1]
+    np.testing.assert_allclose(moved, closed.joints[-1], atol=1e-4)
+    assert (closed.contacts[0] == closed.contacts[-1]).all()
+
+
+def test_a_walk_keeps_whole_gait_cycles(walk):
+    (loop,) = edit(walk, [LOOP])
+    seconds = loop.manifest["loop"]["cycle"]["seconds"]
+    cycles = seconds * 1.8 / 2  # 1.8 steps a second
+    assert cycles > 0.9
+    assert abs(cycles - round(cycles)) < 0.08
+
+
+def test_an_idle_loop_has_two_seconds_or_more():
+    (loop,) = edit(idle(8.0), [LOOP])
+    assert loop.manifest["loop"]["cycle"]["seconds"] >= 2.0
+    with pytest.raises(InvalidInput, match="a loop without steps has 2 s or more"):
+        edit(idle(1.9), [LOOP])
+
+
+def test_a_motion_without_a_cycle_is_refused_with_the_bar_that_it_misses():
+    frames = 60
+    rotations = np.zeros((frames, 22, 4))
+    rotations[..., 0] = 1.0
+    rotations[:, HUMANML3D.index("L_shoulder")] = from_rotvec(
+        np.outer(np.linspace(0, 1.0, frames) ** 3, [0.0, 0.0, 2.5])
+    )
+    root = np.tile([0.0, 0.94, 0.0], (frames, 1))
+    rising = MotionClip.of(HUMANML3D, rotations, root, np.ones((frames, 4), bool), 20.0)
+    with pytest.raises(InvalidInput, match=r"no cycle without a visible seam: .* mm at the seam"):
+        edit(rising, [LOOP])
+
+
+def test_a_loop_follows_its_record_through_other_operations(walk):
+    (loop,) = edit(walk, [LOOP])
+    x = loop.manifest["loop"]["cycle"]["x"]
+    (mirrored,) = edit(loop, [{"op": "mirror"}])
+    assert mirrored.manifest["loop"]["cycle"]["x"] == pytest.approx(-x)
+    (fast,) = edit(loop, [{"op": "speed", "factor": 1.3}])
+    cycle = fast.manifest["loop"]["cycle"]
+    assert (fast.frames - 1) / 20 == pytest.approx(cycle["seconds"])
+    np.testing.assert_allclose(fast.root[-1], loop.root[-1], atol=1e-4)  # the last frame is still the first, moved
+    assert "loop" not in edit(loop, [{"op": "trim", "to": 0.5}])[0].manifest
+    (open_,) = edit(walk, [{"op": "loop", "end": "open"}])
+    with pytest.raises(InvalidInput, match="open loop"):
+        edit(open_, [{"op": "fps", "rate": 30}])
+
+
+def test_a_loop_in_place_stays_there(walk):
+    (loop,) = edit(walk, [LOOP, {"op": "in-place"}])
+    assert np.ptp(loop.root[:, [0, 2]], axis=0).max() < 1e-6
+    assert loop.manifest["travel"]["z"] > 0.5
+    steps = np.linalg.norm(np.diff(np.concatenate([loop.joints, loop.joints[1:3]]), axis=0), axis=-1)
+    assert steps[loop.frames - 1].max() <= steps[: loop.frames - 1].max() + 2e-3

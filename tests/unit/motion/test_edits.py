@@ -1,0 +1,303 @@
+"""Operations on motions: identities, place, provenance."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from marey.core.errors import InvalidInput
+from marey.motion import MotionClip, edit, load_npz
+from marey.motion.arrange import placement_of
+from marey.motion.edits.editing import Source
+from marey.motion.edits.table import OPERATIONS
+from marey.motion.features import HUMANML3D_263
+from marey.motion.feet import skate
+from marey.motion.finish import finish_motion
+from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.pose import solve_pose
+from marey.motion.rotations import about, multiply, rotate
+from marey.motion.skeleton import HUMANML3D, Skeleton
+from tests.support import bodies
+from tests.support.motions import dancer
+from tests.support.walker import walker
+
+MILLIMETRE = 1e-3
+EXACT = 1e-5
+"""Metres: float32 over some metres of travel."""
+clips = st.builds(
+    lambda seed, frames, turn: dance(seed, frames, turn), st.integers(0, 99), st.integers(8, 60), st.floats(-3, 3)
+)
+
+
+def dance(seed: int, frames: int = 60, turn: float = 0.0) -> MotionClip:
+    """A dancer who begins anywhere and faces anywhere."""
+    rotations, root = dancer(seed, frames)
+    rotations[:, 0] = multiply(about("Y", turn), rotations[:, 0])
+    joints = forward_kinematics(HUMANML3D, rotations, root)
+    contacts = joints[:, list(HUMANML3D.feet), 1] < 0.1
+    manifest = {"prompt": "a person waves with the left hand", "licence": "CC-BY-4.0"}
+    return MotionClip.of(HUMANML3D, rotations, root, contacts, 20.0, manifest=manifest)
+
+
+def one(clip: MotionClip, *ops: dict) -> MotionClip:
+    (result,) = edit(clip, ops)
+    return result
+
+
+def placed(clip: MotionClip) -> np.ndarray:
+    """Joints where the manifest says that the motion was taken from."""
+    turn, shift = placement_of(clip)
+    return rotate(turn, clip.joints.astype(np.float64)) + shift
+
+
+def same(a: MotionClip, b: MotionClip, limit: float = EXACT) -> None:
+    assert a.frames == b.frames
+    np.testing.assert_allclose(placed(a), placed(b), atol=limit)
+
+
+def faces_z_at_the_origin(clip: MotionClip) -> bool:
+    x, _, z = facing(clip.joints[0].astype(np.float64), clip.skeleton)
+    return abs(np.arctan2(x, z)) < 0.036 and np.hypot(*clip.root[0, [0, 2]]) < 6e-3
+
+
+@settings(max_examples=25, deadline=None)
+@given(clip=clips, data=st.data())
+def test_pieces_joined_again_are_the_motion(clip, data):
+    at = data.draw(st.integers(0, clip.frames - 1))
+    first, second = edit(clip, [{"op": "split", "at": f"f{at}"}])
+    assert (first.frames, second.frames) == (at + 1, clip.frames - at)
+    assert faces_z_at_the_origin(first)
+    assert faces_z_at_the_origin(second)
+    same(second, replace(clip, joints=clip.joints[at:], root=clip.root[at:]))
+    whole = one(first, {"op": "concat", "with": second})
+    same(whole, clip)
+    np.testing.assert_array_equal(whole.contacts, clip.contacts)
+
+
+@settings(max_examples=25, deadline=None)
+@given(clip=clips)
+def test_twice_is_the_motion_again(clip):
+    for name in ("mirror", "reverse"):
+        twice = one(one(clip, {"op": name}), {"op": name})
+        same(twice, clip)
+        np.testing.assert_array_equal(twice.contacts, clip.contacts)
+        assert twice.manifest["prompt"] == clip.manifest["prompt"]
+        assert faces_z_at_the_origin(one(clip, {"op": name}))
+
+
+def test_twice_is_the_motion_again_to_the_last_place():
+    """Without any placement: a motion that stands at its own place is there again."""
+    clip = walker(seconds=3.0, turn=0.4)
+    for name in ("mirror", "reverse"):
+        twice = one(one(clip, {"op": name}), {"op": name})
+        assert "placement" not in twice.manifest
+        np.testing.assert_allclose(twice.joints, clip.joints, atol=EXACT)
+
+
+@settings(max_examples=25, deadline=None)
+@given(clip=clips, factor=st.sampled_from([2.0, 4.0, 0.5]))
+def test_faster_and_slower_again_is_the_motion(clip, factor):
+    back = one(clip, {"op": "speed", "factor": factor}, {"op": "speed", "factor": 1 / factor})
+    same(back, clip, 5 * MILLIMETRE)
+    slower = one(one(clip, {"op": "speed", "factor": 0.5}), {"op": "speed", "factor": 2})
+    same(slower, clip, 5 * MILLIMETRE)
+
+
+def test_twice_as_fast_in_two_edits_is_within_5_mm_for_a_calm_motion():
+    clip = dance(3, 81)
+    slow = one(clip, {"op": "speed", "factor": 0.25})
+    fast = one(slow, {"op": "speed", "factor": 2})
+    same(one(fast, {"op": "speed", "factor": 0.5}), slow, 5 * MILLIMETRE)
+
+
+def test_a_mirrored_motion_is_the_other_side():
+    clip = dance(1, 30)
+    clip = replace(clip, manifest={**clip.manifest, "scope": {"actions": [{"text": "Left-handed wave"}]}})
+    mirrored = one(clip, {"op": "mirror"})
+    swapped = clip.joints[:, list(HUMANML3D.mirror)] * np.array([-1, 1, 1])
+    np.testing.assert_allclose(placed(mirrored), swapped, atol=EXACT)
+    np.testing.assert_array_equal(mirrored.contacts, clip.contacts[:, [2, 3, 0, 1]])
+    assert mirrored.manifest["prompt"] == "a person waves with the right hand"
+    assert mirrored.manifest["scope"]["actions"][0]["text"] == "Right-handed wave"
+
+
+def test_a_mirrored_body_has_mirrored_bones():
+    offsets = HUMANML3D.offsets.copy()
+    offsets[HUMANML3D.index("L_knee"), 1] -= 0.05
+    rotations, root = dancer(2, 20)
+    clip = MotionClip.of(HUMANML3D.with_offsets(offsets), rotations, root, np.zeros((20, 4), bool), 20.0)
+    mirrored = one(clip, {"op": "mirror"})
+    np.testing.assert_allclose(
+        placed(mirrored), clip.joints[:, list(HUMANML3D.mirror)] * np.array([-1, 1, 1]), atol=EXACT
+    )
+
+
+def test_trim_keeps_both_ends_and_the_place():
+    clip = walker(seconds=3.0, turn=0.5)
+    kept = one(clip, {"op": "trim", "from": 0.5, "to": "f30"})
+    assert kept.frames == 21
+    assert faces_z_at_the_origin(kept)
+    assert kept.manifest["placement"]["z"] > 0.4
+    np.testing.assert_allclose(placed(kept), clip.joints[10:31], atol=EXACT)
+    again = one(kept, {"op": "trim", "from": 0.2})  # placements add up
+    np.testing.assert_allclose(placed(again), clip.joints[14:31], atol=EXACT)
+
+
+def test_motions_join_where_the_last_pose_stands_and_nothing_jumps():
+    first, second = dance(4, 40, turn=1.0), dance(5, 50, turn=-2.0)
+    whole = one(first, {"op": "concat", "with": second, "blend": 0.25})
+    assert whole.frames == 40 + 50 - 1
+    same(one(whole, {"op": "trim", "to": "f39"}), one(first, {"op": "trim"}))
+    steps = np.linalg.norm(np.diff(whole.joints, axis=0), axis=-1)
+    usual = max(np.linalg.norm(np.diff(c.joints, axis=0), axis=-1).max() for c in (first, second))
+    blunt = one(first, {"op": "concat", "with": second, "blend": 0})
+    assert np.linalg.norm(np.diff(blunt.joints, axis=0), axis=-1)[39].max() > 3 * usual
+    assert steps[38:46].max() < 3 * usual
+    change = np.linalg.norm(np.diff(whole.joints, 2, axis=0), axis=-1)[38].max()
+    assert change < 0.5 * np.linalg.norm(np.diff(blunt.joints, 2, axis=0), axis=-1)[38].max()
+    tail = one(whole, {"op": "trim", "from": "f44"})  # after 5 frames of blending: the second motion
+    np.testing.assert_allclose(one(second, {"op": "trim", "from": "f5"}).joints, tail.joints, atol=EXACT)
+
+
+def test_joined_motions_keep_both_prompts_and_the_strictest_licence():
+    first, second = dance(1, 30), dance(2, 30)
+    second = replace(second, manifest={"prompt": "a person bows", "licence": "CC-BY-NC-4.0", "rewritten": "bows"})
+    whole = one(first, {"op": "concat", "with": Source(second, "bow.npz", "ab" * 32)})
+    about = whole.manifest
+    assert about["prompt"] == "a person waves with the left hand, then a person bows"
+    assert about["prompts"] == [[0, "a person waves with the left hand"], [29, "a person bows"]]
+    assert about["licence"] == "CC-BY-NC-4.0"
+    assert [each["licence"] for each in about["edited_from"]["sources"]] == ["CC-BY-4.0", "CC-BY-NC-4.0"]
+    assert about["edited_from"]["sources"][1]["sha256"] == about["edited_from"]["ops"][0]["with"] == "ab" * 32
+    shared = replace(second, manifest={"licence": "CC-BY-SA-4.0"})
+    with pytest.raises(InvalidInput, match="no licence satisfies both"):
+        edit(whole, [{"op": "concat", "with": shared}])
+
+
+def test_other_bodies_are_not_joined():
+    other = dance(2, 20)
+    taller = other.skeleton.with_offsets(1.1 * other.skeleton.offsets)
+    with pytest.raises(InvalidInput, match="bodies differ"):
+        edit(dance(1, 20), [{"op": "concat", "with": replace(other, skeleton=taller)}])
+
+
+def test_in_place_records_what_it_removes():
+    clip = walker(seconds=2.0, turn=0.6)
+    still = one(clip, {"op": "in-place", "remove": "heading"})
+    assert np.ptp(still.root[:, [0, 2]], axis=0).max() == 0
+    assert still.manifest["travel"]["heading"] == pytest.approx(1.2, abs=1e-3)
+    forward = facing(still.joints[-1].astype(np.float64), still.skeleton)
+    assert forward[2] == pytest.approx(1.0, abs=1e-3)
+    turning = one(clip, {"op": "in-place"})
+    assert facing(turning.joints[-1].astype(np.float64), turning.skeleton)[2] < 0.5
+
+
+def test_smoothing_removes_trembling_and_keeps_the_ends():
+    clip = one(dance(6, 60), {"op": "speed", "factor": 0.25})
+    clip = replace(clip, manifest={})
+    noise = np.random.default_rng(0).normal(scale=0.003, size=clip.root.shape)
+    shaky = MotionClip.of(clip.skeleton, clip.rotations, clip.root + noise, clip.contacts, clip.fps)
+    smooth = one(shaky, {"op": "smooth", "hz": 3})
+    calm, rough = (np.abs(np.diff(each.joints, 2, axis=0)).mean() for each in (smooth, shaky))
+    assert calm < 0.4 * rough
+    assert np.abs(placed(smooth)[[0, -1]] - shaky.joints[[0, -1]]).max() < 10 * MILLIMETRE
+    assert np.abs(placed(smooth) - clip.joints).mean() < 5 * MILLIMETRE
+
+
+def stepping(seconds: float = 4.0) -> MotionClip:
+    """A walk whose standing feet slide to the side."""
+    joints = bodies.Body(seconds, speed=lambda t: 1.1 + 0 * t).joints()
+    joints[..., 0] += 0.05 * np.sin(3 * np.arange(len(joints)) / 20.0)[:, None]
+    pose = solve_pose(joints, HUMANML3D, fps=20.0)
+    return MotionClip.of(pose.skeleton, pose.rotations, pose.root, np.zeros((len(joints), 4), bool), 20.0)
+
+
+def test_standing_feet_are_locked():
+    clip = stepping()
+    locked = one(clip, {"op": "feet", "mode": "lock"})
+    slides = [skate(each.joints, locked.contacts, each.skeleton, 20.0) for each in (clip, locked)]
+    assert slides[1] < 0.2 * slides[0]
+    np.testing.assert_allclose(placed(locked)[:, 12:], clip.joints[:, 12:], atol=20 * MILLIMETRE)  # arms and head
+
+
+def test_contacts_are_found_again_and_nothing_moves():
+    clip = stepping()
+    free = one(clip, {"op": "feet", "mode": "free"})
+    assert free.contacts.any()
+    np.testing.assert_allclose(placed(free), clip.joints, atol=EXACT)
+
+
+def test_raw_feet_are_those_of_the_model():
+    features = HUMANML3D_263.encode(stepping().joints.astype(np.float64))
+    clean = finish_motion(features, HUMANML3D_263)
+    raw = one(clean, {"op": "feet", "mode": "raw"})
+    wanted = finish_motion(features, HUMANML3D_263, clean=False)
+    same(raw, wanted, 2 * MILLIMETRE)
+    assert np.abs(clean.joints - wanted.joints).max() > 5 * MILLIMETRE
+    assert raw.manifest["feet_cleaned"] is False
+    with pytest.raises(InvalidInput, match="no features"):
+        edit(clean, [{"op": "mirror"}, {"op": "feet", "mode": "raw"}])
+
+
+def test_results_have_no_features_and_name_their_source(tmp_path):
+    clip = replace(walker(), features=np.ones((4, 263), np.float32), features_fps=20.0)
+    clip = replace(clip, manifest={**clip.manifest, "quality": {"ok": True}, "selection": {"chosen": 1}})
+    clip.save_npz(tmp_path / "a.npz")
+    kept = one(load_npz(tmp_path / "a.npz"), {"op": "trim", "to": 1.0}, {"op": "fps", "rate": 30})
+    assert kept.features.shape == (0, 0)
+    assert kept.features_fps == 0
+    assert kept.fps == 30
+    assert kept.frames == 31
+    assert not {"quality", "selection"} & kept.manifest.keys()
+    record = kept.manifest["edited_from"]
+    assert record["ops"] == [{"op": "trim", "from": 0.0, "to": 1.0}, {"op": "fps", "rate": 30.0}]
+    assert record["sources"][0]["sha256"] == hashlib.sha256((tmp_path / "a.npz").read_bytes()).hexdigest()
+    twice = one(kept, {"op": "mirror"})
+    assert twice.manifest["edited_from"]["sources"][0]["edited_from"] == record
+    kept.save_npz(tmp_path / "b.npz")
+    same(load_npz(tmp_path / "b.npz"), kept)
+
+
+def test_unknown_sides_are_not_mirrored():
+    tree = Skeleton("other", ("a", "b", "c"), (-1, 0, 1), np.ones((3, 3), np.float32), (0, 1, 2))
+    rotations = np.tile([1.0, 0, 0, 0], (5, 3, 1))
+    clip = MotionClip.of(tree, rotations, np.zeros((5, 3)), np.zeros((5, 4), bool), 20.0)
+    with pytest.raises(InvalidInput, match=r"ops\[0\] \(mirror\).*do not tell left from right"):
+        edit(clip, [{"op": "mirror"}])
+    assert one(clip, {"op": "reverse"}).frames == 5
+
+
+@pytest.mark.parametrize(
+    ("ops", "said"),
+    [
+        ("mirror", "is not a list"),
+        ([], "0 operations"),
+        (["mirror"], "is not an object"),
+        ([{"op": "fly"}], "unknown operation"),
+        ([{"op": "mirror", "axis": "x"}], "unknown parameter 'axis'"),
+        ([{"op": "speed"}], r"ops\[0\]\.factor: is missing"),
+        ([{"op": "speed", "factor": True}], "True is not a number from 0.1 to 10"),
+        ([{"op": "speed", "factor": float("nan")}], "is not a number"),
+        ([{"op": "trim", "from": "1.5"}], "is not seconds"),
+        ([{"op": "trim", "from": 99}], "99 s is after the end of the motion"),
+        ([{"op": "trim", "from": "f5", "to": "f4"}], "before the beginning"),
+        ([{"op": "loop", "blend": 0.5}], "0.5 is not a number from 0.1 to 0.3"),
+        ([{"op": "feet", "mode": "soft"}], "'soft' is not lock or free or raw"),
+        ([{"op": "concat", "with": ["a"]}], "is not the name of a motion"),
+        ([{"op": "mirror"}] * 33, "33 operations"),
+    ],
+)
+def test_what_cannot_be_done_is_said(ops, said):
+    with pytest.raises(InvalidInput, match=said):
+        edit(walker(), ops)
+
+
+def test_every_operation_can_be_computed():
+    for operation in OPERATIONS.values():
+        if not operation.pieces:
+            assert callable(operation.function()), operation.name

@@ -1,0 +1,52 @@
+"""Quality record of an edited motion, made anew: of the frames that it has, by the prompt in its manifest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+from marey.core.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.quality.clips import quality_of
+from marey.quality.limits import expected_by_prompts
+from marey.quality.record import KEY, PromptMatch
+from marey.selector.records import match_of
+from marey.text.actions import split_actions
+from marey.text.graph import SemanticGraph
+
+
+def judged(clip: MotionClip) -> MotionClip:
+    """Return the clip with a quality record in its manifest; without one on skeletons that are not measured."""
+    about = clip.manifest
+    quality = quality_of(clip, expected_by_prompts(prompts_of(about)))
+    if quality is None:
+        return clip
+    record = quality.with_match(_match(clip)).model_dump(mode="json")
+    return replace(clip, manifest={**about, KEY: record})
+
+
+def prompts_of(manifest: Mapping[str, Any]) -> Sequence[str]:
+    """Return the prompts in a manifest: several of a recorded stream or of joined motions, none of a captured one."""
+    several = manifest.get("prompts")
+    if several:
+        return [str(prompt) for _, prompt in several]
+    return [str(manifest["prompt"])] if manifest.get("prompt") else []
+
+
+def _match(clip: MotionClip) -> PromptMatch:
+    """Match a clip with its prompt; a motion with several prompts has no match, as a recorded stream has none."""
+    about = clip.manifest
+    if about.get("prompts") or not about.get("prompt"):
+        return PromptMatch()
+    scope = cast("Mapping[str, Any] | None", about.get("scope"))
+    return match_of(clip, _actions(about), scope)
+
+
+def _actions(manifest: Mapping[str, Any]) -> Sequence[str]:
+    """Return the actions of the prompt in order of time; the whole prompt where its graph is missing or broken."""
+    text = str(manifest.get("rewritten") or manifest["prompt"])
+    try:
+        return split_actions(SemanticGraph.from_json(manifest["graph"]))
+    except (KeyError, TypeError, ValueError, InvalidInput):
+        return (text,)
