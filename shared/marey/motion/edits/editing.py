@@ -12,7 +12,7 @@ from typing import Any
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip, load_npz
 from marey.motion.edits.licences import strictest
-from marey.motion.edits.place import settled
+from marey.motion.edits.place import at_origin
 from marey.motion.edits.steps import Step, pieces_of, read_steps
 
 EDITED_FROM = "edited_from"
@@ -94,7 +94,7 @@ def _loaded(named: Any, load: Load) -> Source:
 def _apply(source: Source, steps: Sequence[Step], other: Callable[[Step], Source]) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
-    clip = settled(replace(source.clip, manifest=manifest))
+    clip = at_origin(replace(source.clip, manifest=manifest))
     sources, done = [source], list[dict[str, Any]]()
     for step in steps:
         values, record = dict(step.values), step.as_json()
@@ -115,7 +115,7 @@ def _run(step: Step, clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     if not step.operation.keeps_cycle:
         clip = replace(clip, manifest={name: value for name, value in clip.manifest.items() if name != CYCLE})
     try:
-        result = settled(step.operation.function()(clip, values))
+        result = at_origin(step.operation.function()(clip, values))
     except InvalidInput as error:
         where = f"{step.where} ({step.operation.name})"
         raise type(error)(error.message, where=where, hint=error.hint) from None

@@ -77,7 +77,8 @@ class Bars:
         earlier = min(range(len(jumps)), key=lambda number: jumps[number].excess)
         if jumps[earlier].excess > 1.0:
             return jumps[earlier]
-        return self._foot_fault(play) or loop.begun(earlier)
+        begun = loop.begun(earlier)
+        return self._foot_fault(played(self._clip, begun)) or begun
 
     def _jump(self, play: Played, earlier: int) -> Fault:
         """Return the joint whose step, or change of step, at a seam is the largest beside what is usual in the source.

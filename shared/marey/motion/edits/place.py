@@ -55,7 +55,7 @@ def posed(clip: MotionClip, rotations: Array, root: Array, **changes: Any) -> Mo
     return MotionClip.of(plain.skeleton, rotations, root, plain.contacts, plain.fps, manifest=plain.manifest)
 
 
-def settled(clip: MotionClip) -> MotionClip:
+def at_origin(clip: MotionClip) -> MotionClip:
     """Return the clip facing +Z at the origin in frame 0; its manifest says where it was.
 
     A clip whose own place is there, nearly, is put back to it exactly: reversed twice, a motion is the same again.
