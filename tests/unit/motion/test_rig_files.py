@@ -13,6 +13,7 @@ import pytest
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
 from marey.exporters import Coordinates, exporters
 from marey.motion.export_options import ExportOptions
+from marey.motion.io.convert import as_motion_clip
 from marey.motion.io.glb_read import parse_glb
 from marey.motion.io.rig_bvh import parse_bvh_rig
 from marey.motion.io.rig_gltf import parse_glb_rig, parse_gltf_rig
@@ -63,6 +64,17 @@ def test_a_bvh_on_a_rig_has_the_joints_of_the_glb(name):
     rig = reference_rig(name)
     order = [rig.index(joint) for joint in read.skeleton.joint_names]
     assert np.linalg.norm(read.joints() - places[:, order], axis=-1).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["ue4", "humanik"])
+def test_a_bvh_whose_hips_travel_under_a_still_root_reads_back(name):
+    data = exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(rig=name), "cm", "y"))
+    clip = as_motion_clip(exporters()["bvh"].decode(data, "x.bvh", Coordinates()))
+    motion = on_body(WALK, load_body(name))
+    places = motion.world()[1]
+    order = [motion.rig.index(joint) for joint in clip.skeleton.joint_names]
+    assert motion.rig.joint_names[motion.hips] == clip.skeleton.joint_names[0]
+    assert np.linalg.norm(clip.joints - places[:, order], axis=-1).max() < 1e-3
 
 
 def test_scaled_nodes_keep_their_own_units():

@@ -9,7 +9,7 @@ import numpy as np
 from marey.motion.clip import MotionClip
 from marey.motion.feet import find_contacts
 from marey.motion.io.bvh import BvhClip
-from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.kinematics import facing, forward_kinematics, global_rotations
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rigs.landmarks import feet_and_facing
 from marey.motion.rotations import Array, about, multiply, rotate
@@ -32,6 +32,7 @@ def steady(clip: BvhClip) -> BvhClip:
     """Return the motion with bones of constant length.
 
     A root that only carries another joint (Bandai-Namco's `joint_Root` over the travelling `Hips`) is merged into it.
+    Where a root stands still over hips that travel, as in Unreal's rigs, the body from the hips down is kept.
     Joints that move relative to their parents get their mean offset, and a note gives the largest error.
     """
     positions = clip.positions
@@ -39,6 +40,7 @@ def steady(clip: BvhClip) -> BvhClip:
         return clip
     while len(clip.skeleton.children[0]) == 1 and len(clip.skeleton) > 2 and np.ptp(positions[:, 1], axis=0).any():
         clip, positions = _without_root(clip, positions)
+    clip, positions = _from_travelling(clip, positions)
     skeleton = clip.skeleton.with_offsets(np.concatenate([np.zeros((1, 3)), positions.mean(axis=0)[1:]]))
     fixed = replace(clip, skeleton=skeleton, positions=None)
     off = float(np.linalg.norm(fixed.joints() - clip.joints(), axis=-1).max())
@@ -60,6 +62,37 @@ def _without_root(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
     ends = clip.ends[1:]
     merged = replace(clip, skeleton=skeleton, rotations=rotations, root=root, positions=positions, ends=ends, rest=None)
     return merged, positions
+
+
+def _from_travelling(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
+    """Make the joint that travels the root, if the root stands still and most joints hang on that one."""
+    tree, count = clip.skeleton, len(clip.skeleton)
+    moves = np.ptp(positions, axis=0).max(axis=-1) > 1e-3
+    if moves[0] or not moves.any():
+        return clip, positions
+    for hips in np.flatnonzero(moves).tolist():
+        kept = [hips]
+        for joint in range(hips + 1, count):
+            if tree.parents[joint] in kept:
+                kept.append(joint)
+        if 2 * len(kept) > count:
+            break
+    else:
+        return clip, positions
+    world, joints = global_rotations(tree, clip.rotations), clip.joints()
+    rotations, positions = clip.rotations[:, kept].copy(), positions[:, kept].copy()
+    rotations[:, 0], positions[:, 0] = world[:, hips], joints[:, hips]
+    skeleton = skeleton_of(
+        tuple(tree.joint_names[joint] for joint in kept),
+        (-1, *(kept.index(tree.parents[joint]) for joint in kept[1:])),
+        tree.offsets[kept],
+    )
+    notes = (*clip.notes, f"{count - len(kept)} joints beside the body are left out")
+    moved = replace(
+        clip, skeleton=skeleton, rotations=rotations, root=joints[:, hips], positions=positions,
+        ends=clip.ends[kept], rest=None, notes=notes,
+    )  # fmt: skip
+    return moved, positions
 
 
 def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:

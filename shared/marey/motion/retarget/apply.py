@@ -11,7 +11,8 @@ from marey.motion.arrange import moved
 from marey.motion.clip import MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.retarget.load import load_body
-from marey.motion.retarget.retarget import local_poses, retarget
+from marey.motion.retarget.posed import local_poses
+from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import source_of
 from marey.motion.rigs.body import Body
 from marey.motion.rigs.rigged import RiggedMotion

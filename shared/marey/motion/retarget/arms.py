@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from marey.motion.legs import two_bone_knee
 from marey.motion.retarget.legs import Stance
+from marey.motion.retarget.posed import Posed
 from marey.motion.retarget.source import Source
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rotations import Array, between, length, multiply, normalize
-
-if TYPE_CHECKING:
-    from marey.motion.retarget.retarget import Posed
 
 
 def reach_hands(source: Source, stance: Stance, posed: Posed, hips: Array) -> None:

@@ -12,7 +12,7 @@ from marey.motion.rigs.rigged import RiggedMotion
 
 
 def write_rigged(path: Path | str, motion: RiggedMotion) -> None:
-    """Write a motion on a rig atomically; its ending tells the format: .glb (metres) or .bvh (centimetres, Y up).
+    """Write a motion on a rig atomically; the name's ending tells the format: .glb, or .bvh in centimetres and Y up.
 
     Raises:
         InvalidInput: another ending, numbers that are not finite, or a folder that cannot be written to.
