@@ -9,7 +9,7 @@ import numpy as np
 
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import forward_kinematics, global_rotations
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import about, conjugate, from_rotvec, multiply, rotate, to_matrix
 from marey.motion.skeleton import HUMANML3D
@@ -62,7 +62,7 @@ class Change:
             world[joint] = turned[joint] if parent < 0 else multiply(world[parent], turned[joint])
             if parent >= 0:
                 posed[joint] = posed[parent] + rotate(world[parent], places[joint] - places[parent])
-        nodes: list[Node] = []
+        nodes: list[RigNode] = []
         for joint, name in enumerate(names):
             axes = from_rotvec(draw.normal(size=3) * 2) if self.roll else np.array([1.0, 0, 0, 0])
             turn, place = multiply(world[joint], axes), posed[joint]
@@ -70,11 +70,11 @@ class Change:
                 turn, place = multiply(conjugate(Z_TO_Y), turn), rotate(conjugate(Z_TO_Y), place)
             matrix = np.eye(4)
             matrix[:3, :3], matrix[:3, 3] = to_matrix(turn), place / self.unit
-            nodes.append(Node(name, parents[joint], matrix))
+            nodes.append(RigNode(name, parents[joint], matrix))
         if self.shuffled:
             order = draw.permutation(len(nodes)).tolist()
             place_of = {old: new for new, old in enumerate(order)}
-            nodes = [Node(n.name, place_of.get(n.parent, -1), n.matrix) for n in (nodes[old] for old in order)]
+            nodes = [RigNode(n.name, place_of.get(n.parent, -1), n.matrix) for n in (nodes[old] for old in order)]
         sha256 = hashlib.sha256(str(self).encode()).hexdigest()
         return make_rig(nodes, name="copy", where="copy", unit=self.unit, up=self.up, source="json", sha256=sha256)
 

@@ -1,4 +1,4 @@
-"""What two processes do in `tests/models/hgm3/test_two_processes.py`, each started by torchrun.
+"""Work of the two processes in `tests/models/hgm3/test_two_processes.py`, each started by torchrun.
 
 torchrun --nproc-per-node=2 -m tests.support.two_processes FOLDER
 """

@@ -1,4 +1,4 @@
-"""What a language model is asked for, by the texts a generator was trained on, and how its answer is read.
+"""Questions to a language model, by the wording of the texts that a generator was trained on.
 
 `caption`: one sentence in the style of the starter bundles' captions (MOGO's TCA, Sec. 2.3). `description`: about 60
 words on how the body moves, and the length of the motion (Guo et al. 2025, "SnapMoGen", App. C, Tab. 6).
@@ -55,7 +55,7 @@ Seconds: the length as a number"""
 
 @dataclass(frozen=True)
 class Question:
-    """What the language model is asked, and how its answer is read.
+    """A question to the language model, and how its answer is read.
 
     Attributes:
         instruction: the system message.

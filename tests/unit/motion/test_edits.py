@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from marey.core.errors import InvalidInput
 from marey.motion import MotionClip, edit, load_npz
 from marey.motion.arrange import placement_of
-from marey.motion.edits.editing import Source
+from marey.motion.edits.editing import EditSource
 from marey.motion.edits.table import OPERATIONS
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
@@ -167,7 +167,7 @@ def test_motions_join_where_the_last_pose_stands_and_nothing_jumps():
 def test_joined_motions_keep_both_prompts_and_the_strictest_licence():
     first, second = dance(1, 30), dance(2, 30)
     second = replace(second, manifest={"prompt": "a person bows", "licence": "CC-BY-NC-4.0", "rewritten": "bows"})
-    whole = one(first, {"op": "concat", "with": Source(second, "bow.npz", "ab" * 32)})
+    whole = one(first, {"op": "concat", "with": EditSource(second, "bow.npz", "ab" * 32)})
     about = whole.manifest
     assert about["prompt"] == "a person waves with the left hand, then a person bows"
     assert about["prompts"] == [[0, "a person waves with the left hand"], [29, "a person bows"]]

@@ -12,7 +12,7 @@ from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import source_of
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import angle_between
 from marey.motion.skeleton import HUMANML3D
@@ -26,7 +26,7 @@ LIVELY = lively(walker(seconds=2, turn=0.3), 5)
 def worst(change: Change) -> float:
     """Return the largest distance in metres of a joint of the retargeted copy from the source's."""
     clip, rig = change.motion(LIVELY), change.rig()
-    places = retarget(source_of(clip), Body.of(rig)).world()[1]
+    places = retarget(source_of(clip), RigBody.of(rig)).world()[1]
     names = [name for name in HUMANML3D.joint_names if name in rig.joint_names]
     own, theirs = ([tree.index(name) for name in names] for tree in (rig, HUMANML3D))
     return float(np.linalg.norm(places[:, own] - clip.joints[:, theirs], axis=-1).max())
@@ -71,7 +71,7 @@ def test_bones_of_a_reference_skeleton_keep_their_length_and_left_stays_left(nam
 
 def test_from_one_rig_to_another_and_back_nothing_is_lost():
     source = source_of(WALK)
-    there = on_body(WALK, Body.of(Change(3, "a", 5, 0.01, "z").rig()))
+    there = on_body(WALK, RigBody.of(Change(3, "a", 5, 0.01, "z").rig()))
     back = retarget(as_source(there), source.body).world()[1]
     assert np.linalg.norm(back - WALK.joints, axis=-1).max() <= 5e-3
 
@@ -88,7 +88,7 @@ def as_source(motion: RiggedMotion):
     from marey.motion.retarget.source import Source
     from marey.motion.rotations import conjugate, multiply
 
-    body = Body.of(motion.rig)
+    body = RigBody.of(motion.rig)
     world, places = motion.world()
     turned = multiply(world, conjugate(multiply(body.upright, motion.rig.orientations)))
     return Source(body, turned, places, motion.contacts, motion.fps)

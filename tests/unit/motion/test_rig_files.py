@@ -22,7 +22,7 @@ from marey.motion.io.rigged_glb import format_rigged_glb
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints
 from marey.motion.rigs.rename import renamed
 from marey.motion.rotations import angle_between
@@ -36,7 +36,7 @@ WALK = walker(seconds=2)
 @pytest.mark.parametrize("name", REFERENCES)
 def test_a_rig_read_from_its_own_glb_is_the_rig(name):
     rig = reference_rig(name)
-    motion = on_body(WALK, Body.of(rig))
+    motion = on_body(WALK, RigBody.of(rig))
     read = parse_glb_rig(format_rigged_glb(motion), "x.glb")
     assert read.joint_names == rig.joint_names
     assert np.abs(read.positions - rig.positions).max() < 1e-6
@@ -85,7 +85,7 @@ def test_scaled_nodes_keep_their_own_units():
     nodes[0] |= {"scale": [size] * 3, "translation": [0, 0, 0]}
     rig = parse_gltf_rig(json.dumps({"asset": {"version": "2.0"}, "nodes": nodes, "skins": [_skin(nodes)]}).encode())
     assert np.abs(rig.positions[1:] - reference_rig("mixamo").positions).max() < 1e-5
-    written = parse_glb_rig(format_rigged_glb(on_body(WALK, Body.of(rig))), "x.glb")
+    written = parse_glb_rig(format_rigged_glb(on_body(WALK, RigBody.of(rig))), "x.glb")
     assert np.allclose(written.scales, rig.scales)
 
 
@@ -100,7 +100,7 @@ def test_a_bvh_rig_has_its_unit_told_by_the_body():
     data = exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "m", "y"))
     rig = parse_bvh_rig(data, "x.bvh")
     assert rig.unit == 1.0
-    assert Body.of(rig).leg == pytest.approx(0.8, abs=1e-3)
+    assert RigBody.of(rig).leg == pytest.approx(0.8, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -216,7 +216,7 @@ def _outside(document):
 )
 def test_a_bad_rig_is_refused_with_one_clear_message(change, kind, message):
     with pytest.raises(kind, match=message):
-        Body.of(parse_gltf_rig(_document(change), "hero.gltf"))
+        RigBody.of(parse_gltf_rig(_document(change), "hero.gltf"))
 
 
 def test_a_rig_that_is_not_there(tmp_path):
@@ -235,7 +235,7 @@ def test_a_rig_that_is_not_there(tmp_path):
 def test_broken_files_give_only_our_errors(extension):
     rig = reference_rig("mixamo")
     good = {
-        "glb": lambda: format_rigged_glb(on_body(WALK, Body.of(rig))),
+        "glb": lambda: format_rigged_glb(on_body(WALK, RigBody.of(rig))),
         "json": lambda: format_json_rig(rig),
         "bvh": lambda: exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "cm", "y")),
     }[extension]()

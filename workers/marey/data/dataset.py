@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile, NotFound
 from marey.data.licences import Terms, Tier
-from marey.data.rigs import Rig
+from marey.data.rigs import CapturedRig
 from marey.motion.units import Unit, Up
 
 DATASET, INDEX = "dataset.toml", "index.csv"
@@ -54,14 +54,14 @@ class Dataset(BaseModel):
     largest_error_cm: float = 2.0
     index_fps: float = Field(default=30.0, gt=0)
     columns: Mapping[str, str] = {}
-    rigs: tuple[Rig, ...] = Field(alias="rig", min_length=1)
+    rigs: tuple[CapturedRig, ...] = Field(alias="rig", min_length=1)
 
     @property
     def terms(self) -> Terms:
         """Terms of the clips, except for rows with their own."""
         return Terms(self.name, self.title, self.licence, self.credit, self.url, self.tier)
 
-    def rig_of(self, names: tuple[str, ...], where: str) -> Rig:
+    def rig_of(self, names: tuple[str, ...], where: str) -> CapturedRig:
         """Find the rig of a skeleton by its joint names.
 
         Raises:

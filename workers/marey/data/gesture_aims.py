@@ -7,7 +7,7 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, Pace, respond
+from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, eased, envelope, stations
 
 Array = NDArray[np.floating]
@@ -21,9 +21,9 @@ def aim(rng: random.Random) -> Gesture:
     side = rng.choices(SIDES, (1, 2))[0]
     if rng.random() < 0.45:
         seconds, kinds = rng.uniform(2.0, 7.0), ("aim", form)
-        pace = Pace.lasting(seconds)
+        pace = GesturePace.lasting(seconds)
     else:
-        pace = Pace.draw(rng, (0.3, 0.9), (1.5, 4.5))
+        pace = GesturePace.draw(rng, (0.3, 0.9), (1.5, 4.5))
         seconds, kinds = pace.total(rng), ("aim", form, "aim-raise")
     hands, twist, head = _GUNS[form](rng, side), _TWISTS[form], rng.uniform(0, 7)
     degrees, turned = rng.uniform(*twist), _OTHER[side] if form == "aim-rifle" else side

@@ -6,7 +6,7 @@ import random
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, Pace, arms_of, drawn_arm, respond
+from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, drawn_arm, respond
 from marey.data.gesture_poses import ARMS, StandingBody, swings, swung
 
 _WAVES = {
@@ -23,7 +23,7 @@ def wave(rng: random.Random) -> Gesture:
     rate = {"slow": rng.uniform(1.2, 1.6), "": rng.uniform(1.6, 2.4), "fast": rng.uniform(2.4, 3.2)}[tempo]
     length = rng.choice(["brief", "", "", "long"])
     hold = {"brief": (1.3 / rate, 1.7 / rate), "": (2.0 / rate, 3.4), "long": (4.2, 6.5)}[length]
-    pace = Pace.draw(rng, (0.35, 0.9), hold)
+    pace = GesturePace.draw(rng, (0.35, 0.9), hold)
     side = rng.choices([*SIDES, BOTH], (4, 4, 1))[0]
     arms = {one: drawn_arm(rng, _WAVES[form]) for one in arms_of(side)}
     whole = rng.uniform(0.5, 0.9) if form == "wave-whole" else rng.uniform(0, 0.15)
@@ -59,7 +59,7 @@ def raise_arm(rng: random.Random) -> Gesture:
     length = rng.choice(["quick", "", "", "long"])
     rise = {"quick": (0.3, 0.45), "": (0.45, 1.1), "long": (0.5, 1.4)}[length]
     hold = {"quick": (0.3, 0.5), "": (0.5, 2.0), "long": (2.2, 5.5)}[length]
-    pace = Pace.draw(rng, rise, hold)
+    pace = GesturePace.draw(rng, rise, hold)
     arms = {one: drawn_arm(rng, _RAISES[form]) for one in arms_of(side)}
     twist, sway = rng.uniform(-2, 6), rng.uniform(0, 5)
 
@@ -83,7 +83,7 @@ _GUIDES = {
 
 def guide(rng: random.Random) -> Gesture:
     form, side = rng.choice(list(_GUIDES)), rng.choice(SIDES)
-    pace = Pace.draw(rng, (0.45, 1.1), (0.7, 2.5))
+    pace = GesturePace.draw(rng, (0.45, 1.1), (0.7, 2.5))
     arm = drawn_arm(rng, _GUIDES[form])
     twist, stoop = rng.uniform(0, 14), rng.uniform(0, 14)
 
@@ -100,7 +100,7 @@ def clap(rng: random.Random) -> Gesture:
     high = rng.random() < 0.3
     tempo = rng.choice(["slow", "", "", "fast"])
     rate = {"slow": rng.uniform(1.1, 1.6), "": rng.uniform(1.7, 2.4), "fast": rng.uniform(2.6, 3.4)}[tempo]
-    pace = Pace.draw(rng, (0.4, 0.9), (3.6 / rate, 5.0))
+    pace = GesturePace.draw(rng, (0.4, 0.9), (3.6 / rate, 5.0))
     above = rng.uniform(0.02, 0.4) if high else rng.uniform(-0.28, -0.06)
     ahead = rng.uniform(0.2, 0.3) if high else rng.uniform(0.27, 0.36)
     apart = rng.uniform(0.1, 0.22)

@@ -1,4 +1,4 @@
-"""What gestures are drawn from: lengths of their phases, directions of arms, and the trunk's response."""
+"""Parts of drawn gestures: lengths of their phases, directions of arms, and the trunk's response."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Gesture:
 
 
 @dataclass(frozen=True)
-class Pace:
+class GesturePace:
     """Timing of a hand that goes up, stays and comes down, in seconds."""
 
     start: float
@@ -50,12 +50,12 @@ class Pace:
     fall: float
 
     @classmethod
-    def draw(cls, rng: random.Random, rise: tuple[float, float], hold: tuple[float, float]) -> Pace:
+    def draw(cls, rng: random.Random, rise: tuple[float, float], hold: tuple[float, float]) -> GesturePace:
         up = rng.uniform(*rise)
         return cls(rng.uniform(0.1, 1.3), up, rng.uniform(*hold), up * rng.uniform(0.9, 1.4))
 
     @classmethod
-    def lasting(cls, seconds: float) -> Pace:
+    def lasting(cls, seconds: float) -> GesturePace:
         """A hand that is up in the first frame already and stays for `seconds`."""
         return cls(-1.0, 0.5, seconds + 1.0, 0.5)
 
@@ -72,7 +72,7 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class Arm:
+class DrawnArm:
     """Final directions of an arm, its swing in degrees, and the delay of the forearm in seconds."""
 
     upper: Array
@@ -81,9 +81,9 @@ class Arm:
     lag: float
 
 
-def drawn_arm(rng: random.Random, form: Mapping[str, tuple]) -> Arm:
+def drawn_arm(rng: random.Random, form: Mapping[str, tuple]) -> DrawnArm:
     upper, fore = (direction(*(rng.uniform(*limits) for limits in form[bone])) for bone in ("upper", "fore"))
-    return Arm(upper, fore, rng.uniform(*form.get("swing", (0, 0))), rng.uniform(0.0, 0.12))
+    return DrawnArm(upper, fore, rng.uniform(*form.get("swing", (0, 0))), rng.uniform(0.0, 0.12))
 
 
 def arms_of(side: str) -> tuple[str, ...]:

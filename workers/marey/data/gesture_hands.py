@@ -7,7 +7,7 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, Pace, arms_of, respond
+from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, respond
 from marey.data.gesture_poses import StandingBody, direction, stations, swings
 
 Array = NDArray[np.floating]
@@ -29,7 +29,7 @@ def reach_forward(rng: random.Random) -> Gesture:
     up, out, far = (rng.uniform(*limits[name]) for name in ("up", "out", "far"))
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = {"quick": (0.3, 0.45), "": (0.5, 0.85), "slow": (0.95, 1.4)}[tempo]
-    pace = Pace.draw(rng, rise, limits["hold"])
+    pace = GesturePace.draw(rng, rise, limits["hold"])
     shakes = rng.uniform(1.8, 2.8), rng.uniform(0.02, 0.035) if form == "reach-shake" else 0.0
     twist, stoop, head = rng.uniform(12, 22), rng.uniform(4, 9) - 0.2 * up, rng.uniform(0, 8)
 
@@ -64,9 +64,9 @@ def talk(rng: random.Random) -> Gesture:
     if form == "together":
         first = paths[SIDES[0]]
         paths = {one: first + np.array([[rng.gauss(0, 0.012) for _ in range(3)] for _ in first]) for one in SIDES}
-    pace = Pace.lasting(seconds)
+    pace = GesturePace.lasting(seconds)
     if rng.random() < 0.5:
-        pace = Pace(rng.uniform(0.05, 0.4), rng.uniform(0.35, 0.6), seconds - 1.8, rng.uniform(0.5, 0.8))
+        pace = GesturePace(rng.uniform(0.05, 0.4), rng.uniform(0.35, 0.6), seconds - 1.8, rng.uniform(0.5, 0.8))
     looks = _beats(rng, (0.5, 1.4), seconds)
     head = [(rng.uniform(-18, 18), rng.uniform(-5, 7), rng.uniform(-3, 3)) for _ in looks]
 

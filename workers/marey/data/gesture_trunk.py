@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, Pace
+from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
 from marey.data.gesture_poses import StandingBody, envelope, swings, tremble
 
 _SLIGHT, _DEEP = 36.0, 66.0
@@ -20,7 +20,7 @@ def bow(rng: random.Random) -> Gesture:
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = {"quick": (0.35, 0.55), "": (0.6, 1.1), "slow": (1.0, 1.6)}[tempo]
     hold = {"quick": (0.05, 0.2), "": (0.15, 0.9), "slow": (1.0, 2.0)}[tempo]
-    paces = [Pace.draw(rng, rise, hold)]
+    paces = [GesturePace.draw(rng, rise, hold)]
     for _ in range(times - 1):
         one = replace(paces[0], start=paces[-1].seconds + rng.uniform(0.0, 0.3))
         paces.append(one)
@@ -49,7 +49,7 @@ def nod(rng: random.Random) -> Gesture:
     tempo = rng.choice(["slow", "", "quick"])
     rate = {"slow": rng.uniform(0.7, 1.0), "": rng.uniform(1.0, 1.7), "quick": rng.uniform(1.9, 2.6)}[tempo]
     degrees = rng.uniform(8, 12) if tempo == "quick" else rng.uniform(9, 18)
-    pace = Pace.draw(rng, (0.2, 0.4), (2.2 / rate, 4.5 / rate))
+    pace = GesturePace.draw(rng, (0.2, 0.4), (2.2 / rate, 4.5 / rate))
     neck = rng.uniform(0.1, 0.3)
 
     def change(body: StandingBody) -> None:
@@ -70,9 +70,9 @@ _HUGS = {
 
 def shiver(rng: random.Random) -> Gesture:
     form, seconds = rng.choice(list(_HUGS)), rng.uniform(2.5, 8.0)
-    pace = Pace.lasting(seconds)
+    pace = GesturePace.lasting(seconds)
     if rng.random() < 0.3:
-        pace = Pace(rng.uniform(0.05, 0.3), rng.uniform(0.35, 0.6), seconds, 1.0)
+        pace = GesturePace(rng.uniform(0.05, 0.3), rng.uniform(0.35, 0.6), seconds, 1.0)
     out, up, ahead = (rng.uniform(*_HUGS[form][name]) for name in ("out", "up", "ahead"))
     uneven, bent, lift = rng.uniform(-0.03, 0.03), rng.uniform(4, 14), rng.uniform(8, 20)
     rate, strength = rng.uniform(4.3, 5.2), rng.uniform(0.013, 0.021)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
-from marey.data.rigs import Rig
+from marey.data.rigs import CapturedRig
 from marey.motion.filters import smooth
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import global_rotations
@@ -40,11 +40,11 @@ class SourceMotion:
     """Points and directions of a rig in motion, at the rig's proportions.
 
     Attributes:
-        joints: (T, 22, 3) metres in the order of `Rig.points`.
+        joints: (T, 22, 3) metres in the order of `CapturedRig.points`.
         lateral: (T, 2, 3) unit vectors to the body's left, rigid with the left and the right foot.
-        sole_pitch: degrees, see `Rig.sole_pitch`.
-        trunk: (T, 7, 3, 3) orientations of the joints of `Rig.turning`, columns left, up, forward; identity in a body
-            that stands upright and faces +Z.
+        sole_pitch: degrees, see `CapturedRig.sole_pitch`.
+        trunk: (T, 7, 3, 3) orientations of the joints of `CapturedRig.turning`, columns left, up, forward; identity
+            in a body that stands upright and faces +Z.
     """
 
     joints: Array
@@ -53,7 +53,7 @@ class SourceMotion:
     trunk: Array
 
 
-def read_source(clip: BvhClip, rig: Rig, *, where: str, unit: Unit = "cm") -> SourceMotion:
+def read_source(clip: BvhClip, rig: CapturedRig, *, where: str, unit: Unit = "cm") -> SourceMotion:
     """Read the rig's points from a clip, resampled to 20 fps.
 
     `marey.motion.io.bvh` has already removed a first frame in T-pose.
@@ -86,7 +86,7 @@ def read_source(clip: BvhClip, rig: Rig, *, where: str, unit: Unit = "cm") -> So
     )
 
 
-def _offsets(clip: BvhClip, rig: Rig, index: list[int], where: str, unit: float) -> Array:
+def _offsets(clip: BvhClip, rig: CapturedRig, index: list[int], where: str, unit: float) -> Array:
     """Offsets (22, 3) of the rig's points from their joints, metres."""
     out = np.zeros((len(index), 3))
     for k, (point, j) in enumerate(zip(rig.points, index, strict=True)):
@@ -98,7 +98,7 @@ def _offsets(clip: BvhClip, rig: Rig, index: list[int], where: str, unit: float)
     return out
 
 
-def _flat_feet(clip: BvhClip, rig: Rig, index: list[int], offsets: Array) -> tuple[Array, float]:
+def _flat_feet(clip: BvhClip, rig: CapturedRig, index: list[int], offsets: Array) -> tuple[Array, float]:
     """Direction to the body's left in the frame of each ankle (2, 3), and the pitch of the foot bone in degrees, while
     the foot is flat: from the rig, or from the rest pose."""
     places = clip.skeleton.rest[index] + offsets
@@ -129,7 +129,7 @@ def resample_points(points: Array, fps: float, target: float) -> Array:
     return p1 + 0.5 * t * (c + t * (a + t * b))
 
 
-def retarget(source: SourceMotion, rig: Rig, *, unit: Unit = "cm") -> Array:
+def retarget(source: SourceMotion, rig: CapturedRig, *, unit: Unit = "cm") -> Array:
     """Retarget to joints (T, 22, 3) of HumanML3D in metres, with exactly its bone lengths and the heights of the file,
     facing +Z over the origin in frame 0. `floor.on_floor` finds the floor."""
     s = source.joints

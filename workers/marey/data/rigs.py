@@ -37,7 +37,7 @@ RigPoint = Annotated[Point, BeforeValidator(_point)]
 Four = tuple[RigPoint, RigPoint, RigPoint, RigPoint]
 
 
-class Rig(BaseModel):
+class CapturedRig(BaseModel):
     """A rig that can be retargeted to the 22 joints of HumanML3D.
 
     Attributes:

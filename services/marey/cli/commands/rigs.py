@@ -9,7 +9,7 @@ import typer
 from marey.cli import console, options
 
 if TYPE_CHECKING:
-    from marey.motion.rigs.body import Body
+    from marey.motion.rigs.body import RigBody
 
 app = typer.Typer(help="Rigs that motions are put on.", no_args_is_help=True)
 
@@ -48,7 +48,7 @@ def show(
     console.table(("part", "joint", "found by"), rows)
 
 
-def describe(body: Body) -> dict[str, Any]:
+def describe(body: RigBody) -> dict[str, Any]:
     """Return what is known of a rig, as JSON: sizes in metres."""
     rig, found = body.rig, body.map
     return {
@@ -70,7 +70,7 @@ def describe(body: Body) -> dict[str, Any]:
     }
 
 
-def _role(body: Body, joint: int) -> str:
+def _role(body: RigBody, joint: int) -> str:
     """Return what becomes of a joint that is no part of the body."""
     found = body.map
     if joint in found.twists:

@@ -14,7 +14,7 @@ from marey.motion.export_options import ExportOptions
 if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
-    from marey.motion.edits.editing import Source
+    from marey.motion.edits.editing import EditSource
 
 
 def edit_files(
@@ -81,15 +81,15 @@ def _writer(output: Path, file_format: str) -> tuple[Exporter[Any], bool]:
     return known[file_format], False
 
 
-def _read(path: Path) -> Source:
+def _read(path: Path) -> EditSource:
     from marey.exporters import Coordinates
     from marey.exporters.convert import read_motion
     from marey.motion.clip import MAX_UNPACKED
-    from marey.motion.edits.editing import Source
+    from marey.motion.edits.editing import EditSource
     from marey.motion.files import read_limited
 
     clip = read_motion(path, Coordinates())
-    return Source(clip, path.name, hashlib.sha256(read_limited(path, MAX_UNPACKED)).hexdigest())
+    return EditSource(clip, path.name, hashlib.sha256(read_limited(path, MAX_UNPACKED)).hexdigest())
 
 
 def _numbered(target: Path, count: int) -> list[Path]:

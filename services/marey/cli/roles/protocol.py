@@ -21,7 +21,7 @@ REAL = "real"
 
 @dataclass(frozen=True)
 class ProtocolRequest:
-    """What is measured, and where the results go.
+    """A measurement: the bundle, its evaluators and data, and where the results go.
 
     Attributes:
         bundle: a generator, or `REAL`.

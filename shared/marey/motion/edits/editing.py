@@ -24,7 +24,7 @@ MOST_FRAMES = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class EditSource:
     """A motion to edit, as its file.
 
     Attributes:
@@ -46,11 +46,11 @@ class Source:
         return {**({"name": self.name} if self.name else {}), "sha256": digest, **kept}
 
 
-Load = Callable[[str], "MotionClip | Source"]
+Load = Callable[[str], "MotionClip | EditSource"]
 
 
 def edit(
-    clip: MotionClip | Source, ops: Sequence[Mapping[str, Any]], *, load: Load = load_npz
+    clip: MotionClip | EditSource, ops: Sequence[Mapping[str, Any]], *, load: Load = load_npz
 ) -> tuple[MotionClip, ...]:
     """Apply operations in their order; the clip itself does not change.
 
@@ -72,10 +72,10 @@ def edit(
             that cannot become a loop, or licences that exclude each other.
         NotFound, InvalidFile: from reading another motion.
     """
-    source = clip if isinstance(clip, Source) else Source(clip)
-    loaded: dict[int, Source] = {}
+    source = clip if isinstance(clip, EditSource) else EditSource(clip)
+    loaded: dict[int, EditSource] = {}
 
-    def other(step: Step) -> Source:
+    def other(step: Step) -> EditSource:
         key = id(step.values["with"])
         if key not in loaded:
             loaded[key] = _loaded(step.values["with"], load)
@@ -84,14 +84,14 @@ def edit(
     return tuple(_apply(source, steps, other) for steps in pieces_of(read_steps(ops)))
 
 
-def _loaded(named: Any, load: Load) -> Source:
-    found = named if isinstance(named, MotionClip | Source) else load(named)
-    if isinstance(found, Source):
+def _loaded(named: Any, load: Load) -> EditSource:
+    found = named if isinstance(named, MotionClip | EditSource) else load(named)
+    if isinstance(found, EditSource):
         return found
-    return Source(found, name=named if isinstance(named, str) else "")
+    return EditSource(found, name=named if isinstance(named, str) else "")
 
 
-def _apply(source: Source, steps: Sequence[Step], other: Callable[[Step], Source]) -> MotionClip:
+def _apply(source: EditSource, steps: Sequence[Step], other: Callable[[Step], EditSource]) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
     clip = at_origin(replace(source.clip, manifest=manifest))
@@ -124,7 +124,7 @@ def _run(step: Step, clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     return result
 
 
-def _provenance(sources: Sequence[Source], done: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _provenance(sources: Sequence[EditSource], done: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     licence = strictest(each.clip.manifest.get("licence") for each in sources)
     unique = {each.record["sha256"]: each.record for each in sources}
     record = {"sources": [*unique.values()], "ops": [*done], "software": {"marey": version("marey")}}

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.motion.io.bvh import BvhClip, first_frame_stands_apart, parse_bvh
 from marey.motion.kinematics import global_rotations
-from marey.motion.rigs.body import Body
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.body import RigBody
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import IDENTITY, Array, to_matrix
 from marey.motion.units import METRES
@@ -50,7 +50,7 @@ def _rig(clip: BvhClip, world: Array, where: str, sha256: str) -> Rig:
     """Return the rig whose rest pose has these orientations (J, 4) of the joints, in metres and Y up."""
     tree = clip.skeleton
     axes = to_matrix(world)
-    nodes: list[Node] = []
+    nodes: list[RigNode] = []
     for joint, (name, parent) in enumerate(zip(tree.joint_names, tree.parents, strict=True)):
         matrix: NDArray[np.float64] = np.eye(4)
         matrix[:3, :3] = axes[joint]
@@ -58,14 +58,14 @@ def _rig(clip: BvhClip, world: Array, where: str, sha256: str) -> Rig:
             matrix[:3, 3] = nodes[parent].matrix[:3, :3] @ tree.offsets[joint] + nodes[parent].matrix[:3, 3]
         end = clip.ends[joint]
         tip = None if np.isnan(end).any() else (float(end[0]), float(end[1]), float(end[2]))
-        nodes.append(Node(name, parent, matrix, tip=tip))
+        nodes.append(RigNode(name, parent, matrix, tip=tip))
     name = PurePath(where).name
     return make_rig(nodes, name=name, where=where, unit=1.0, up="y", source="bvh", sha256=sha256)
 
 
 def _stands(rig: Rig) -> bool:
     try:
-        return Body.of(rig, sized=False).standing
+        return RigBody.of(rig, sized=False).standing
     except InvalidInput:  # no legs are found: that is said when the rig is used
         return False
 
@@ -73,7 +73,7 @@ def _stands(rig: Rig) -> bool:
 def _with_unit(rig: Rig) -> Rig:
     """Return the rig with its lengths in the unit that makes its legs those of a person; centimetres if none does."""
     try:
-        leg = Body.of(rig, sized=False).leg
+        leg = RigBody.of(rig, sized=False).leg
     except InvalidInput:
         leg = 0.0
     usual = FIGURE[0] <= leg * METRES[UNITS[0]] <= FIGURE[1]

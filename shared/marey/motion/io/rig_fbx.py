@@ -13,7 +13,7 @@ import numpy as np
 from marey.motion.io.fbx_scene import Scene, read_scene
 from marey.motion.io.fbx_skeleton import bones_of, skeleton_order
 from marey.motion.io.fbx_transforms import world_transforms
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import to_matrix
 from marey.motion.units import Z_TO_Y, Up
@@ -32,12 +32,12 @@ def parse_fbx_rig(data: bytes, where: str = "fbx") -> Rig:
     world = world_transforms(scene, order, {}, bind=True)
     turn, up, notes = _axes(scene)
     place = {key: index for index, key in enumerate(order)}
-    nodes: list[Node] = []
+    nodes: list[RigNode] = []
     for key in order:
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = turn @ world.linear[key], turn @ world.places[key]
         parent = place.get(scene.parents.get(key, 0), -1)
-        nodes.append(Node(scene.models[key].name or f"node{place[key]}", parent, matrix, key in bones))
+        nodes.append(RigNode(scene.models[key].name or f"node{place[key]}", parent, matrix, key in bones))
     return make_rig(
         nodes,
         name=PurePath(where).name,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile
 from marey.motion.io.glb_write import JSON, MAGIC, VERSION
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import normalize, to_matrix
 
@@ -69,7 +69,7 @@ def _rig(text: bytes, whole: bytes, where: str) -> Rig:
     )
 
 
-def _nodes(document: Mapping[str, Any], where: str) -> tuple[list[Node], dict[str, Any]]:
+def _nodes(document: Mapping[str, Any], where: str) -> tuple[list[RigNode], dict[str, Any]]:
     """Return the nodes of the skeleton, and what the file says of its parts of the body."""
     nodes: Sequence[Mapping[str, Any]] = document.get("nodes", [])
     if len(nodes) > MAX_NODES:
@@ -84,7 +84,9 @@ def _nodes(document: Mapping[str, Any], where: str) -> tuple[list[Node], dict[st
     matrices = _global_matrices(kept, nodes, parents)
     place = {node: index for index, node in enumerate(kept)}
     found = [
-        Node(str(nodes[n].get("name", f"node{n}")), place.get(parents[n], -1), matrices.get(n, np.eye(4)), n in bones)
+        RigNode(
+            str(nodes[n].get("name", f"node{n}")), place.get(parents[n], -1), matrices.get(n, np.eye(4)), n in bones
+        )
         for n in kept
     ]
     return found, {"humanoid": {part: place[node] for part, node in humanoid.items() if node in place}}

@@ -18,7 +18,7 @@ import numpy as np
 
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import Array, conjugate, multiply, rotate, to_matrix
 from marey.motion.units import Z_TO_Y
@@ -48,12 +48,12 @@ def _rig(document: Mapping[str, Any], where: str, sha256: str) -> Rig:
         raise InvalidFile(f"is not a rig of version {VERSION}", where=where, hint=SHAPE)
     unit, up = float(document["unit"]), document["up"]
     if up not in ("y", "z") or not 1e-6 <= unit <= 1e6:
-        raise InvalidFile("its unit is no number of metres, or its axis neither y nor z", where=where, hint=SHAPE)
+        raise InvalidFile("its unit must be metres as a number, and its axis y or z", where=where, hint=SHAPE)
     joints: list[Mapping[str, Any]] = document["joints"]
     index = {str(joint["name"]): number for number, joint in enumerate(joints)}
     if len(index) < len(joints):
         raise InvalidFile("two joints have one name", where=where)
-    nodes: list[Node] = []
+    nodes: list[RigNode] = []
     for joint in joints:
         parent = joint.get("parent")
         if parent is not None and parent not in index:
@@ -64,7 +64,7 @@ def _rig(document: Mapping[str, Any], where: str, sha256: str) -> Rig:
             raise InvalidFile(f"the rotation of {joint['name']!r} is no unit quaternion", where=where, hint=SHAPE)
         matrix[:3, :3] = to_matrix(turn / np.linalg.norm(turn))
         matrix[:3, 3] = np.array(joint["position"], np.float64).reshape(3)
-        nodes.append(Node(str(joint["name"]), -1 if parent is None else index[parent], matrix))
+        nodes.append(RigNode(str(joint["name"]), -1 if parent is None else index[parent], matrix))
     return make_rig(nodes, name=PurePath(where).name, where=where, unit=unit, up=up, source="json", sha256=sha256)
 
 

@@ -12,7 +12,7 @@ from pathlib import PurePath
 import numpy as np
 
 from marey.core.arrays import check_array, parse_npz
-from marey.motion.rigs.make_rig import Node, make_rig
+from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 
 _FINGERS = [f"{finger}{n}" for finger in ("index", "middle", "pinky", "ring", "thumb") for n in (1, 2, 3)]
@@ -72,10 +72,10 @@ def parse_smplx_rig(data: bytes, where: str = "npz") -> Rig:
         arrays["J_regressor"], "J_regressor", where, kinds="f", shape=(len(JOINTS), VERTICES), hint=hint
     )
     places = weights.astype(np.float64) @ points.astype(np.float64)
-    nodes: list[Node] = []
+    nodes: list[RigNode] = []
     for name, parent, place in zip(JOINTS, PARENTS, places, strict=True):
         matrix = np.eye(4)
         matrix[:3, 3] = place
-        nodes.append(Node(name, parent, matrix))
+        nodes.append(RigNode(name, parent, matrix))
     sha256 = hashlib.sha256(data).hexdigest()
     return make_rig(nodes, name=PurePath(where).name, where=where, unit=1.0, up="y", source=SOURCE, sha256=sha256)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from marey.motion.retarget.spine import along, spans
-from marey.motion.rigs.body import Body, frame
+from marey.motion.rigs.body import RigBody, frame
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rotations import Array, between, from_matrix, multiply, rotate
 
@@ -27,7 +27,7 @@ class Alignment:
         exact: True if both bodies have the same shape, so that every joint can be placed like the source's.
     """
 
-    def __init__(self, source: Body, target: Body) -> None:
+    def __init__(self, source: RigBody, target: RigBody) -> None:
         self.source, self.target = source, target
         self.exact = _same_shape(source, target)
         self.by_direction = self.exact or not target.standing or not source.standing
@@ -118,19 +118,19 @@ def _flat(vector: Array) -> Array:
     return vector * np.array([1.0, 0.0, 1.0])
 
 
-def _pelvis(body: Body) -> Array:
+def _pelvis(body: RigBody) -> Array:
     """Return the places of hips, hip joints and the beginning of the spine (4, 3)."""
     spine = body.at("spine1") if body.has("spine1") else body.top
     return np.stack([body.at("hips"), body.at("left_upper_leg"), body.at("right_upper_leg"), spine])
 
 
-def _ribs(body: Body) -> Array:
+def _ribs(body: RigBody) -> Array:
     """Return the places of the neck and of both arms' beginnings (3, 3)."""
     begins = [f"{side}_shoulder" if body.has(f"{side}_shoulder") else f"{side}_upper_arm" for side in SIDES]
     return np.stack([body.at("neck1") if body.has("neck1") else body.top, *(body.at(name) for name in begins)])
 
 
-def _chest_frame(body: Body) -> Array | None:
+def _chest_frame(body: RigBody) -> Array | None:
     if not (body.has("left_upper_arm") and body.has("right_upper_arm")):
         return None
     up, left = body.top - body.hips, body.at("left_upper_arm") - body.at("right_upper_arm")
@@ -139,7 +139,7 @@ def _chest_frame(body: Body) -> Array | None:
     return frame(up, left) if np.linalg.norm(np.cross(up, left)) > 1e-6 else None
 
 
-def _same_shape(source: Body, target: Body) -> bool:
+def _same_shape(source: RigBody, target: RigBody) -> bool:
     """Return True if pelvis, chest and limbs of both bodies are alike but for their size."""
     optional = ("left_upper_arm", "right_upper_arm", "left_shoulder", "right_shoulder", "neck1", "left_toes")
     if any(source.has(part) != target.has(part) for part in optional) or not source.has("left_upper_arm"):
@@ -152,7 +152,7 @@ def _same_shape(source: Body, target: Body) -> bool:
     return bool((own[~long] < 1e-3).all() and np.ptp(ratio) <= SAME * ratio.mean())
 
 
-def _measures(body: Body) -> Array:
+def _measures(body: RigBody) -> Array:
     """Return the distances within pelvis and chest and the lengths of the limbs, as far as the body has them."""
     chains = (("upper_leg", "lower_leg", "foot", "toes"), ("shoulder", "upper_arm", "lower_arm", "hand"))
     lengths = [_distances(_pelvis(body)), _distances(_ribs(body))]

@@ -14,7 +14,7 @@ from marey.motion.retarget.load import load_body
 from marey.motion.retarget.posed import local_poses
 from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import source_of
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, multiply, rotate
 
@@ -31,7 +31,7 @@ def put_on_rig(clip: MotionClip, options: ExportOptions) -> RiggedMotion:
     return on_body(clip, load_body(options.rig, options.rig_map), options)
 
 
-def on_body(clip: MotionClip, body: Body, options: ExportOptions = PLAIN, *, hands: bool = False) -> RiggedMotion:
+def on_body(clip: MotionClip, body: RigBody, options: ExportOptions = PLAIN, *, hands: bool = False) -> RiggedMotion:
     """Put a clip on a rig.
 
     Args:
@@ -47,7 +47,7 @@ def on_body(clip: MotionClip, body: Body, options: ExportOptions = PLAIN, *, han
     return _with_rest_frame(motion) if options.tpose_frame else motion
 
 
-def _on_root(motion: RiggedMotion, body: Body, heading: Array) -> RiggedMotion:
+def _on_root(motion: RiggedMotion, body: RigBody, heading: Array) -> RiggedMotion:
     """Return the motion with X, Z and heading of the hips on the bone over them, which takes along what hangs on it but
     for the body and what follows it."""
     rig, root, hips = motion.rig, body.map.root, body.map.parts["hips"]

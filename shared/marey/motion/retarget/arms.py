@@ -6,13 +6,13 @@ import numpy as np
 
 from marey.motion.legs import two_bone_knee
 from marey.motion.retarget.legs import Stance
-from marey.motion.retarget.posed import Posed
+from marey.motion.retarget.posed import PosedRig
 from marey.motion.retarget.source import Source
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rotations import Array, between, length, multiply, normalize
 
 
-def reach_hands(source: Source, stance: Stance, posed: Posed, hips: Array) -> None:
+def reach_hands(source: Source, stance: Stance, posed: PosedRig, hips: Array) -> None:
     """Turn the arms of a pose until the hands are where the source's hands are: at the scale of the legs, from the
     middle of the hips. A hand that is out of reach comes as near as it can.
 

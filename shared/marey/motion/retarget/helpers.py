@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rotations import Array, conjugate, dot, from_rotvec, multiply, normalize
 
 
-def share_twists(target: Body, turned: Array) -> None:
+def share_twists(target: RigBody, turned: Array) -> None:
     """Turn twist joints about their bones, in place.
 
     The upper bone of a limb is turned about itself by its beginning, and skin near the shoulder or hip shall not be;

@@ -8,12 +8,12 @@ from pathlib import Path
 from marey.core.documents import read_json
 from marey.core.errors import InvalidInput, NotFound
 from marey.motion.retarget.reference import REFERENCES, reference_rig
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints, read_map
 from marey.motion.rigs.read import READERS, read_rig
 
 
-def load_body(rig: str | Path, rig_map: str | Path | None = None) -> Body:
+def load_body(rig: str | Path, rig_map: str | Path | None = None) -> RigBody:
     """Return a reference skeleton or the rig of a file, with its parts. Files are read again when they change.
 
     Args:
@@ -37,7 +37,7 @@ def _stamp(path: str | Path | None) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=16)
-def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> Body:
+def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> RigBody:
     given = None if rig_map is None else read_map(read_json(Path(rig_map)), rig_map)
     if rig in REFERENCES:
         found = reference_rig(rig)
@@ -51,4 +51,4 @@ def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tupl
             hint=f"Reference skeletons: {', '.join(REFERENCES)}. Files: {', '.join('.' + each for each in READERS)}.",
             argument="rig",
         )
-    return Body.of(found, map_joints(found, given, where=rig_map))
+    return RigBody.of(found, map_joints(found, given, where=rig_map))

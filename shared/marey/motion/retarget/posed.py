@@ -9,7 +9,7 @@ from marey.motion.retarget.align import IDENTITY
 from marey.motion.retarget.helpers import share_twists
 from marey.motion.retarget.legs import UP
 from marey.motion.retarget.source import Source
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, between, conjugate, multiply, rotate
@@ -18,7 +18,7 @@ MOVES = 1e-6
 """Metres by which a joint's translation must differ from the rest pose, to be written."""
 
 
-class Posed:
+class PosedRig:
     """The joints of a target by the turns of its parts.
 
     Args:
@@ -27,7 +27,7 @@ class Posed:
         place: (T, 3) where the hips are, metres.
     """
 
-    def __init__(self, target: Body, turns: dict[str, Array], place: Array) -> None:
+    def __init__(self, target: RigBody, turns: dict[str, Array], place: Array) -> None:
         self.target, self.place = target, place
         self.turns = {part: turn for part, turn in turns.items() if target.has(part)}
 
@@ -70,7 +70,7 @@ class Posed:
         return _local(source, target, world, places)
 
 
-def _over(target: Body, joint: int) -> bool:
+def _over(target: RigBody, joint: int) -> bool:
     """Return True if a joint neither moves nor hangs on one that does: it is over the hips or beside them."""
     moving = {target.map.parts["hips"], *target.map.follows}
     while joint >= 0:
@@ -80,7 +80,7 @@ def _over(target: Body, joint: int) -> bool:
     return True
 
 
-def _local(source: Source, target: Body, world: Array, places: Array) -> RiggedMotion:
+def _local(source: Source, target: RigBody, world: Array, places: Array) -> RiggedMotion:
     rig = target.rig
     rotations, translations, moving = local_poses(rig, world, places)
     about = {"name": rig.name, "sha256": rig.sha256, "family": target.map.family}

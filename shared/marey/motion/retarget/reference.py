@@ -25,7 +25,7 @@ from marey.motion.units import Up
 
 
 @dataclass(frozen=True)
-class Joint:
+class ReferenceJoint:
     """A joint of a table.
 
     Attributes:
@@ -40,18 +40,18 @@ class Joint:
     bone: Array
 
 
-Axes = Callable[[Joint], Array]
+Axes = Callable[[ReferenceJoint], Array]
 """Gives the axes (3, 3) of a joint in the rest pose, as columns in the world."""
 
 
-def mixamo_axes(joint: Joint) -> Array:
+def mixamo_axes(joint: ReferenceJoint) -> Array:
     """Y along the bone; Z down in arms, up in feet, else forward."""
     if abs(joint.bone[0]) > 0.5:
         return _square(1, joint.bone, 2, (0.0, -1.0, 0.0))
     return _square(1, joint.bone, 2, (0.0, 1.0, 0.0) if joint.bone[2] > 0.5 else (0.0, 0.0, 1.0))
 
 
-def ue4_axes(joint: Joint) -> Array:
+def ue4_axes(joint: ReferenceJoint) -> Array:
     """X along the bone on the left and in the trunk; axes of the right side are the mirrored ones turned round.
 
     Z is right in the trunk, up in arms, forward in hands, left in legs, whose X is against the bone.
@@ -62,7 +62,7 @@ def ue4_axes(joint: Joint) -> Array:
         return _square(0, joint.bone, 2, (-1.0, 0.0, 0.0))
     if joint.place[0] < 0:
         mirror = np.array([-1.0, 1.0, 1.0])
-        left = ue4_axes(Joint(joint.name, joint.parent, joint.place * mirror, joint.bone * mirror))
+        left = ue4_axes(ReferenceJoint(joint.name, joint.parent, joint.place * mirror, joint.bone * mirror))
         return -mirror[:, None] * left
     if joint.name.startswith(("thigh", "calf", "foot", "ball", "ik_foot")):
         return _square(0, -joint.bone, 2, (1.0, 0.0, 0.0))
@@ -70,7 +70,7 @@ def ue4_axes(joint: Joint) -> Array:
     return _square(0, joint.bone, 2, (0.0, 0.0, 1.0) if palm else (0.0, 1.0, 0.0))
 
 
-def world_axes(joint: Joint) -> Array:
+def world_axes(joint: ReferenceJoint) -> Array:
     """All axes along the world's."""
     return np.eye(3)
 
@@ -107,7 +107,7 @@ def reference_rig(name: str) -> Rig:
     )
 
 
-def read_table(table: str) -> list[Joint]:
+def read_table(table: str) -> list[ReferenceJoint]:
     """Return the joints of a table, the right side of a limb after the left one."""
     rows = _both_sides([line.split() for line in table.strip().splitlines()])
     places: dict[str, Array] = {}
@@ -123,7 +123,7 @@ def read_table(table: str) -> list[Joint]:
         below = next((child for child, over, *_ in rows if over == name and "twist" not in child), None)
         if name not in bones:
             bones[name] = bones[parent] if below is None else places[below] - places[name]
-    return [Joint(name, parent, places[name], normalize(bones[name])) for name, parent, *_ in rows]
+    return [ReferenceJoint(name, parent, places[name], normalize(bones[name])) for name, parent, *_ in rows]
 
 
 def _both_sides(rows: list[list[str]]) -> list[list[str]]:

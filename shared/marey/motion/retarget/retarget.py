@@ -15,16 +15,16 @@ from marey.motion.filters import smooth
 from marey.motion.retarget.align import Alignment
 from marey.motion.retarget.arms import reach_hands
 from marey.motion.retarget.legs import STEADY, UP, Stance, flatten_toes, make_legs, solve_legs
-from marey.motion.retarget.posed import Posed
+from marey.motion.retarget.posed import PosedRig
 from marey.motion.retarget.source import Source
 from marey.motion.retarget.spine import blend, shares, spans
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, conjugate, multiply, normalize, rotate
 
 
-def retarget(source: Source, target: Body, *, hands: bool = False) -> RiggedMotion:
+def retarget(source: Source, target: RigBody, *, hands: bool = False) -> RiggedMotion:
     """Put a motion on a rig.
 
     Args:
@@ -55,7 +55,7 @@ def retarget(source: Source, target: Body, *, hands: bool = False) -> RiggedMoti
         if not _moves(source, f"{leg.side}_toes"):
             turns[f"{leg.side}_toes"] = flatten_toes(turns[f"{leg.side}_toes"], leg.hold)
     place = hips - rotate(turns["hips"], target.hips - target.at("hips"))
-    posed = Posed(target, turns, place)
+    posed = PosedRig(target, turns, place)
     if hands:
         reach_hands(source, stance, posed, hips)
     return posed.motion(source)
@@ -100,7 +100,7 @@ def _part_turns(source: Source, alignment: Alignment) -> dict[str, Array]:
     return {part: multiply(turn, parts[part]) for part, turn in turned.items()}
 
 
-def _spine(source: Source, target: Body) -> dict[str, Array]:
+def _spine(source: Source, target: RigBody) -> dict[str, Array]:
     own, theirs = target.map.spine, source.body.map.spine
     hips = source.turns("hips")
     chest = source.turned[:, source.body.map.chest]
@@ -116,7 +116,7 @@ def _spine(source: Source, target: Body) -> dict[str, Array]:
     return {f"spine{number}": turn for number, turn in enumerate(turns, start=1)}
 
 
-def _neck(source: Source, target: Body) -> dict[str, Array]:
+def _neck(source: Source, target: RigBody) -> dict[str, Array]:
     own, theirs = target.map.neck, source.body.map.neck
     chest = source.turned[:, source.body.map.chest]
     head = source.turns("head") if source.body.has("head") else chest

@@ -14,7 +14,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import forward_kinematics, global_rotations
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import Array, conjugate, multiply
 from marey.motion.skeleton import Skeleton
@@ -33,7 +33,7 @@ class Source:
         manifest: provenance of the motion.
     """
 
-    body: Body
+    body: RigBody
     turned: Array = field(repr=False)
     joints: Array = field(repr=False)
     contacts: NDArray[np.bool_] = field(repr=False)
@@ -81,12 +81,12 @@ def rig_of(skeleton: Skeleton) -> Rig:
 
 
 @lru_cache(maxsize=64)
-def _body_of(name: str, names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes) -> Body:
+def _body_of(name: str, names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes) -> RigBody:
     places = np.frombuffer(offsets, np.float32).reshape(-1, 3)
-    return Body.of(rig_of(Skeleton(name, names, parents, places, tuple(range(len(names))))))
+    return RigBody.of(rig_of(Skeleton(name, names, parents, places, tuple(range(len(names))))))
 
 
-def body_of(skeleton: Skeleton) -> Body:
+def body_of(skeleton: Skeleton) -> RigBody:
     """Return the body of a skeleton; remembered, since many motions have the same one.
 
     Raises:
@@ -95,7 +95,7 @@ def body_of(skeleton: Skeleton) -> Body:
     return _body_of(skeleton.name, skeleton.joint_names, skeleton.parents, skeleton.offsets.tobytes())
 
 
-def source_on(body: Body, clip: BvhClip, contacts: NDArray[np.bool_] | None = None) -> Source:
+def source_on(body: RigBody, clip: BvhClip, contacts: NDArray[np.bool_] | None = None) -> Source:
     """Return a BVH clip as a motion of a rig whose rest pose is known from another file, such as one that begins with a
     T-pose.
 

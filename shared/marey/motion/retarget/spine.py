@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from marey.motion.rigs.body import Body
+from marey.motion.rigs.body import RigBody
 from marey.motion.rotations import Array, normalize
 
 
-def spans(body: Body, chain: Sequence[int], end: Array) -> Array:
+def spans(body: RigBody, chain: Sequence[int], end: Array) -> Array:
     """Return the beginning and end (n, 2) of each bone of a chain, as shares of its length; the last bone ends at a
     place (3,) of the upright rest pose."""
     points: Array = np.concatenate([body.places[list(chain)], end[None]])
@@ -48,7 +48,7 @@ def blend(turns: Sequence[Array], weights: Array) -> Array:
     return normalize(total)
 
 
-def along(body: Body, chain: Sequence[int], end: Array, places: Array) -> Array:
+def along(body: RigBody, chain: Sequence[int], end: Array, places: Array) -> Array:
     """Return the points (n, 3) of a chain's upright rest pose at places (n,) from 0 to 1."""
     points = np.concatenate([body.places[list(chain)], end[None]])
     ends = np.concatenate([[0.0], spans(body, chain, end)[:, 1]])

@@ -26,7 +26,7 @@ SHORTEST, TALLEST = 0.2, 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class RigBody:
     """A rig with its parts.
 
     Attributes:
@@ -40,7 +40,7 @@ class Body:
     upright: Array = field(repr=False)
 
     @classmethod
-    def of(cls, rig: Rig, joint_map: JointMap | None = None, *, sized: bool = True) -> Body:
+    def of(cls, rig: Rig, joint_map: JointMap | None = None, *, sized: bool = True) -> RigBody:
         """Return the body of a rig.
 
         Args:

@@ -101,7 +101,7 @@ def _given(rig: Rig, given: Mapping[str, str | None], where: str) -> dict[str, i
     for part, name in given.items():
         if part not in PARTS:
             raise InvalidInput(
-                f"{part!r} is no part of the body", where=where, hint=f"Known: {', '.join(PARTS[:12])} …"
+                f"{part!r} is not a part of the body", where=where, hint=f"Known: {', '.join(PARTS[:12])} …"
             )
         if name is not None and name not in rig.joint_names:
             raise InvalidInput(

@@ -20,7 +20,7 @@ sheared; exporters round."""
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class RigNode:
     """A node of a file.
 
     Attributes:
@@ -39,7 +39,7 @@ class Node:
 
 
 def make_rig(
-    nodes: Sequence[Node],
+    nodes: Sequence[RigNode],
     *,
     name: str,
     where: str,
@@ -95,7 +95,7 @@ def make_rig(
     )
 
 
-def _parents_first(nodes: Sequence[Node], where: str) -> list[int]:
+def _parents_first(nodes: Sequence[RigNode], where: str) -> list[int]:
     """Return the nodes' indices in depth-first order, siblings as in the file."""
     below: dict[int, list[int]] = {}
     for index, node in enumerate(nodes):

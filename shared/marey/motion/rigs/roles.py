@@ -10,7 +10,7 @@ import numpy as np
 from marey.motion.rigs.parts import SIDES
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.tree import between
-from marey.motion.rigs.words import TWISTS, Word
+from marey.motion.rigs.words import TWISTS, NameWord
 
 BONES = (("upper_arm", "lower_arm"), ("lower_arm", "hand"), ("upper_leg", "lower_leg"), ("lower_leg", "foot"))
 """Limb bones: the parts of their beginning and end."""
@@ -33,7 +33,7 @@ class Twist:
     inline: bool
 
 
-def find_twists(rig: Rig, parts: Mapping[str, int], words: Sequence[Word]) -> dict[int, Twist]:
+def find_twists(rig: Rig, parts: Mapping[str, int], words: Sequence[NameWord]) -> dict[int, Twist]:
     """Return the joints along arms and legs that share the twist of their bone."""
     found: dict[int, Twist] = {}
     taken = set(parts.values())
@@ -51,7 +51,7 @@ def find_twists(rig: Rig, parts: Mapping[str, int], words: Sequence[Word]) -> di
     return found
 
 
-def find_followers(rig: Rig, parts: Mapping[str, int], words: Sequence[Word]) -> dict[int, str]:
+def find_followers(rig: Rig, parts: Mapping[str, int], words: Sequence[NameWord]) -> dict[int, str]:
     """Return the joints that are named after inverse kinematics and a hand or foot: `ik_foot_l`, `ik_hand_gun`."""
     found: dict[int, str] = {}
     for joint, word in enumerate(words):

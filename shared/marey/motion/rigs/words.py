@@ -42,7 +42,7 @@ TWISTS = frozenset(["twist", "roll", "tweak"])
 
 
 @dataclass(frozen=True)
-class Word:
+class NameWord:
     """A joint's name in parts.
 
     Attributes:
@@ -58,7 +58,7 @@ class Word:
     words: frozenset[str]
 
 
-def read_names(names: Sequence[str]) -> list[Word]:
+def read_names(names: Sequence[str]) -> list[NameWord]:
     """Read the names of all joints of a rig; a letter before a word is a side where the other side has it too."""
     bare = _without_prefix([name.rsplit(":", 1)[-1].rsplit("|", 1)[-1] for name in names])
     known = set(bare)
@@ -74,7 +74,7 @@ def _without_prefix(names: list[str]) -> list[str]:
     return names
 
 
-def _read(name: str, known: set[str]) -> Word:
+def _read(name: str, known: set[str]) -> NameWord:
     words = split(name)
     side = next((_SIDES[word] for word in words if word in _SIDES), None)
     if side is None and (found := _LETTER.match(name)) and name[0] in "lr":
@@ -84,7 +84,7 @@ def _read(name: str, known: set[str]) -> Word:
     rest = [word for word in words if word not in _SIDES]
     plain = [word for word in rest if not word.isdigit() and word not in _KINDS]
     digits = [word for word in rest if word.isdigit()]
-    return Word(side, "".join(plain or rest), int(digits[-1][-4:]) if digits else 0, frozenset(words))
+    return NameWord(side, "".join(plain or rest), int(digits[-1][-4:]) if digits else 0, frozenset(words))
 
 
 def split(name: str) -> list[str]:

@@ -27,7 +27,7 @@ REAL_NAME = "real motions"
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A row: mean and half of the 95 % interval by metric; None = no interval is given.
 
     Attributes:
@@ -45,11 +45,11 @@ class Row:
 
 
 @lru_cache(maxsize=1)
-def published_rows() -> tuple[Row, ...]:
+def published_rows() -> tuple[TableRow, ...]:
     """Return the papers' rows."""
     text = files("marey.evaluator.protocol").joinpath("published.toml").read_text("utf-8")
     return tuple(
-        Row(
+        TableRow(
             each["name"],
             each["source"],
             each["data"],
@@ -60,17 +60,17 @@ def published_rows() -> tuple[Row, ...]:
     )
 
 
-def measured_rows(found: Mapping[str, Any]) -> tuple[Row, ...]:
+def measured_rows(found: Mapping[str, Any]) -> tuple[TableRow, ...]:
     """Return the rows of a run (`run_protocol`), evaluator by evaluator, with intervals over its repeats."""
     repeats: Sequence[Mapping[str, Any]] = found["repeats"]
     names = {"real": REAL_NAME, "generated": found["generator"]}
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for evaluator in found["evaluators"]:
         for kind in repeats[0][evaluator]:
             values = {name: [each[evaluator][kind][name] for each in repeats] for name in repeats[0][evaluator][kind]}
             intervals = {name: repeated(numbers) for name, numbers in values.items()}
             measured = {name: (each.mean, each.half_width) for name, each in intervals.items()}
-            rows.append(Row(names[kind], "measured here", "+".join(found["data"]["names"]), evaluator, measured))
+            rows.append(TableRow(names[kind], "measured here", "+".join(found["data"]["names"]), evaluator, measured))
     return tuple(rows)
 
 
@@ -104,17 +104,17 @@ def markdown_of(found: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rows(found: Mapping[str, Any]) -> tuple[Row, ...]:
+def _rows(found: Mapping[str, Any]) -> tuple[TableRow, ...]:
     names = found["data"]["names"]
     return (*measured_rows(found), *(row for row in published_rows() if names == [row.data]))
 
 
-def _beside(row: Row, evaluator: str, found: Mapping[str, Any]) -> bool:
+def _beside(row: TableRow, evaluator: str, found: Mapping[str, Any]) -> bool:
     """Return True for rows of an evaluator's table: papers' rows stand beside those of their own evaluator alone."""
     return evaluator == row.evaluator or found["kinds"][evaluator] == row.evaluator
 
 
-def _table(rows: Sequence[Row]) -> list[str]:
+def _table(rows: Sequence[TableRow]) -> list[str]:
     head = ["row", "from", *(TITLES[name] for name in METRICS)]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for row in rows:
