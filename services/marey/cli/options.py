@@ -242,6 +242,10 @@ Placement = Annotated[
 Mesh = Annotated[
     bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
 ]
+Loop = Annotated[
+    bool,
+    typer.Option("--loop", help="Cut a cycle out of each motion that can be played on, as `marey edit --loop`."),
+]
 Rig = Annotated[
     str | None,
     typer.Option(

@@ -11,9 +11,11 @@ from typer.testing import CliRunner
 
 from marey.cli.main import app
 from marey.cli.operations import with_operations
+from marey.cli.roles.editing import loop
+from marey.core.errors import InvalidInput
 from marey.core.sides import swap_sides, swap_sides_in
 from marey.editing.judge import judged
-from marey.motion import edit, load_npz, read_glb
+from marey.motion import edit, load_npz, read_fbx, read_glb
 from marey.motion.arrange import placement_of
 from marey.motion.edits.table import OPERATIONS
 from marey.motion.io.bvh import read_bvh
@@ -129,3 +131,20 @@ def test_left_and_right_are_exchanged_in_words(text: str, swapped: str):
     assert swap_sides(text) == swapped
     assert swap_sides(swapped) == text
     assert swap_sides_in({"left": [text, 1, None]}) == {"left": [swapped, 1, None]}
+
+
+def test_a_loop_on_the_skeleton_of_a_character(walk: Path) -> None:
+    run(walk, "-o", walk.with_name("loop.fbx"), "--loop", "--in-place", "travel", "--rig", "mixamo")
+    cycle = read_fbx(walk.with_name("loop.fbx"))
+    assert any(name.endswith("LeftUpLeg") for name in cycle.skeleton.joint_names)
+    assert len(cycle.root) < load_npz(walk).frames
+
+
+def test_a_generated_motion_without_a_cycle_is_named(walk: Path) -> None:
+    clip = load_npz(walk)
+    assert loop(clip, "'walk', seed 3").manifest["loop"]
+    short = edit(clip, [{"op": "trim", "to": 0.3}])[0]
+    with pytest.raises(InvalidInput) as caught:
+        loop(short, "'walk', seed 3")
+    assert caught.value.where == "'walk', seed 3"
+    assert "another seed" in str(caught.value.hint)

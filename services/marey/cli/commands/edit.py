@@ -38,6 +38,9 @@ def edit(
     tpose_frame: options.TPoseFrame = False,
     placement: options.Placement = options.PlacementOption.ORIGIN,
     mesh: options.Mesh = False,
+    rig: options.Rig = None,
+    rig_map: options.RigMap = None,
+    names: options.JointNames = None,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
     **operations: Any,
@@ -54,7 +57,9 @@ def edit(
         steps = _read(ops)
     if not steps:
         raise InvalidInput("no operation is given", hint="Name one, such as --loop; `marey edit --help` lists them.")
-    export = options.export_options(bvh_root, root_bone, None, tpose_frame, options.RestPoseOption.T, placement, mesh)
+    export = options.export_options(
+        bvh_root, root_bone, None, tpose_frame, options.RestPoseOption.T, placement, mesh, rig, rig_map, names
+    )
     for line in edit_files(sources, output, steps, file_format=file_format, export=export, overwrite=overwrite):
         _report(line)
         if as_json:

@@ -59,6 +59,7 @@ def generate(
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
+    loop: options.Loop = False,
     formats: options.Formats = None,
     bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
     root_bone: options.RootBone = False,
@@ -76,6 +77,7 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Generate motions in this process, without a server or a queue."""
+    from marey.cli.roles.editing import loop as loop_clip
     from marey.cli.roles.generating import OneShot
     from marey.client.fetching import check_folder, make_folders
 
@@ -112,8 +114,9 @@ def generate(
     with console.bar() as bar:
         task = bar.add_task("generating", total=len(planned))
         made = studio.make([p.wanted for p in planned])
-        for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
-            line = _write(plan, clip, elapsed, chosen, export, overwrite=overwrite)
+        for plan, (wanted, clip, elapsed) in zip(planned, made, strict=True):
+            result = loop_clip(clip, f"{wanted.prompt!r}, seed {wanted.seed}") if loop else clip
+            line = _write(plan, result, elapsed, chosen, export, overwrite=overwrite)
             bar.advance(task)
             _report_rewrite(clip)
             _report_quality(line)

@@ -65,6 +65,27 @@ def edit_files(
         yield _line(source, path, clip)
 
 
+def loop(clip: MotionClip, where: str) -> MotionClip:
+    """Cut a cycle out of a generated motion, and judge it anew.
+
+    Args:
+        where: prompt and seed, for messages.
+
+    Raises:
+        InvalidInput: it holds no cycle that can be played on.
+    """
+    from marey.editing.judge import judged
+    from marey.motion.edits.editing import edit
+
+    try:
+        (cycle,) = edit(clip, [{"op": "loop"}])
+    except InvalidInput as error:
+        raise InvalidInput(
+            error.message, where=where, hint="Try another seed or a longer motion, or leave out --loop."
+        ) from error
+    return judged(cycle)
+
+
 def _writer(output: Path, file_format: str) -> tuple[Exporter[Any], bool]:
     """Return the exporter of the results, and whether the output names one file."""
     from marey.exporters import exporters
