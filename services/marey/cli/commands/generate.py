@@ -260,7 +260,8 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
     """Return the exporters of the formats, each once; by default all installed ones that are stored.
 
     Raises:
-        InvalidInput: there is none for a format, or none of them has an option of the export.
+        InvalidInput: there is none for a format, none of them has an option of the export, or an unknown rig.
+        NotFound, InvalidFile, TooLarge: the rig cannot be read.
     """
     from marey.exporters import check_options, exporters
 
@@ -273,6 +274,10 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
     stored = [name for name, exporter in known.items() if exporter.stored]
     kinds = [known[name] for name in dict.fromkeys(formats or stored)]
     check_options(kinds, export)
+    if export.rig is not None:
+        from marey.motion.retarget import load_body
+
+        load_body(export.rig, export.rig_map)  # it is kept; a wrong name is found before a bundle is loaded
     return kinds
 
 
