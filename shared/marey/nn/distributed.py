@@ -42,11 +42,11 @@ def broadcast_any(mine: Tensor | None, like: Tensor) -> Tensor | None:
         return mine
     has = torch.zeros(dist.get_world_size(), device=like.device)
     has[rank()] = float(mine is not None)
-    owners = all_reduce_sum(has).nonzero().flatten().tolist()
-    if not owners:
+    owners = all_reduce_sum(has)
+    if not bool(owners.any()):
         return None
     shared = torch.empty_like(like) if mine is None else mine
-    dist.broadcast(shared, src=owners[0])
+    dist.broadcast(shared, src=int(owners.argmax()))
     return shared
 
 

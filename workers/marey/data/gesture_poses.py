@@ -257,7 +257,7 @@ def swings(way: Array, rate: Callable[[Array], Array] | float) -> Array:
     return np.sin(2 * np.pi * phase) * eased((way - _SWING_FROM) / (1 - _SWING_FROM))
 
 
-def stations(frames: int, times: Sequence[float], points: Sequence[Sequence[float]]) -> Array:
+def stations(frames: int, times: Sequence[float], points: Array | Sequence[Sequence[float]]) -> Array:
     """Path (frames, K) through points (n, K) at `times` in seconds, increasing, with a stop at each; ends are held."""
     t = np.arange(frames) / FPS
     at, through = np.asarray(times, np.float64), np.asarray(points, np.float64)
