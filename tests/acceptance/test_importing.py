@@ -87,7 +87,7 @@ def test_refusals_are_one_message_with_place_and_advice(marey: Command, models: 
 
     missing = marey("models", "import", "t2m-evaluator", tmp_path, "-o", models / "x")
     assert missing.code == 3
-    assert "finest.tar" in missing.err
+    assert "Comp_v6_KLD005/meta" in missing.err
     assert str(tmp_path) in missing.err
 
     unread = marey("models", "import", "t2m-evaluator", tmp_path, "-o", models / "x", "--text-encoder", t5)

@@ -55,7 +55,7 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
         Conflict: the bundle already exists.
     """
     download = Download(request.folder, inside=INSIDE)
-    meta = download.find("Comp_v6_KLD005/meta", what="the statistics of the evaluator")
+    meta = download.find("Comp_v6_KLD005/meta", what="the folder of the evaluator's statistics")
     config = config or published_config(meta / "mean.npy")
     motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
     file = download.find("text_mot_match/model/finest.tar", what="the evaluator")
