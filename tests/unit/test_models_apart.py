@@ -23,6 +23,9 @@ NAMING = {
     REGISTERED: "the line that registers it",
     "models/packages/starter/pyproject.toml": "the package of bundles that has its bundle",
     "mkdocs.yml": "the list of pages",
+    "workers/marey/evaluator/protocol/published.toml": "rows of the papers' tables",
+    "tests/unit/evaluator/test_protocol.py": "reads these rows",
+    "tests/acceptance/test_published_data.py": "trains both models of the papers on their data sets",
 }
 """Files that name a model, with the reason."""
 SKIPPED = (".md", ".lock", ".png", ".jpg", ".svg", ".safetensors", ".npz", ".gz", ".bvh", ".csv", ".tsv", ".woff2")

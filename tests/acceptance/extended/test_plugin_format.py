@@ -77,10 +77,10 @@ def test_it_is_generated_without_a_server(installed: Marey, tmp_path: Path) -> N
 
 def test_the_product_alone_does_not_know_it(installed: Marey, offline: Marey, tmp_path: Path) -> None:
     offline("generate", PROMPT, "--bundle", TINY, "--format", "poses", "-o", tmp_path).refused(
-        2, "'poses' is not a known motion format", "bvh, gif, glb, mp4, npz, webp"
+        2, "'poses' is not a known motion format", "bvh, fbx, gif, glb, mp4, npz, smplx, usd, vrma, webp"
     )
     (tmp_path / "a.pose").write_text("{}")
     offline("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(
-        2, "Known: .bvh, .gif, .glb, .mp4, .npz, .webp."
+        2, "Known: .bvh, .fbx, .gif, .glb, .mp4, .npz, .smplx.npz, .usd, .vrma, .webp."
     )
     installed("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "not a file of poses")

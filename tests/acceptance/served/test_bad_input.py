@@ -232,6 +232,6 @@ def test_broken_motion_files(offline: Marey, tmp_path: Path) -> None:
     (tmp_path / "b.npz").write_bytes(b"PK\x03\x04 cut off")
     offline("convert", tmp_path / "b.npz", tmp_path / "b.bvh").refused(2, "b.npz")
     offline("convert", tmp_path / "c.npz", tmp_path / "c.bvh").refused(3, "no such file")
-    offline("convert", tmp_path / "a.fbx", tmp_path / "c.bvh").refused(2, ".fbx", ".bvh, .gif, .glb, .mp4, .npz, .webp")
+    offline("convert", tmp_path / "a.c3d", tmp_path / "c.bvh").refused(2, ".c3d", ".bvh, .fbx, .gif, .glb, .mp4, .npz")
     offline("render", tmp_path / "a.bvh", "-o", tmp_path / "a.gif").refused(2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.bvh", "b.npz"]

@@ -154,7 +154,7 @@ def test_variety_lowers_and_raises_the_temperature() -> None:
     assert variety.low["temperature"] < 1 < variety.high["temperature"]
 
 
-@pytest.mark.parametrize(("width", "encoder"), [(384, "minilm"), (768, "t5-base")])
+@pytest.mark.parametrize(("width", "encoder"), [(384, "minilm"), (768, "clip-vit-l14")])
 def test_a_random_bundle_names_the_encoder_of_its_width(tmp_path: Path, width: int, encoder: str) -> None:
     config = replace(TINY, condition=replace(TINY.condition, text_width=width))
     bundle = random_bundle(tmp_path / "random", config)

@@ -47,12 +47,12 @@ def test_captions_of_all_authors_join_those_of_the_index_and_the_manifest_names_
     data = PreparedData.open(folder / "out")
     files = ("captions-x.csv", "captions-y.csv")
     assert data.manifest.caption_files == {f"studio/{name}": sha256_of(folder / name) for name in files}
-    captured, mirrored = data.clips
+    captured, mirrored = (clip for clip in data.clips if not clip.made)
     assert captured.authors[:3] == mirrored.authors[:3] == (1, 2, 1)
     assert len(captured.authors) == 5  # the words of the vocabulary and sentences for the action come after them
     assert captured.captions[1] == "left foot first, walk"
     assert mirrored.captions[1] == "right foot first, walk"
-    assert data.caption_counts == [captured.authors, mirrored.authors]
+    assert data.caption_counts == [clip.authors for clip in data.clips]
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder:
     pack = pack_set(CaptureSet.own(folder), processes=1)
     build([pack], folder / "out", speed=0.2)
     data = PreparedData.open(folder / "out")
-    found = {clip.id: clip for clip in data.clips}
+    found = {clip.id: clip for clip in data.clips if not clip.made and not clip.spliced}
     assert sorted(found) == sorted(f"{m}{n}" for m in ("", "M") for n in ("a@0", "a@0*0.8", "a@0*1.2", "a@10"))
     assert (found["a@0*0.8"].speed, found["a@0*1.2"].speed) == (0.8, 1.2)
     frames = found["a@0"].length
@@ -104,6 +104,6 @@ def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder:
         bone_lengths(data.joints(found[name]).astype(np.float64), HUMANML3D) for name in ("a@0", "a@0*0.8")
     )
     assert np.abs(slower - captured.mean(axis=0)).max() < 0.003
-    assert data.manifest.kinds == {"captured": 2, "mirrored": 2, "retimed": 4}
+    assert {"captured": 2, "mirrored": 2, "retimed": 4}.items() <= data.manifest.kinds.items()
     with pytest.raises(InvalidInput, match="must be between 0"):
         build([pack], folder / "more", speed=0.9)

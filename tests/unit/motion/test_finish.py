@@ -239,8 +239,8 @@ def test_conversion_refuses_what_it_cannot_do(tmp_path):
     assert (tmp_path / "b.bvh").read_text() == "mine"
     convert(tmp_path / "a.npz", tmp_path / "b.bvh", overwrite=True)
     assert (tmp_path / "b.bvh").read_text().startswith("HIERARCHY")
-    with pytest.raises(InvalidInput, match="fbx"):
-        convert(tmp_path / "a.npz", tmp_path / "b.fbx")
+    with pytest.raises(InvalidInput, match="c3d"):
+        convert(tmp_path / "a.npz", tmp_path / "b.c3d")
     with pytest.raises(NotFound):
         convert(tmp_path / "none.npz", tmp_path / "c.bvh")
     (tmp_path / "bad.bvh").write_text("HIERARCHY\nROOT a\n{\n")

@@ -126,7 +126,7 @@ def test_a_map_overrides_what_is_found():
     assert rig.joint_names[found.parts["left_hand"]] == "mixamorig:LeftHandMiddle1"
     assert found.how["left_hand"] == "map"
     assert "right_toes" not in found.parts
-    for wrong, message in (({"tail": "x"}, "no part of the body"), ({"head": "nose"}, "no joint 'nose'")):
+    for wrong, message in (({"tail": "x"}, "not a part of the body"), ({"head": "nose"}, "no joint 'nose'")):
         with pytest.raises(InvalidInput, match=message):
             map_joints(rig, wrong)
 
