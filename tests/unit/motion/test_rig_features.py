@@ -307,9 +307,8 @@ def test_what_is_no_body_is_finished_without_nan(scale):
 
 def test_features_reach_every_export_format(tmp_path):
     clip = finish_motion(SNAPMOGEN_296.encode_pose(*rigged(7, 45)), SNAPMOGEN_296, manifest={"prompt": "sway"})
-    known = {
-        name: each for name, each in exporters().items() if name not in ("smplx", "usd")
-    }  # a user's model, an extra
+    others = ("smplx", "usd")  # the one needs a model of the user's, the other an extra
+    known = {name: each for name, each in exporters().items() if name not in others}
     files = {name: each.encode(clip, Coordinates()) for name, each in known.items()}
     assert {"bvh", "npz"} <= files.keys()
     back = parse_npz(files["npz"])
