@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -335,6 +336,17 @@ def test_a_larger_transformer_starts_from_a_smaller_one(prepared: PreparedData, 
         RECIPE.part("masked", large, tmp_path / "run")
     train_stage("masked", replace(options(prepared, tmp_path / "run", 2, large), warm=True))
     assert RECIPE.part("masked", large, tmp_path / "run").config["masked"]["layers"] == 4
+
+
+@pytest.mark.parametrize("other", [{"heads": 4}, {"norm_first": False}, {"heads": 1, "layers": 4}])
+def test_a_transformer_that_computes_otherwise_is_no_start(
+    prepared: PreparedData, run: Path, tmp_path: Path, other: dict[str, Any]
+) -> None:
+    """Its weights have the same shapes."""
+    shutil.copytree(run, tmp_path / "run")
+    another = replace(TINY, masked=replace(TINY.masked, **other))
+    with pytest.raises(InvalidInput, match="another masked"):
+        train_stage("masked", replace(options(prepared, tmp_path / "run", 2, another), warm=True))
 
 
 def test_a_transformer_does_not_shrink(prepared: PreparedData, run: Path) -> None:

@@ -8,7 +8,7 @@ run/{stage}/part          the finished part
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeVar
@@ -115,12 +115,12 @@ class TrainingRecipe(Generic[C]):
             NotFound: not trained yet.
             InvalidInput: its networks were built from other values than `config`'s.
         """
-        return self._part(name, config, run, self.built_from[name])
+        return self._part(name, config, run, grows=None)
 
-    def _part(self, name: str, config: C, run: Path, fields: Sequence[str]) -> TrainedPart:
+    def _part(self, name: str, config: C, run: Path, *, grows: str | None) -> TrainedPart:
         part = load_part(run / name / "part")
         theirs = self.read(part.config)
-        differ = [f for f in fields if getattr(theirs, f) != getattr(config, f)]
+        differ = [f for f in self.built_from[name] if not _fits(getattr(theirs, f), getattr(config, f), f == grows)]
         if differ:
             raise InvalidInput(
                 f"was trained with another {differ[0]}",
@@ -138,12 +138,19 @@ class TrainingRecipe(Generic[C]):
         """
         ancestors(options, stage.name)
         if options.warm:
-            own = [field for field in self.built_from[stage.name] if field != self.grows.get(stage.name)]
-            part = self._part(stage.name, options.config, options.run, own)
+            part = self._part(stage.name, options.config, options.run, grows=self.grows.get(stage.name))
             stage.module.load_state_dict(grow(part.state, stage.module.state_dict()))
         if options.recompute:
             set_recompute(stage.module)
         return train(stage, options.options(stage.name), options.config.to_dict())
+
+
+def _fits(theirs: Any, ours: Any, grows: bool) -> bool:
+    """Return True if equal values built the networks, or if the transformer of the one grows into that of the other."""
+    if theirs == ours or not grows:
+        return bool(theirs == ours)
+    larger = dataclasses.replace(theirs, layers=ours.layers, feedforward=ours.feedforward)
+    return bool(larger == ours and ours.norm_first)
 
 
 def ancestors(options: TrainOptions[Any], name: str) -> tuple[Terms, ...]:
