@@ -5,6 +5,15 @@ see docs/extending.md. Importing this package needs the standard library only.
 """
 
 from marey.exporters.exporter import Coordinates, Exporter
-from marey.exporters.registry import GROUP, check_options, exporter_of, exporters, extension_of
+from marey.exporters.registry import GROUP, check_options, exporter_named, exporter_of, exporters, extension_of
 
-__all__ = ["GROUP", "Coordinates", "Exporter", "check_options", "exporter_of", "exporters", "extension_of"]
+__all__ = [
+    "GROUP",
+    "Coordinates",
+    "Exporter",
+    "check_options",
+    "exporter_named",
+    "exporter_of",
+    "exporters",
+    "extension_of",
+]

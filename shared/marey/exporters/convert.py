@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.core.errors import Conflict, InvalidInput
 from marey.exporters.exporter import Coordinates, Exporter
-from marey.exporters.registry import check_options, exporters
+from marey.exporters.registry import check_options, exporter_named, exporters
 from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions, RestPose
 from marey.motion.files import read_limited, write_atomically
@@ -81,13 +81,16 @@ def read_motion(path: Path, coordinates: Coordinates) -> MotionClip:
 
 
 def _exporter_for(path: Path) -> Exporter[Any]:
-    """Return the exporter whose extension a name has; of two, the longer: `a.smplx.npz` is no npz of a motion."""
-    name = path.name.lower()
-    found = [each for each in exporters().values() if name.endswith(f".{each.extension}")]
-    if not found:
+    """Return the exporter of a file.
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    found = exporter_named(path.name)
+    if found is None:
         known = ", ".join(f".{each.extension}" for each in exporters().values())
         raise InvalidInput(f"`{path.suffix}` is not a known motion format", where=str(path), hint=f"Known: {known}.")
-    return max(found, key=lambda each: len(each.extension))
+    return found
 
 
 def _decode(reader: Exporter[Any], path: Path, coordinates: Coordinates) -> MotionClip | BvhClip:

@@ -79,6 +79,14 @@ def extension_of(format: str) -> str:
     return format if found is None else found.extension
 
 
+def exporter_named(file_name: str) -> Exporter[Any] | None:
+    """Return the exporter whose extension a file name has, or None; of two, the longer: `a.smplx.npz` is no npz of a
+    motion."""
+    name = file_name.lower()
+    having = (each for each in exporters().values() if name.endswith(f".{each.extension}"))
+    return max(having, key=lambda each: len(each.extension), default=None)
+
+
 def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> None:
     """Validate that each chosen option acts on the files of a format.
 

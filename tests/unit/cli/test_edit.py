@@ -148,3 +148,9 @@ def test_a_generated_motion_without_a_cycle_is_named(walk: Path) -> None:
         loop(short, "'walk', seed 3")
     assert caught.value.where == "'walk', seed 3"
     assert "another seed" in str(caught.value.hint)
+
+
+def test_an_ending_of_two_parts_names_its_own_format(walk: Path) -> None:
+    said = run(walk, "-o", walk.with_name("a.smplx.npz"), "--mirror", code=2)
+    assert "SMPL-X model" in said
+    assert not walk.with_name("a.smplx.npz").exists()

@@ -88,11 +88,10 @@ def loop(clip: MotionClip, where: str) -> MotionClip:
 
 def _writer(output: Path, file_format: str) -> tuple[Exporter[Any], bool]:
     """Return the exporter of the results, and whether the output names one file."""
-    from marey.exporters import exporters
+    from marey.exporters import exporter_named, exporters
 
     known = exporters()
-    extension = output.suffix.lower().removeprefix(".")
-    named = next((each for each in known.values() if each.extension == extension), None)
+    named = exporter_named(output.name)
     if named is not None and not output.is_dir():
         return named, True
     if file_format not in known:
