@@ -20,13 +20,7 @@ def changed_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
         before: of the prompt with its spelling corrected, so that a typo is no other verb.
         after: of the rewrite.
     """
-    checks = (
-        ("the verbs", _verbs(before), _verbs(after)),
-        ("a side", _bag(before, SIDES), _bag(after, SIDES)),
-        ("a direction", _bag(before, DIRECTIONS), _bag(after, DIRECTIONS)),
-        ("a count", _counts(before), _counts(after)),
-    )
-    for what, was, now in checks:
+    for what, was, now in (("the verbs", _verbs(before), _verbs(after)), *_named(before, after)):
         if was != now:
             return f"it changes {what}: {_list(was)} became {_list(now)}"
     return None
@@ -37,15 +31,19 @@ def lost_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
 
     A description tells in other verbs how the body moves, and names sides and directions that the prompt left open.
     """
-    checks = (
+    for what, was, now in _named(before, after):
+        if lost := set(was) - set(now):
+            return f"it loses {what}: {', '.join(sorted(lost))}"
+    return None
+
+
+def _named(before: SemanticGraph, after: SemanticGraph) -> tuple[tuple[str, Counter[str], Counter[str]], ...]:
+    """Sides, directions and counts before and after."""
+    return (
         ("a side", _bag(before, SIDES), _bag(after, SIDES)),
         ("a direction", _bag(before, DIRECTIONS), _bag(after, DIRECTIONS)),
         ("a count", _counts(before), _counts(after)),
     )
-    for what, was, now in checks:
-        if lost := set(was) - set(now):
-            return f"it loses {what}: {', '.join(sorted(lost))}"
-    return None
 
 
 def _verbs(graph: SemanticGraph) -> Counter[str]:

@@ -71,25 +71,23 @@ _T5_LEFT = "the decoder, or a copy of the embedding"
 _T5_BLOCKS = r"encoder\.block\.(\d+)\."
 _T5_FEED_FORWARD = "encoder.block.0.layer.1.DenseReluDense."
 
+
+def _clip(width: int) -> Published:
+    """CLIP's text tower with states of a width."""
+    return Published(
+        licence="MIT",
+        credit=_CLIP,
+        keep=_CLIP_KEEP,
+        left=_CLIP_LEFT,
+        markers={"text_model.embeddings.token_embedding.weight": width, "text_projection.weight": width},
+        blocks=_CLIP_BLOCKS,
+        layers=("text_config", "num_hidden_layers"),
+    )
+
+
 PUBLISHED = {
-    "clip-vit-b32": Published(
-        licence="MIT",
-        credit=_CLIP,
-        keep=_CLIP_KEEP,
-        left=_CLIP_LEFT,
-        markers={"text_model.embeddings.token_embedding.weight": 512, "text_projection.weight": 512},
-        blocks=_CLIP_BLOCKS,
-        layers=("text_config", "num_hidden_layers"),
-    ),
-    "clip-vit-l14": Published(
-        licence="MIT",
-        credit=_CLIP,
-        keep=_CLIP_KEEP,
-        left=_CLIP_LEFT,
-        markers={"text_model.embeddings.token_embedding.weight": 768, "text_projection.weight": 768},
-        blocks=_CLIP_BLOCKS,
-        layers=("text_config", "num_hidden_layers"),
-    ),
+    "clip-vit-b32": _clip(512),
+    "clip-vit-l14": _clip(768),
     "t5-base": Published(
         "Apache-2.0", _T5, _T5_KEEP, _T5_LEFT,
         {"shared.weight": 768, f"{_T5_FEED_FORWARD}wi.weight": 768}, _T5_BLOCKS, ("num_layers",),

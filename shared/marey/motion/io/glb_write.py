@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -180,6 +180,17 @@ def animation_of(posed: Arranged, numbers: Numbers) -> dict[str, Any]:
     tracks = [(joint, "rotation", "VEC4", turns[:, joint]) for joint in range(turns.shape[1])]
     places = posed.positions
     tracks += [(joint, "translation", "VEC3", places[:, joint]) for joint in range(places.shape[1])]
+    return animation_with(tracks, time, numbers)
+
+
+def animation_with(tracks: Iterable[tuple[int, str, str, NDArray[Any]]], time: int, numbers: Numbers) -> dict[str, Any]:
+    """Return an animation with a channel for each track.
+
+    Args:
+        tracks: node, what is moved of it, type of the accessor, and values (T, 3 or 4).
+        time: accessor of the times of all tracks.
+        numbers: where the values go.
+    """
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     for joint, path, kind, values in tracks:

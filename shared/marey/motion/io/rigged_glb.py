@@ -8,7 +8,17 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.motion.export_options import PLAIN, ExportOptions
-from marey.motion.io.glb_write import FEET, GENERATOR, Numbers, chosen_options, floats, pack, plain, spans
+from marey.motion.io.glb_write import (
+    FEET,
+    GENERATOR,
+    Numbers,
+    animation_with,
+    chosen_options,
+    floats,
+    pack,
+    plain,
+    spans,
+)
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, to_matrix, unroll
@@ -97,12 +107,7 @@ def _animation(motion: RiggedMotion, numbers: Numbers) -> dict[str, Any]:
         (joint, "translation", "VEC3", motion.translations[:, joint] / units[joint])
         for joint in np.flatnonzero(motion.moving).tolist()
     ]
-    channels: list[dict[str, Any]] = []
-    samplers: list[dict[str, Any]] = []
-    for joint, path, kind, values in tracks:
-        channels.append({"sampler": len(samplers), "target": {"node": joint, "path": path}})
-        samplers.append({"input": time, "interpolation": "LINEAR", "output": numbers.add(kind, values)})
-    return {"name": "motion", "channels": channels, "samplers": samplers}
+    return animation_with(tracks, time, numbers)
 
 
 def _extras(motion: RiggedMotion, options: ExportOptions) -> dict[str, Any]:

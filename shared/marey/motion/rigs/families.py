@@ -63,6 +63,20 @@ _CALLED = {
     "pinky": ("pinky", "little", "fpinky"),
 }
 
+_SMPL = """
+        hips pelvis
+        head head
+        shoulder {s}collar
+        upper_arm {s}shoulder
+        lower_arm {s}elbow
+        hand {s}wrist
+        upper_leg {s}hip
+        lower_leg {s}knee
+        foot {s}ankle
+        toes {s}foot
+    """
+"""Names of SMPL and SMPL-X, which differ in their words for the sides, and in the fingers."""
+
 FAMILIES: tuple[Family, ...] = (
     _family("mixamo", ("left", "right"), "{s}hand{f}{n}", """
         hips hips
@@ -176,30 +190,8 @@ FAMILIES: tuple[Family, ...] = (
         foot {s}foot
         toes {s}toebase
     """),
-    _family("smpl", ("l", "r"), "", """
-        hips pelvis
-        head head
-        shoulder {s}collar
-        upper_arm {s}shoulder
-        lower_arm {s}elbow
-        hand {s}wrist
-        upper_leg {s}hip
-        lower_leg {s}knee
-        foot {s}ankle
-        toes {s}foot
-    """),
-    _family("smplx", ("left", "right"), "{s}{f}{n}", """
-        hips pelvis
-        head head
-        shoulder {s}collar
-        upper_arm {s}shoulder
-        lower_arm {s}elbow
-        hand {s}wrist
-        upper_leg {s}hip
-        lower_leg {s}knee
-        foot {s}ankle
-        toes {s}foot
-    """),
+    _family("smpl", ("l", "r"), "", _SMPL),
+    _family("smplx", ("left", "right"), "{s}{f}{n}", _SMPL),
     _family("snapmogen", ("l", "r"), "", """
         hips root
         head cheadbindjnt
