@@ -162,8 +162,8 @@ def test_an_interrupt_ends_the_command_and_all_that_draws(api: LiveApi, tmp_path
         assert running.poll() is None, "it has ended"
         time.sleep(0.05)
     os.killpg(running.pid, signal.SIGINT)
-    assert running.wait(30) == 130
+    assert running.wait(120) == 130
     progress, *rest = running.communicate()[1].splitlines()
     assert ("drawing" in progress, rest) == (True, ["marey: interrupted"])
-    assert psutil.wait_procs(drawing, timeout=10)[1] == []
+    assert psutil.wait_procs(drawing, timeout=60)[1] == []
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("r.png", b"old")]

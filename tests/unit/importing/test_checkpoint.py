@@ -158,6 +158,7 @@ def zip_of(name: str, compression: int = zipfile.ZIP_STORED) -> bytes:
         (zip_of("archive/data.pkl", zipfile.ZIP_DEFLATED), "is packed"),
         (pickle.dumps([1, 2]), "cannot be read|holds list"),
     ],
+    ids=["empty", "page", "pointer", "gzip", "tar", "text", "zip", "packed zip", "pickle"],
 )
 def test_other_formats_are_named(tmp_path: Path, content: bytes, said: str) -> None:
     file = tmp_path / "net.tar"
