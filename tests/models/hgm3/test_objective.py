@@ -309,3 +309,17 @@ def test_gradients_of_parts_add_up_to_those_of_the_batch(prepared: PreparedData,
     assert whole.keys() == parts.keys()
     for name, wanted in whole.items():
         torch.testing.assert_close(parts[name], wanted, atol=1e-6, rtol=1e-4, msg=name)
+
+
+def test_both_transformers_learn_the_phases_and_speeds_that_are_asked_for(prepared: PreparedData) -> None:
+    """One sequence of tokens a clip, from its first frame, and no clips at other speeds than captured."""
+    tokenizer, tokens, captions = encoded(prepared, TINY)
+    slower = [clip.model_copy(update={"speed": 0.85}) if k % 2 else clip for k, clip in enumerate(prepared.clips)]
+    for phases, speeds in ((1, False), (4, True)):
+        config = replace(TINY, phases=phases, speeds=speeds)
+        masked = MaskedStage(config, slower, tokens, captions)
+        residual = ResidualStage(config, slower, tokens, captions, tokenizer.codebooks)
+        for stage in (masked, residual):
+            assert bool(np.any(stage.pairs.train % 2)) == speeds
+            assert stage.tokens.phases == phases
+            assert torch.equal(stage.tokens.starts, tokens.starts[:, :phases])

@@ -103,7 +103,9 @@ def test_what_was_drawn_is_further_clips_with_the_caption_that_it_was_drawn_for(
     tokenizer = another_tokenizer()
     tokens = TokenData.encode(tokenizer, data)
     captions = CaptionData.of(CaptionTexts.load(joined_data), joined_data.caption_counts, TINY.condition, CPU)
-    clips, more, said = drawn.extend(joined_data.clips, tokens, captions)
+    slowed = [clip.model_copy(update={"speed": 0.85}) for clip in joined_data.clips]
+    clips, more, said = drawn.extend(slowed, tokens, captions)
+    assert clips[:-2] == slowed
     assert clips[-2:] == [joined_data.clips[7], joined_data.clips[2]]
     for row, (motion, code, length) in enumerate([(of_first, 1, 9), (of_second, 2, 7)], start=len(joined_data.clips)):
         for phase in range(tokens.phases):

@@ -78,7 +78,9 @@ class Drawn:
             starts=torch.cat([tokens.starts, starts[:, None].expand(-1, tokens.phases)]),
             lengths=torch.cat([tokens.lengths, lengths[:, None].expand(-1, tokens.phases)]),
         )
-        return [*clips, *(clips[clip] for clip in self.clips)], more, captions.with_single(self.clips, self.captions)
+        # Drawn for a slower clip or not, a motion plays at its own speed.
+        own = [clips[clip].model_copy(update={"speed": 1.0}) for clip in self.clips]
+        return [*clips, *own], more, captions.with_single(self.clips, self.captions)
 
 
 def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> Drawn | None:

@@ -6,7 +6,7 @@ Random choices use a numpy generator that the loop seeds from (seed, step, rank)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -132,6 +132,10 @@ class TokenData:
     def phases(self) -> int:
         """Return P."""
         return self.starts.shape[1]
+
+    def first_phases(self, count: int) -> TokenData:
+        """Return the same clips at their first `count` phases, or at all if there are fewer."""
+        return replace(self, starts=self.starts[:, :count], lengths=self.lengths[:, :count])
 
     def log_shares(self, codes: int, clips: NDArray[np.int64]) -> Tensor:
         """Return the logarithm of each code's frequency (V, K) in `clips`, those that are trained on, at all phases:

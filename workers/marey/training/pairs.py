@@ -17,7 +17,7 @@ from marey.training.sentences import SentenceData
 
 class Pairs:
     """Clips that have captions and are long enough; with `natural`, without those made longer or shorter than
-    captured."""
+    captured; without `speeds`, at their captured speed alone."""
 
     def __init__(
         self,
@@ -27,10 +27,13 @@ class Pairs:
         min_tokens: int,
         *,
         natural: bool = False,
+        speeds: bool = True,
     ) -> None:
         usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (captions.count > 0)
         if natural:
             usable &= [len(clip.acts) > 1 or not clip.spliced for clip in clips]
+        if not speeds:
+            usable &= [clip.speed == 1 for clip in clips]
         splits = np.array([c.split for c in clips])
         self.train = np.flatnonzero(usable & (splits == "train"))
         self.validation = np.flatnonzero(usable & (splits == "val"))

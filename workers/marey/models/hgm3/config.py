@@ -127,6 +127,11 @@ class HGM3Config(ModelConfig):
     in_order: bool = False  # ours: prompts of several actions are read in the order of time (`TextSpec.in_order`)
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
+    phases: Count = field(default=4, metadata=ADDED)
+    """Ours: by how many token sequences, from its frames 0, 1, … on, both transformers learn a clip; at most the frames
+    of a token. One is learned by heart in fewer steps."""
+    speeds: bool = field(default=True, metadata=ADDED)
+    """Ours: both transformers learn clips that `data prepare --speed` made slower or faster, too."""
     residual_drop: Share = 0.2  # condition drop of the residual transformer
     length_hidden: tuple[Count, ...] = (512, 256, 128)  # widths of the length estimator (MoMask)
     mining: MiningConfig = MiningConfig()

@@ -77,12 +77,12 @@ class MaskedStage:
     def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
         self.config = config
         self.optimisation = config.train_masked
-        self.tokens, self.captions = tokens, captions
+        self.tokens, self.captions = tokens.first_phases(config.phases), captions
         self.module = MaskedModule(config).to(tokens.tokens.device)
-        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
+        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds)
         captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
-            self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
+            self.module.masked.head.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return F (with the graph) and G as separate groups."""

@@ -55,13 +55,13 @@ class ResidualStage:
     ) -> None:
         self.config = config
         self.optimisation = config.train_residual
-        self.tokens, self.captions = tokens, captions
+        self.tokens, self.captions = tokens.first_phases(config.phases), captions
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
-        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
+        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds)
         captions.standardise(self.module.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
-            self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
+            self.module.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
