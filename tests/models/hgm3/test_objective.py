@@ -323,3 +323,12 @@ def test_both_transformers_learn_the_phases_and_speeds_that_are_asked_for(prepar
             assert bool(np.any(stage.pairs.train % 2)) == speeds
             assert stage.tokens.phases == phases
             assert torch.equal(stage.tokens.starts, tokens.starts[:, :phases])
+
+
+def test_random_masks_do_not_train_the_loss_predictor(prepared: PreparedData) -> None:
+    for mask, trained in (("random", False), ("hard", True)):
+        stage = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, mask=mask)))
+        loss, logs = stage.loss(StepContext(0, 0.5, np.random.default_rng(0)))
+        loss.backward()
+        assert all((p.grad is not None) == trained for p in stage.module.predictor.parameters())
+        assert (float(logs["ranking"]) > 0) == trained

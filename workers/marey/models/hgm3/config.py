@@ -80,7 +80,7 @@ class ConditionConfig:
 class MiningConfig:
     """Hard token mining (HGM³ Sec. 3.2)."""
 
-    mask: Literal["hard", "random"] = "hard"  # random = α is 0 throughout
+    mask: Literal["hard", "random"] = "hard"  # random = α is 0 throughout, and the loss predictor is not trained
     alpha_start: Share = 0.0  # α_0 of eq. 8
     alpha_end: Share = 0.5  # α_T of eq. 8
     momentum: Momentum = 0.999  # λ of eq. 6; the paper gives none

@@ -192,8 +192,14 @@ class MaskedStage:
         visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
         logits = model(self._shown(targets, masked), valid, condition, visible, masked)
         losses = token_losses(logits, targets)
-        predicted = self._predict(self.module.predictor, sample, nodes.detach(), valid)
-        return losses, masked, hits(logits.detach(), targets), ranking_loss(predicted, losses, masked)
+        return losses, masked, hits(logits.detach(), targets), self._ranking(sample, nodes.detach(), losses, masked)
+
+    def _ranking(self, sample: MaskedSample, nodes: Tensor, losses: Tensor, masked: Tensor) -> Tensor:
+        """Return G's loss (B,): zero with random masks, which do not ask it; it took a third of a step."""
+        if self.config.mining.mask == "random":
+            return losses.new_zeros(len(losses))
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        return ranking_loss(self._predict(self.module.predictor, sample, nodes, valid), losses, masked)
 
     def _predict(self, predictor: LossPredictor, sample: MaskedSample, nodes: Tensor, valid: Tensor) -> Tensor:
         condition = predictor.condition(nodes, sample.dropped)
