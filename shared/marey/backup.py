@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeVar
 from uuid import UUID, uuid4
@@ -17,7 +17,7 @@ from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among
 from marey.jobs import tables
 from marey.jobs.leases import AssetDigest
-from marey.jobs.states import ENDED, ItemStage, JobControl, Review
+from marey.jobs.states import ENDED, ItemStage, JobControl, JobKind, Review
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
 from marey.vocabulary.scope import ScopePolicy
 
@@ -81,6 +81,8 @@ class ItemRecord(_Record):
     finished_at: AwareDatetime
     replaces: UUID | None
     scope: dict[str, Any] | None = None
+    edits: dict[str, Any] | None = None
+    edited_from: list[UUID] = Field(default_factory=list[UUID])
     motion: MotionRecord | None
 
 
@@ -109,6 +111,7 @@ class JobRecord(_Record):
     finished_at: AwareDatetime
     erased_at: AwareDatetime | None
     scope: ScopePolicy = "ignore"
+    kind: JobKind = JobKind.GENERATE
 
 
 class JobBackup(_Record):
@@ -179,8 +182,9 @@ def back_up(conn: sa.Connection, tenant: str, job: UUID) -> JobBackup:
         row["item_id"]: {k: v for k, v in row.items() if k != "item_id"} | {"files": files.get(row["id"], [])}
         for row in _rows(conn, tables.motion, MotionRecord, motion.job_id == job, more=["item_id"])
     }
+    sources = _sources_of(conn, job)
     items = [
-        {**row, "motion": motions.get(row["id"])}
+        {**row, "motion": motions.get(row["id"]), "edited_from": sources[row["id"]]}
         for row in _rows(conn, tables.item, ItemRecord, tables.item.c.job_id == job, order="position")
     ]
     events = _rows(conn, tables.job_event, EventRecord, tables.job_event.c.job_id == job, order="seq")
@@ -234,6 +238,9 @@ def _write_job(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:
         conn.execute(sa.insert(tables.item), [_item_row(job.id, item) for item in some])
     _end_items(conn, backup, lease)
     _write_motions(conn, tenant, backup)
+    linked = [{"item_id": item.id, "source_id": source} for item in backup.items for source in item.edited_from]
+    for some in _chunks(linked):
+        conn.execute(sa.insert(tables.edited_from), some)
     replaced = [{"b_id": item.id, "b_replaces": item.replaces} for item in backup.items if item.replaces]
     if replaced:
         table = tables.item
@@ -251,7 +258,7 @@ def _write_job(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:
 
 def _item_row(job: UUID, item: ItemRecord) -> dict[str, object]:
     """Return an item in the state ready. A backup holds no text features, so the item names none."""
-    left = {"motion", "state", "reason", "attempts", "problem", "finished_at", "replaces", "stage"}
+    left = {"motion", "state", "reason", "attempts", "problem", "finished_at", "replaces", "stage", "edited_from"}
     at_text = item.stage is ItemStage.TEXT
     return {
         **item.model_dump(exclude=left),
@@ -314,6 +321,16 @@ def _rows(
 ) -> list[Mapping[str, Any]]:
     columns = [table.c[name] for name in (*record.model_fields, *more) if name in table.c]
     return [dict(row) for row in conn.execute(sa.select(*columns).where(*wanted).order_by(table.c[order])).mappings()]
+
+
+def _sources_of(conn: sa.Connection, job: UUID) -> defaultdict[UUID, list[UUID]]:
+    """Return the motions that each item of a job was made from."""
+    made, item = tables.edited_from, tables.item.c
+    found: defaultdict[UUID, list[UUID]] = defaultdict(list)
+    query = sa.select(made.c.item_id, made.c.source_id).join(tables.item, item.id == made.c.item_id)
+    for each, source in conn.execute(query.where(item.job_id == job).order_by(made.c.source_id)):
+        found[each].append(source)
+    return found
 
 
 def _erasing(job: UUID) -> sa.Select[int]:

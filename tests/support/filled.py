@@ -39,7 +39,7 @@ from marey.streams import (
     end_stream,
     take_stream,
 )
-from marey.takes import erase, reroll, review
+from marey.takes import NewEdit, erase, reroll, review, submit_edit
 from marey.tenants import DEFAULT_TENANT, Actor, Quotas, audit, create_key, create_tenant, rotate_key
 from marey.webhooks import Attempt, EventKind, claim_deliveries, record_attempt
 from tests.servers.jobs import MODEL, PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
@@ -51,6 +51,7 @@ TRACE = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01"
 JUDGE = "judge"
 STATES = {
     ("job", "state"): {"queued", "running", "paused", "succeeded", "cancelled", "partial", "failed"},
+    ("job", "kind"): {"generate", "edit"},
     ("item", "state"): {"ready", "leased", "succeeded", "failed", "dead", "cancelled"},
     ("item", "stage"): {"text", "generate"},
     ("asset", "state"): {"writing", "stored"},
@@ -102,6 +103,8 @@ def _jobs(engine: sa.Engine) -> None:
         review(conn, DEFAULT_TENANT, motions[1:2], Review.REJECTED, by="ann")
         reroll(conn, DEFAULT_TENANT, motions[2:3], lambda item: new_item(item.index, item.prompt), by="ann")
     _made_files(engine, motions[0])
+    with transaction(engine) as conn:
+        submit_edit(conn, NewEdit(motions[0], [{"op": "mirror"}]))
     _end(engine, retryable=False)
     _end(engine, retryable=True)
     _die(engine)

@@ -18,6 +18,7 @@ from marey.api.broadcaster import EventBroadcaster
 from marey.api.catalogue import Catalogue
 from marey.api.context import CONNECTIONS, Context
 from marey.api.docs.routes import router as docs_router
+from marey.api.edits.routes import router as edits_router
 from marey.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from marey.api.evaluations.routes import router as evaluations_router
 from marey.api.health.checks import readiness_checks
@@ -59,8 +60,8 @@ from marey.storage import open_store
 from marey.webhooks.vault import Vault
 
 ROUTERS = (
-    *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, docs_router, models_router),
-    texts_router,
+    *(health_router, home_router, jobs_router, motions_router, edits_router, streams_router, live_router, docs_router),
+    *(models_router, texts_router),
     *(evaluations_router, schedules_router, webhooks_router, references_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)

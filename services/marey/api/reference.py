@@ -27,6 +27,7 @@ EXAMPLES: dict[tuple[str, str], Any] = {
     ("JobPatch", "application/json"): {"priority": 50, "comment": "for tonight's review"},
     ("NewReviewBody", "application/json"): {"motions": [_MOTION], "verdict": "kept", "comment": "clean feet"},
     ("NewRerollBody", "application/json"): {"motions": [_MOTION], "comment": "slides at the end"},
+    ("NewEditBody", "application/json"): {"ops": [{"op": "trim", "from": 0.5, "to": 3.2}, {"op": "loop"}]},
     ("NewStreamBody", "application/json"): {"prompt": "a person walks forward", "seconds": 60.0, "seed": 7},
     ("ParseBody", "application/json"): {"prompts": ["a person walks forward and waves"], "model": "hgm3"},
     ("NewEvaluationBody", "application/json"): {**_MEASURED, "name": "nightly"},

@@ -20,14 +20,14 @@ from celery import Celery
 from marey.core import metrics
 from marey.core.errors import InvalidInput, Unreachable
 from marey.db import QUEUE_CHANNEL, Listener, transaction
-from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, live_workers, waiting_batches
+from marey.jobs import EDIT_QUEUE, EVALUATOR_QUEUE, TEXT_QUEUE, live_workers, waiting_batches
 from marey.runtime.app import DRAIN, PUBLISH_RETRY
 from marey.runtime.logs import logger
 from marey.scheduler.components import SchedulerComponent
 
 log = logger(__name__)
 
-BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1}
+BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1, EDIT_QUEUE: 8}
 DEFAULT_BATCH_SIZE = 32
 """Items per claim, for counting waiting batches; a wrong value costs a hint, never an item."""
 

@@ -42,16 +42,18 @@ from marey.jobs.motions import get_motion, motions_of
 from marey.jobs.operate import cancel, pause, resume, retry, set_comment, set_fail_early, set_priority
 from marey.jobs.policy import Policy, policy
 from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
-from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobKind, JobState, Review
 from marey.jobs.submit import submit
 from marey.jobs.sweep import make_due, sweep
 from marey.jobs.types import (
+    EDIT_QUEUE,
     EVALUATOR_QUEUE,
     MAX_KEEP_DAYS,
     NO_TEXT,
     PRIORITY_LIMIT,
     SEED_LIMIT,
     TEXT_QUEUE,
+    Edits,
     EventRow,
     FailureReason,
     ItemRow,
@@ -65,6 +67,7 @@ from marey.jobs.types import (
 from marey.jobs.workers import beat, list_schedulers, list_workers, live_workers, record_scheduler_heartbeat, retire
 
 __all__ = [
+    "EDIT_QUEUE",
     "EVALUATOR_QUEUE",
     "MAX_KEEP_DAYS",
     "NO_TEXT",
@@ -75,6 +78,7 @@ __all__ = [
     "Claim",
     "ClaimedItem",
     "Committed",
+    "Edits",
     "Estimate",
     "EventRow",
     "FailureReason",
@@ -85,6 +89,7 @@ __all__ = [
     "ItemStage",
     "ItemState",
     "JobControl",
+    "JobKind",
     "JobRow",
     "JobState",
     "MotionFile",

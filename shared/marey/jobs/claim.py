@@ -16,6 +16,7 @@ from marey.jobs.journal import LockedJob, lock_job, record
 from marey.jobs.leases import Claim, ClaimedItem, HeartbeatReply
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import ItemStage, ItemState, JobControl
+from marey.jobs.types import Edits
 from marey.tenants.quotas import runnable_items
 
 LANES_TRIED = 8  # lanes tried in a claim; a worker that finds all of them emptied by others claims again
@@ -76,7 +77,8 @@ TAKE = sa.text(f"""
     )
     UPDATE item SET state = 'leased', lease_token = :token FROM picked WHERE item.id = picked.id
     RETURNING item.id, item.position, item.index, item.variant, item.model, item.bundle, item.text_key, item.seed,
-              item.settings, item.attempts, item.stage, item.scope, {", ".join(f"item.{name}" for name in SPEC_FIELDS)}
+              item.settings, item.attempts, item.stage, item.scope, item.edits,
+              {", ".join(f"item.{name}" for name in SPEC_FIELDS)}
 """)  # noqa: S608
 
 ALONE = sa.text("SELECT EXISTS (SELECT FROM lease WHERE job_id = :job AND queue = :queue AND solo)")
@@ -264,5 +266,5 @@ def _take(
 def _claimed(row: sa.RowMapping) -> ClaimedItem:
     values: dict[str, Any] = dict(row)
     del values["stage"]
-    values["tags"] = tuple(row["tags"])
+    values.update(tags=tuple(row["tags"]), edits=Edits.of(row["edits"]))
     return ClaimedItem(**values)

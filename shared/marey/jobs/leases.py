@@ -9,7 +9,7 @@ from uuid import UUID
 
 from marey.items.item import ItemSpec
 from marey.jobs.states import ItemStage, ItemState
-from marey.jobs.types import FailureReason, JsonObject
+from marey.jobs.types import Edits, FailureReason, JsonObject
 from marey.vocabulary.scope import ScopePolicy
 
 
@@ -29,6 +29,8 @@ class ClaimedItem(ItemSpec):
     attempts: int
     scope: JsonObject | None = None
     """Scope of the prompt (`marey.vocabulary.scope.Scope.as_json`); None = not examined."""
+    edits: Edits | None = None
+    """Operations on stored motions; None = the motion is generated."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import no_such_job
 from marey.jobs.motions import read_motions
-from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
-from marey.jobs.types import EventRow, FailureReason, ItemRow, JobRow, MotionRow
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobKind, JobState, Review
+from marey.jobs.types import Edits, EventRow, FailureReason, ItemRow, JobRow, MotionRow
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
@@ -122,12 +122,13 @@ def _jobs() -> sa.Select[*tuple[Any, ...]]:
         (table.finished_at + sa.func.make_interval(0, 0, 0, table.keep_days)).label("expires"),
         table.erased_at.label("erased"),
         table.scope,
+        table.kind,
     )
 
 
 def _job(row: sa.RowMapping) -> JobRow:
     values: dict[str, Any] = dict(row)
-    values.update(control=JobControl(row["control"]), state=JobState(row["state"]))
+    values.update(control=JobControl(row["control"]), state=JobState(row["state"]), kind=JobKind(row["kind"]))
     return JobRow(**values)
 
 
@@ -138,6 +139,7 @@ def _items() -> sa.Select[*tuple[Any, ...]]:
         *(table.model, table.bundle, table.seed, table.settings, table.stage, table.state),
         *(table[name] for name in SPEC_FIELDS),
         *(table.attempts, table.solo, table.run_after, table.reason, table.problem, table.replaces, table.scope),
+        table.edits,
         table.created_at.label("created"),
         table.finished_at.label("finished"),
     )
@@ -157,6 +159,7 @@ def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
         state=ItemState(row["state"]),
         tags=tuple(row["tags"]),
         problem=None if problem is None else FailureReason(**problem),
+        edits=Edits.of(row["edits"]),
         motion=motion,
     )
     return ItemRow(**values)

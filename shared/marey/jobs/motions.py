@@ -13,7 +13,7 @@ from marey.db.sql import among
 from marey.jobs import tables
 from marey.jobs.files import files_of
 from marey.jobs.states import Review
-from marey.jobs.types import MotionFile, MotionRow
+from marey.jobs.types import Edits, MotionFile, MotionRow
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
@@ -56,7 +56,7 @@ def read_motions(
             *(item.name, item.prompt, item.model, item.bundle, motion.licence, item.seed, item.variant),
             *(motion.frames, motion.fps, motion.elapsed, motion.metadata.label("metadata")),
             motion.created_at.label("created"),
-            *(item.index, item.tags, item.replaces, later.c.id.label("replaced_by")),
+            *(item.index, item.tags, item.replaces, item.edits, later.c.id.label("replaced_by")),
             *(motion.review, motion.reviewed_at.label("reviewed"), motion.reviewed_by, motion.review_comment),
         )
         .join(tables.item, item.id == motion.item_id)
@@ -71,6 +71,10 @@ def read_motions(
 
 def _motion(row: sa.RowMapping, files: Sequence[MotionFile]) -> MotionRow:
     values: dict[str, Any] = dict(row)
-    review = row["review"]
-    values.update(tags=tuple(row["tags"]), review=None if review is None else Review(review))
+    review, edits = row["review"], Edits.of(values.pop("edits"))
+    values.update(
+        tags=tuple(row["tags"]),
+        review=None if review is None else Review(review),
+        edited_from=() if edits is None else edits.sources,
+    )
     return MotionRow(**values, files=tuple(files))

@@ -15,7 +15,7 @@ from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job_of, r
 from marey.jobs.listings import get_job
 from marey.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
 from marey.jobs.submit import check_share
-from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, JobRow
+from marey.jobs.types import EDIT_QUEUE, EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, JobRow
 from marey.tenants.quotas import reserve_quotas
 
 
@@ -200,7 +200,7 @@ def refuse_erased(job: LockedJob, verb: str) -> None:
 def _refuse_unread(conn: sa.Connection, job: UUID, items: sa.ColumnElement[bool]) -> None:
     """Validate that no item lacks text features. A backup holds none, so a restored item could not be generated."""
     table = tables.item.c
-    unread = items & (table.text_key == NO_TEXT) & (table.model != EVALUATOR_QUEUE)
+    unread = items & (table.text_key == NO_TEXT) & table.model.not_in((EDIT_QUEUE, EVALUATOR_QUEUE))
     if conn.execute(sa.select(table.id).where(unread).limit(1)).one_or_none() is not None:
         raise Conflict(
             "items of this job came from a backup, and cannot be retried",

@@ -30,6 +30,15 @@ class ItemStage(StrEnum):
     GENERATE = "generate"
 
 
+class JobKind(StrEnum):
+    """Work of a job's items."""
+
+    GENERATE = "generate"
+    """Motions from prompts, or the score of an evaluation."""
+    EDIT = "edit"
+    """Motions from stored motions."""
+
+
 class JobControl(StrEnum):
     """The operator's intent for a job."""
 

@@ -44,7 +44,7 @@ TEXTS_LOCK = 0x6D617265
 
 COLUMNS = (
     *("id", "job_id", "position", "index", "variant", "model", "bundle", "seed", "settings", "text_key"),
-    *("generate_batch_key", "stage", "queue", "batch_key", "replaces", "scope"),
+    *("generate_batch_key", "stage", "queue", "batch_key", "replaces", "scope", "edits"),
     *SPEC_FIELDS,
 )
 _spec: Callable[[NewItem], tuple[object, ...]] = attrgetter(*SPEC_FIELDS)
@@ -86,6 +86,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
             keep_days=job.keep_days,
             traceparent=job.traceparent,
             scope=job.scope,
+            kind=job.kind,
         )
     )
     lanes = write_items(conn, identifier, job.items, scope=job.scope)
@@ -161,6 +162,7 @@ def _row(item: NewItem, job: UUID, position: int, stage: ItemStage, lane: Lane) 
         *(new_id(), job, position, item.index, item.variant, item.model, item.bundle, item.seed),
         *(json.dumps(dict(item.settings)), item.text_key, item.batch_key, str(stage), *lane, item.replaces),
         None if item.scope is None else json.dumps(dict(item.scope)),
+        None if item.edits is None else json.dumps(item.edits.as_json()),
         *map(_as_column, _spec(item)),
     )
 

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB, TSVECTOR
 
 from marey.db.tables import NOW, Id, Time, metadata, one_of, short_id
-from marey.jobs.states import ItemStage, ItemState, JobControl, Review
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobKind, Review
 from marey.vocabulary.scope import POLICIES
 
 # The rule of `states.job_state`.
@@ -64,7 +64,9 @@ job = sa.Table(
         name="counters",
     ),
     sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
+    sa.Column("kind", sa.Text, nullable=False, server_default=str(JobKind.GENERATE)),
     sa.CheckConstraint(one_of("scope", POLICIES), name="scope"),
+    sa.CheckConstraint(one_of("kind", list(JobKind)), name="kind"),
     sa.CheckConstraint("traceparent ~ '^00-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}$'", name="traceparent"),
     sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),  # the order of earlier releases
     sa.Index("ix_job_created", "tenant_id", "created_at", "id"),
@@ -109,6 +111,7 @@ item = sa.Table(
     sa.Column("finished_at", Time),
     # Replaced motion of a re-roll.
     sa.Column("replaces", Id, sa.ForeignKey("motion.id", ondelete="SET NULL", use_alter=True)),
+    sa.Column("edits", JSONB),  # `marey.jobs.types.Edits`; null = not an edit
     sa.CheckConstraint(one_of("state", list(ItemState)), name="state"),
     sa.CheckConstraint(one_of("stage", list(ItemStage)), name="stage"),
     sa.CheckConstraint("(state = 'leased') = (lease_token IS NOT NULL)", name="lease"),
@@ -146,6 +149,16 @@ item = sa.Table(
         postgresql_using="gin",
         postgresql_where=sa.text("state = 'succeeded'"),
     ),
+)
+
+# Every motion that an edit is made from, with the sources of its sources. No foreign key to them: edits stay when a
+# source is deleted, and a restored job may be older than its edits.
+edited_from = sa.Table(
+    "edited_from",
+    metadata,
+    sa.Column("item_id", Id, sa.ForeignKey("item.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("source_id", Id, primary_key=True),
+    sa.Index("ix_edited_from_source_id", "source_id"),
 )
 
 lane = sa.Table(

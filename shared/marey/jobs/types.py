@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TypeVar
+from typing import Any, TypeVar
 from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.items.item import ItemSpec
-from marey.jobs.states import ItemStage, ItemState, JobControl, JobState, Review
+from marey.jobs.states import ItemStage, ItemState, JobControl, JobKind, JobState, Review
 from marey.tenants.types import DEFAULT_TENANT
 from marey.vocabulary.scope import ScopePolicy
 
 TEXT_QUEUE = "text"
 EVALUATOR_QUEUE = "evaluator"
 """The queue of score items."""
+EDIT_QUEUE = "edit"
+"""The queue of edits of stored motions; also `model` and `bundle` of their items."""
 NO_TEXT = ""
 """`text_key` of an item without text features: it starts at `generate`."""
 SEED_LIMIT = 2**31
@@ -45,6 +47,30 @@ class FailureReason:
         return cls(error.problem_type, error.message, error.where, error.hint)
 
 
+@dataclass(frozen=True)
+class Edits:
+    """Operations on stored motions.
+
+    Attributes:
+        ops: as in JSON (`docs/reference/edits.md`); other motions stand in them by their ids.
+        sources: the edited motion, then the others in the order of the operations.
+    """
+
+    ops: tuple[Mapping[str, Any], ...]
+    sources: tuple[UUID, ...]
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any] | None) -> Edits | None:
+        """Read the column; None if the item is not an edit."""
+        if document is None:
+            return None
+        return cls(tuple(document["ops"]), tuple(map(UUID, document["sources"])))
+
+    def as_json(self) -> dict[str, Sequence[object]]:
+        """Return the value of the column."""
+        return {"ops": [dict(op) for op in self.ops], "sources": [str(source) for source in self.sources]}
+
+
 # --- submit ---
 
 
@@ -65,6 +91,7 @@ class NewItem(ItemSpec):
         scope: of the prompt, as `marey.vocabulary.scope.Scope.as_json`; None = not examined.
         scope_key: key of the encoder's verdict (`marey.text.keys.scope_key`), which the text stage gives; None = the
             words decide.
+        edits: operations on stored motions; None = the motion is generated.
     """
 
     index: int
@@ -79,6 +106,7 @@ class NewItem(ItemSpec):
     replaces: UUID | None = None
     scope: JsonObject | None = None
     scope_key: str | None = None
+    edits: Edits | None = None
 
 
 @dataclass(frozen=True)
@@ -106,6 +134,7 @@ class NewJob:
     """`traceparent` of the request (`marey.core.tracing`)."""
     scope: ScopePolicy = "ignore"
     """Treatment of prompts with unknown actions; the caller has applied it."""
+    kind: JobKind = JobKind.GENERATE
 
 
 @dataclass(frozen=True)
@@ -149,6 +178,7 @@ class JobRow:
     erased: datetime | None
     """Time when its prompts were erased."""
     scope: ScopePolicy
+    kind: JobKind
 
 
 @dataclass(frozen=True)
@@ -193,6 +223,8 @@ class MotionRow:
     """Replaced motion of a re-roll."""
     replaced_by: UUID | None
     """Item of its re-roll."""
+    edited_from: tuple[UUID, ...]
+    """Sources of an edit: the edited motion, then the others; empty if the motion was generated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,6 +255,7 @@ class ItemRow(ItemSpec):
     """Replaced motion of a re-roll."""
     scope: JsonObject | None
     """Scope of the prompt; None = not examined, or erased."""
+    edits: Edits | None
     motion: MotionRow | None
 
 

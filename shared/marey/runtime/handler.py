@@ -6,6 +6,7 @@ renews the lease, stores files, commits, releases and retries. A handler may rel
 - `run` is called on one thread, one batch at a time; every item of a batch has the same bundle and settings.
 - `run` yields one outcome per item, in any order, as soon as it is known; items in `control.dropped()` need none.
 - The items of an evaluator's queue come one by one, and their batch has `scoring`: the motions to measure.
+- The batch of the queue `edit` has `editing`: the motions to edit.
 - `Done.export` is called once, later, on the store thread, while the next batch runs: decoding, clean-up and file
   formats belong there, not into `run`.
 - An exception from `run` concerns every item of the batch without an outcome: a `MareyError` fails them with its
@@ -22,6 +23,7 @@ from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.jobs.leases import Claim, ClaimedItem, PromptScope
+from marey.runtime.editing import EditInput
 from marey.runtime.exports import Export, ExportedFile
 from marey.runtime.scoring import ScoreInput
 
@@ -37,6 +39,8 @@ class Batch:
     """Text features (`TextFeatures.to_blob`) by the items' `text_key`; empty in the text stage."""
     scoring: ScoreInput | None = None
     """Motions of an evaluation, for score items, which have no prompt."""
+    editing: EditInput | None = None
+    """Stored motions, for edits."""
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,16 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 from uuid import UUID
 
 import sqlalchemy as sa
 
 from marey.core.errors import MareyError, Unreachable
 from marey.db import transaction
-from marey.jobs import NO_TEXT, Claim, ClaimedItem, ItemStage, claim, load_texts
+from marey.jobs import EDIT_QUEUE, NO_TEXT, Claim, ClaimedItem, ItemStage, claim, load_texts
 from marey.runtime.committer import Committer
+from marey.runtime.editing import edit_input
 from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, retry_unreachable
 from marey.runtime.handler import Batch, Failed, Handler
 from marey.runtime.lease import Heartbeat, HeldLease
@@ -27,6 +28,8 @@ from marey.runtime.telemetry import ids_of
 from marey.storage import AssetStore
 
 log = logger(__name__)
+
+T = TypeVar("T")
 
 STOP_PATIENCE = 20.0  # of the 25 s a worker has to stop
 WRITE_PATIENCE = 300.0  # longer than the committer's own retries with store and database together
@@ -58,7 +61,7 @@ class Drain:
         engine: the database.
         worker: name for its claims from a queue.
         handlers: by queue; served in turns, so that texts stay ahead of motions and do not delay them.
-        store: source of the motions of score items.
+        store: source of the motions of score items and edits.
         ticked: called at each claim and step of progress: liveness is the age of the last call.
     """
 
@@ -194,26 +197,32 @@ class Drain:
         return error.message
 
     def _batch(self, lease: HeldLease) -> Batch:
-        """Return the claim with its text features, or its scoring input; items that lack features fail, retryably."""
+        """Return the claim with its text features, motions to edit or motions to score; items that lack features fail,
+        retryably."""
         taken = lease.claim
         if taken.stage is ItemStage.TEXT:
             return Batch(taken, taken.items, {})
+        if taken.queue == EDIT_QUEUE:
+            edit = partial(edit_input, self._engine, self._store, taken)
+            return Batch(taken, taken.items, {}, editing=self._patiently(edit))
         if taken.items[0].text_key == NO_TEXT:
             score = partial(score_input, self._engine, self._store, taken.job)
-            return Batch(
-                taken, taken.items, {}, retry_unreachable(score, seconds=CLAIM_PATIENCE, stopping=self._stopping)
-            )
+            return Batch(taken, taken.items, {}, scoring=self._patiently(score))
         keys = sorted({item.text_key for item in taken.items})
 
         def read() -> dict[str, bytes]:
             with transaction(self._engine) as conn:
                 return load_texts(conn, keys)
 
-        features = retry_unreachable(read, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+        features = self._patiently(read)
         missing = [item for item in taken.items if item.text_key not in features]
         if missing:
             self._fail_all(lease, missing, HandlerError("the text features of this item are gone"), retryable=True)
         return Batch(taken, tuple(item for item in taken.items if item.text_key in features), features)
+
+    def _patiently(self, read: Callable[[], T]) -> T:
+        """Read the input of a claim; retry while the database is away."""
+        return retry_unreachable(read, seconds=CLAIM_PATIENCE, stopping=self._stopping)
 
     def _run_bucket(self, lease: HeldLease, handler: Handler, batch: Batch) -> None:
         """Run items together; on failure halve the bucket, so that one item cannot fail the others."""

@@ -1,6 +1,7 @@
-"""User actions on motions: search, reviews and re-rolls, references, retention, erasure, files
+"""User actions on motions: search, edits, reviews and re-rolls, references, retention, erasure, files
 made on request, garbage collection."""
 
+from marey.takes.edits import NewEdit, submit_edit
 from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
 from marey.takes.made import (
@@ -26,6 +27,7 @@ __all__ = [
     "MadeFile",
     "MakingClaim",
     "MotionFilter",
+    "NewEdit",
     "ReferenceKind",
     "ReferenceMatch",
     "Reroll",
@@ -47,4 +49,5 @@ __all__ = [
     "resolve_reference",
     "review",
     "rewrite_files",
+    "submit_edit",
 ]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 from uuid import UUID
 
 import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import JSONB
 
 from marey.core.errors import Conflict, InvalidFile, NotFound, Unreachable
 from marey.db.database import EVENT_CHANNEL, transaction
 from marey.db.deadlines import BULK, MAINTENANCE
-from marey.db.sql import notify
+from marey.db.sql import among, notify
 from marey.evaluations import tables as evaluation_tables
 from marey.evaluations.repository import refuse_needed
 from marey.exporters import Coordinates, Exporter, exporter_of, exporters
@@ -22,15 +24,19 @@ from marey.jobs.journal import LockedJob, NewEvent, lock_job_of, record
 from marey.jobs.states import ENDED
 from marey.jobs.submit import TEXTS_LOCK
 from marey.jobs.types import NO_TEXT
+from marey.motion.edits.editing import EDITED_FROM
 from marey.takes.assets import keep_content, write_content
+from marey.takes.edits import edit_jobs_of
 from marey.takes.gc import ObjectStore, remove_unused_assets
 from marey.takes.types import Erasure
 
+DIGEST = re.compile(r"[0-9a-f]{64}")
 ROUND = 200
 """Jobs or files per round."""
 KEPT = (
     *("model", "bundle", "weights_sha256", "random_weights", "licence", "seed", "settings", "software"),
     *("feet_cleaned", "stream", "quality", "selection"),
+    *("placement", "loop", "travel", "travel_per_second", EDITED_FROM),
 )
 """Manifest keys other than the prompt that are kept. All others are removed: a new key is removed until it is listed
 here."""
@@ -68,6 +74,10 @@ FORGET = (
 )
 """All columns of the database with words of a prompt, or a hash from which they could be guessed. Files made on request
 go with the update of `motion_file`, by a trigger."""
+
+EDITED = sa.text("""
+    SELECT id, metadata -> :key AS record FROM motion WHERE job_id = :job AND metadata ? :key
+""")
 
 FORGET_TEXTS = sa.text("""
     DELETE FROM text_features
@@ -130,7 +140,8 @@ def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
 
 
 def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
-    """Erase the prompts of a job that has ended: prompts, rewrites, graphs and features, at once.
+    """Erase the prompts of a job that has ended, and of every edit of its motions: prompts, rewrites, graphs and
+    features, at once.
 
     Files that hold prompts, such as npz, are not served until `rewrite_files` has rewritten them; nor are files of a
     format whose exporter is not installed here.
@@ -139,19 +150,18 @@ def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
 
     Raises:
         NotFound: the tenant has no such job.
-        Conflict: it has open items, or an evaluation made it, whose prompts and report are stored separately.
+        Conflict: it or an edit of its motions has open items, or an evaluation made it, whose prompts and report are
+            stored separately.
     """
     _refuse_evaluations(conn, tenant, job)
-    locked = lock_job_of(conn, tenant, job)
-    if locked.state not in ENDED:
-        raise Conflict(
-            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
-        )
-    if not locked.erased:
-        _forget(conn, locked, by)
+    locked = [_lock_ended(conn, tenant, job), *_lock_edits(conn, tenant, job)]
+    for each in locked:
+        if not each.erased:
+            _forget(conn, each, by)
     table = job_tables.job.c
     erased = conn.execute(sa.select(table.erased_at).where(table.id == job)).scalar_one()
-    return Erasure(job, erased, _files_left(conn, job))
+    jobs = [each.id for each in locked]
+    return Erasure(job, erased, _files_left(conn, jobs), tuple(jobs[1:]))
 
 
 def rewrite_files(engine: sa.Engine, store: FileStore) -> int:
@@ -195,6 +205,23 @@ class _File:
     media_type: str
 
 
+def _lock_ended(conn: sa.Connection, tenant: str, job: UUID) -> LockedJob:
+    locked = lock_job_of(conn, tenant, job)
+    if locked.state not in ENDED:
+        raise Conflict(
+            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
+        )
+    return locked
+
+
+def _lock_edits(conn: sa.Connection, tenant: str, job: UUID) -> list[LockedJob]:
+    """Lock the jobs of all edits of a locked job's motions; a submit that edits one of their motions then waits."""
+    locked: dict[UUID, LockedJob] = {}
+    while new := [edit for edit in edit_jobs_of(conn, job) if edit not in locked]:
+        locked |= {edit: _lock_ended(conn, tenant, edit) for edit in new}
+    return list(locked.values())
+
+
 def _refuse_evaluations(conn: sa.Connection, tenant: str, job: UUID) -> None:
     refuse_needed(conn, tenant, job)
     table = evaluation_tables.evaluation.c
@@ -216,6 +243,7 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     values = {"job": job.id, "kept": list(KEPT), "without_prompt": without_prompt}
     for statement in FORGET:
         conn.execute(sa.text(statement), {name: value for name, value in values.items() if f":{name}" in statement})
+    _forget_digests(conn, job.id)
     # A concurrent submit may have seen these features and rely on them: wait for it, then check.
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
     conn.execute(FORGET_TEXTS, {"keys": list(keys)})
@@ -223,14 +251,36 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     record(conn, job, [NewEvent("erased", f"prompts erased by {by}")])
 
 
-def _files_left(conn: sa.Connection, job: UUID) -> int:
+def _forget_digests(conn: sa.Connection, job: UUID) -> None:
+    """Remove the digests of sources from the records of edits; each source's file held the prompt."""
+    motion = job_tables.motion
+    for row in conn.execute(EDITED, {"job": job, "key": EDITED_FROM}).all():
+        metadata = sa.func.jsonb_set(motion.c.metadata, [EDITED_FROM], sa.cast(_undigested(row.record), JSONB))
+        conn.execute(sa.update(motion).where(motion.c.id == row.id).values(metadata=metadata))
+
+
+def _undigested(record: Any) -> Any:
+    """Return a record of an edit without SHA-256: the prompt could be guessed from the digest of its file."""
+    if isinstance(record, Mapping):
+        values = cast("Mapping[str, Any]", record)
+        return {
+            name: _undigested(value)
+            for name, value in values.items()
+            if name != "sha256" and not (name == "with" and isinstance(value, str) and DIGEST.fullmatch(value))
+        }
+    if isinstance(record, Sequence) and not isinstance(record, str):
+        return [_undigested(value) for value in cast("Sequence[Any]", record)]
+    return record
+
+
+def _files_left(conn: sa.Connection, jobs: Sequence[UUID]) -> int:
     file, motion = job_tables.motion_file.c, job_tables.motion.c
     query = (
         sa.select(sa.func.count())
         .select_from(job_tables.motion_file)
         .join(job_tables.motion, motion.id == file.motion_id)
     )
-    return conn.execute(query.where(motion.job_id == job, file.erasing)).scalar_one()
+    return conn.execute(query.where(among(motion.job_id, jobs), file.erasing)).scalar_one()
 
 
 def _formats_waiting(conn: sa.Connection) -> Sequence[str]:
@@ -265,6 +315,8 @@ def _without_prompt(exporter: Exporter[Any], data: bytes, where: str) -> bytes:
     assert exporter.decode is not None  # `Exporter` checks it of formats that hold prompts
     clip = exporter.decode(data, where, Coordinates())
     manifest = {name: value for name, value in clip.manifest.items() if name in KEPT}
+    if EDITED_FROM in manifest:
+        manifest[EDITED_FROM] = _undigested(manifest[EDITED_FROM])
     return exporter.encode(replace(clip, manifest={**manifest, "erased": True}), Coordinates())
 
 

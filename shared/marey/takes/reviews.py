@@ -89,7 +89,7 @@ def reroll(
         NotFound: the tenant lacks one of them; nothing is written.
         InvalidInput: none, too many, or an error of `make`.
         Conflict: prompts were erased, an open evaluation counts the job's items, or a motion is the clip of a live
-            stream.
+            stream or an edit.
         QuotaUsedUp: the tenant's quotas do not allow them.
     """
     _check(motions, comment)
@@ -135,6 +135,7 @@ def _roll_again(
     sources = [item for item in items_of(conn, list(wanted)) if wanted[item.id].id not in rolled]
     if not sources:
         return set()
+    _refuse_edits(sources)
     _refuse_streams(conn, [item.id for item in sources])
     reserve_quotas(conn, job.tenant, len(sources))
     numbers = _Numbers(conn, job.id, {item.index for item in sources})
@@ -187,6 +188,16 @@ class _Numbers:
         """Return the next variant of the prompt."""
         self._variants[index] += 1
         return self._variants[index]
+
+
+def _refuse_edits(items: Sequence[ItemRow]) -> None:
+    edit = next((item for item in items if item.edits is not None), None)
+    if edit is not None:
+        raise Conflict(
+            "it is an edit, which depends on no seed",
+            where=f"item {edit.id}",
+            hint="Re-roll the motion that it was made from, and edit that take.",
+        )
 
 
 def _refuse_streams(conn: sa.Connection, items: Sequence[UUID]) -> None:

@@ -58,4 +58,6 @@ class Erasure:
     job: UUID
     erased: datetime
     files_left: int
-    """Files that still wait to be rewritten; they are not served before."""
+    """Files that still wait to be rewritten, of edits too; they are not served before."""
+    edits: tuple[UUID, ...] = ()
+    """Jobs of edits of its motions; their prompts were erased with it."""

@@ -16,6 +16,7 @@ from marey.cli.backup import BackupManifest, export_tenant, import_tenant
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
 from marey.db import transaction
 from marey.jobs import (
+    EDIT_QUEUE,
     ItemFailure,
     JobRow,
     NewMotion,
@@ -33,16 +34,16 @@ from marey.jobs import (
 )
 from marey.jobs.types import EventRow, ItemRow
 from marey.storage import FolderStore
-from marey.takes import GarbageReport, collect_garbage, reroll, review
+from marey.takes import GarbageReport, NewEdit, collect_garbage, erase, reroll, review, submit_edit
 from tests.servers.audit import audit
-from tests.servers.jobs import PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
+from tests.servers.jobs import MODEL, PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.marey import Marey
 
 TABLES = "job, asset, text_features, idempotency"
 
 
-def work(engine: sa.Engine, store: FolderStore, *, fail: int = 0) -> None:
-    claimed = claim_some(engine)
+def work(engine: sa.Engine, store: FolderStore, *, fail: int = 0, queue: str = MODEL) -> None:
+    claimed = claim_some(engine, queue)
     good = claimed.items[: len(claimed.items) - fail]
     motions: list[NewMotion] = [motion_of(item.id) for item in good]
     with transaction(engine) as conn:
@@ -87,6 +88,35 @@ def lose_everything(engine: sa.Engine, store: FolderStore) -> None:
         conn.execute(sa.text(f"TRUNCATE {TABLES} CASCADE"))
     for key in list(store.keys()):
         store.delete(key)
+
+
+def test_an_edit_comes_back_with_the_motions_that_it_was_made_from(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    source = submit_items(engine, 1)
+    parse_texts(engine)
+    work(engine, folder_store)
+    edits: list[UUID] = []
+    motion = motion_in(engine, source)
+    for _ in range(2):  # an edit of an edit
+        with transaction(engine) as conn:
+            edits.append(submit_edit(conn, NewEdit(motion, [{"op": "mirror"}])).id)
+        work(engine, folder_store, queue=EDIT_QUEUE)
+        motion = motion_in(engine, edits[-1])
+    before = snapshot(engine, edits)
+    export_tenant(engine, folder_store, "default", tmp_path / "b")
+    lose_everything(engine, folder_store)
+    import_tenant(engine, folder_store, "default", tmp_path / "b")
+    assert snapshot(engine, edits) == before
+    with transaction(engine) as conn:
+        assert erase(conn, "default", source, by="ann").edits == tuple(edits)
+
+
+def motion_in(engine: sa.Engine, job: UUID) -> UUID:
+    """The first motion of a job."""
+    with transaction(engine) as conn:
+        (first, *_) = (item.motion.id for item in list_items(conn, "default", job).rows if item.motion)
+    return first
 
 
 def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:

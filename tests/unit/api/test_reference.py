@@ -17,6 +17,7 @@ from starlette.testclient import TestClient
 
 import marey.api.docs
 from marey.api.app import create_app
+from marey.api.edits.schemas import NewEditBody
 from marey.api.evaluations.schemas import NewEvaluationBody
 from marey.api.jobs.schemas import JobPatch, NewJobBody
 from marey.api.reference import EXAMPLES
@@ -33,7 +34,7 @@ from marey.text_service.routes import ParseBody
 BODIES = {
     model.__name__: model
     for model in (
-        *(NewJobBody, JobPatch, NewReviewBody, NewRerollBody, NewStreamBody, ParseBody),
+        *(NewJobBody, JobPatch, NewReviewBody, NewRerollBody, NewEditBody, NewStreamBody, ParseBody),
         *(NewEvaluationBody, NewScheduleBody, SchedulePatch, NewWebhookBody, WebhookPatch),
     )
 }

@@ -121,7 +121,7 @@ def test_a_cron_line_in_place_of_a_command_is_an_add(commands: tuple[typer.Typer
 def test_a_server_measures_by_itself_where_it_has_a_bundle_that_does(tmp_path: Path) -> None:
     config = Settings(home=tmp_path, models=tmp_path / "models")
     write_generator(config.models, "hgm3-x", model="hgm3")
-    assert default_roles(config) == "hgm3+text"
+    assert default_roles(config) == "hgm3+text,edit"
     write_evaluator(config.models)
-    assert default_roles(config) == "hgm3+text+evaluator"
-    assert parse_roles(default_roles(config)) == [("hgm3", "text", "evaluator")]
+    assert default_roles(config) == "hgm3+text+evaluator,edit"
+    assert parse_roles(default_roles(config)) == [("hgm3", "text", "evaluator"), ("edit",)]

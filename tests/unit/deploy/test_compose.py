@@ -35,12 +35,12 @@ def settings_of(service: Service, monkeypatch: pytest.MonkeyPatch, secrets: str)
 
 
 def test_every_part_of_the_platform_is_there() -> None:
-    ours = {"migrate", "api", "scheduler", "parser", "text", "worker", "evaluator"}
+    ours = {"migrate", "api", "scheduler", "parser", "text", "worker", "editor", "evaluator"}
     assert set(ALL) == ours | {"postgres", "redis", "objectstore"}
     assert {service.name for service in OURS} == ours
     workers = [service for service in OURS if service.command[0] == "worker"]
     roles = [service.command[1] if service.command[1:] else service.environment["MAREY_ROLE"] for service in workers]
-    assert sorted(roles) == ["evaluator", "models", "text"]
+    assert sorted(roles) == ["edit", "evaluator", "models", "text"]
     assert {*roles} - {EVERY_MODEL} | {*model_names()} == {*known_queues()}
 
 
@@ -152,7 +152,7 @@ def test_a_service_reads_the_secrets_it_is_given_and_no_other(service: Service) 
 
 def test_whoever_is_stopped_gets_the_time_it_asks_for() -> None:
     work = worker.STOP_SECONDS + worker.KILL_SECONDS
-    assert min(ALL[name].grace for name in ("text", "evaluator")) > work
+    assert min(ALL[name].grace for name in ("text", "editor", "evaluator")) > work
     assert ALL["worker"].grace > max(children.STOP_SECONDS, live.STOP_SECONDS) > work
     assert ALL["scheduler"].grace > 2 * scheduler.STOP_SECONDS
     assert ALL["postgres"].raw["stop_signal"] == "SIGINT"
@@ -161,7 +161,7 @@ def test_whoever_is_stopped_gets_the_time_it_asks_for() -> None:
 def test_limits_of_processor_time_and_threads_are_one_number() -> None:
     chosen = services({"MAREY_WORKER_CPUS": "7"})
     for service in chosen.values():
-        if service.name == "parser":  # one sentence at a time fills one core
+        if service.name in {"parser", "editor"}:  # one sentence or motion at a time fills one core
             assert str(service.raw["cpus"]) == service.environment["MAREY_THREADS"] == "1"
         elif service.ours and service.target == "worker":
             assert str(service.raw["cpus"]) == service.environment["MAREY_THREADS"] == "7"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from marey.exporters import Coordinates, exporter_of
-from marey.generation.export import export_clip
+from marey.runtime.exporting import export_clip
 from tests.support.walker import walker
 
 

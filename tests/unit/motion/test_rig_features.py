@@ -15,7 +15,6 @@ from marey.core.errors import InvalidInput
 from marey.evaluator.measuring import encoded
 from marey.exporters import Coordinates, exporters
 from marey.exporters.convert import convert
-from marey.generation.export import export_clip
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip, load_npz, parse_npz
 from marey.motion.export_options import ExportOptions
@@ -30,6 +29,7 @@ from marey.motion.skeleton import SNAPMOGEN
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import PromptMatch
+from marey.runtime.exporting import export_clip
 from marey.selector.records import match_of
 from marey.viz.player import html_player
 from marey.viz.render import contact_sheet

@@ -1,4 +1,4 @@
-"""Export of generated features to files: the last step of an item, the same in a worker and in `marey generate`."""
+"""Finishing of generated features: the last step of an item, the same in a worker and in `marey generate`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import torch
 
-from marey.exporters import Coordinates, exporters
 from marey.generation.port import Generated, Generator, Request, S
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
@@ -16,7 +15,6 @@ from marey.motion.finish import finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import KEY, PromptMatch
-from marey.runtime.exports import Export, ExportedFile
 from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
 
@@ -95,18 +93,3 @@ def _match(clip: MotionClip, request: Request) -> PromptMatch:
     if request.recording is not None:
         return PromptMatch()
     return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)
-
-
-def export_clip(clip: MotionClip, licence: str) -> Export:
-    """Encode a clip in every installed format that is stored, in memory."""
-    return Export(
-        files=tuple(
-            ExportedFile(each.format, each.encode(clip, Coordinates()), each.media_type)
-            for each in exporters().values()
-            if each.stored
-        ),
-        frames=clip.frames,
-        fps=clip.fps,
-        licence=licence,
-        manifest=clip.manifest,
-    )

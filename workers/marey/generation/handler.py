@@ -13,9 +13,10 @@ from marey.core.errors import MareyError
 from marey.core.settings import Settings
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
-from marey.generation.export import export_clip, finish
+from marey.generation.export import finish
 from marey.generation.port import Generated, GenerationControl, Generator, Request, S
 from marey.jobs import ClaimedItem
+from marey.runtime.exporting import export_clip
 from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome
 from marey.streams.recording import StreamRecording

@@ -16,7 +16,6 @@ from marey.api.jobs import service
 from marey.api.jobs.estimates import EstimateView, QueueView
 from marey.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
 from marey.api.jobs.schemas import (
-    MAX_PRIORITY,
     SCOPE,
     CheckedView,
     ErasureView,
@@ -78,7 +77,7 @@ async def submit_job(
     key: Submitter,
     name: Annotated[schemas.Name | None, Query()] = None,
     comment: Annotated[schemas.Comment | None, Query()] = None,
-    priority: Annotated[int, Query(ge=-MAX_PRIORITY, le=MAX_PRIORITY)] = 0,
+    priority: Annotated[int, Query(ge=-jobs.PRIORITY_LIMIT, le=jobs.PRIORITY_LIMIT)] = 0,
     fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
     keep_days: Annotated[int | None, Query(ge=1, le=jobs.MAX_KEEP_DAYS)] = None,
     scope: Annotated[ScopePolicy, Query(description=SCOPE)] = "warn",
@@ -283,7 +282,7 @@ def retry_job(
 @router.post("/{job}/erase")
 @deadline(db.BULK)
 def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
-    """Erase the prompts of a job that has ended; motions, names and tags stay.
+    """Erase the prompts of a job that has ended, and of every edit of its motions; motions, names and tags stay.
 
     Prompts in the database are erased at once. Files that hold them are no longer served, and rewritten within
     minutes: `files_left` counts the remaining ones. This cannot be undone.

@@ -16,12 +16,15 @@ from marey.http.schemas import Comment, Name, View
 from marey.items.item import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from marey.jobs import (
     MAX_KEEP_DAYS,
+    PRIORITY_LIMIT,
+    Edits,
     EventRow,
     FailureReason,
     ItemRow,
     ItemStage,
     ItemState,
     JobControl,
+    JobKind,
     JobRow,
     JobState,
 )
@@ -29,7 +32,6 @@ from marey.jobs.quality_counts import QualityCounts
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import ScopePolicy, Verdict
 
-MAX_PRIORITY = 1000
 SCOPE = "Prompts with actions that the model does not know: accepted with a warning, refused, or not examined."
 
 
@@ -59,19 +61,24 @@ class NewItemBody(BaseModel):
     )
 
 
-class JobFields(BaseModel):
-    """Fields of the job as a whole."""
+class CommonJobFields(BaseModel):
+    """Fields that jobs of every kind have."""
 
     model_config = ConfigDict(extra="forbid")
 
     name: Name | None = None
     comment: Comment | None = None
-    priority: int = Field(0, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
-    fail_early: float | None = Field(
-        None, ge=0, le=1, description="Ratio of failed items above which open items are cancelled."
-    )
+    priority: int = Field(0, ge=-PRIORITY_LIMIT, le=PRIORITY_LIMIT)
     keep_days: int | None = Field(
         None, ge=1, le=MAX_KEEP_DAYS, description="Days after its end when the job is deleted, with motions and files."
+    )
+
+
+class JobFields(CommonJobFields):
+    """Fields of the job as a whole."""
+
+    fail_early: float | None = Field(
+        None, ge=0, le=1, description="Ratio of failed items above which open items are cancelled."
     )
     scope: ScopePolicy = Field("warn", description=SCOPE)
 
@@ -87,7 +94,7 @@ class JobPatch(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    priority: int | None = Field(None, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
+    priority: int | None = Field(None, ge=-PRIORITY_LIMIT, le=PRIORITY_LIMIT)
     comment: Comment | None = None
     fail_early: float | None = Field(
         None, ge=0, le=1, description="Ratio of failed items above which open items are cancelled; null = off."
@@ -209,6 +216,7 @@ class JobView(View):
     expires: datetime | None = Field(description="Time of deletion; null = never, or not before it ends.")
     erased: datetime | None = Field(description="Time when its prompts were erased.")
     scope: ScopePolicy
+    kind: JobKind
 
     @classmethod
     def of(cls, row: JobRow) -> JobView:
@@ -242,7 +250,10 @@ class ErasureView(View):
 
     job: UUID
     erased: datetime
-    files_left: int = Field(description="Files that still wait to be rewritten; they are not served before.")
+    files_left: int = Field(
+        description="Files that still wait to be rewritten, of edits too; they are not served before."
+    )
+    edits: list[UUID] = Field(description="Jobs of edits of its motions; their prompts were erased with it.")
 
 
 class ErrorView(View):
@@ -257,6 +268,20 @@ class ErrorView(View):
     def of(cls, problem: FailureReason) -> ErrorView:
         """Convert a row's problem."""
         return cls(type=problem.type, message=problem.message, where=problem.where, hint=problem.hint)
+
+
+class EditsView(View):
+    """Operations on stored motions."""
+
+    ops: list[dict[str, Any]]
+    """Of this result: each split stands as one of its two trims."""
+    sources: list[UUID]
+    """The edited motion, then the others."""
+
+    @classmethod
+    def of(cls, edits: Edits) -> EditsView:
+        """Convert the operations of a row."""
+        return cls(ops=[dict(op) for op in edits.ops], sources=list(edits.sources))
 
 
 class ItemView(View):
@@ -284,16 +309,18 @@ class ItemView(View):
     finished: datetime | None
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
     scope: ScopeView | None = Field(description="Null: not examined, erased, or the bundle lists no actions.")
+    edits: EditsView | None = Field(description="Null if the motion is generated.")
     motion: MotionView | None
 
     @classmethod
     def of(cls, row: ItemRow) -> ItemView:
         """Convert a row."""
-        apart = {"settings", "tags", "error", "scope", "motion"}
+        apart = {"settings", "tags", "error", "scope", "edits", "motion"}
         return cls(
             scope=None if row.scope is None else ScopeView.model_validate(row.scope),
             settings=dict(row.settings),
             tags=list(row.tags),
+            edits=None if row.edits is None else EditsView.of(row.edits),
             error=None if row.problem is None else ErrorView.of(row.problem),
             motion=None if row.motion is None else MotionView.of(row.motion),
             **{name: getattr(row, name) for name in cls.model_fields if name not in apart},

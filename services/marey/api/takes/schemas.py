@@ -109,6 +109,9 @@ class MotionView(View):
     review: ReviewView | None
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
     replaced_by: UUID | None = Field(description="Item of its re-roll.")
+    edited_from: list[UUID] = Field(
+        description="Sources of an edit: the edited motion, then the others; empty if the motion was generated."
+    )
     quality: MotionQuality | None = Field(
         description="Physical quality; null for motions of earlier releases and of skeletons other than that of 22 "
         "joints."
@@ -119,10 +122,11 @@ class MotionView(View):
     def of(cls, row: MotionRow) -> MotionView:
         """Convert a row."""
         files = [FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.files]
-        apart = {"files", "tags", "review", "quality", "selection"}
+        apart = {"files", "tags", "review", "quality", "selection", "edited_from"}
         own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
         records = {"quality": read_quality(row.metadata), "selection": read_selection(row.metadata)}
-        return cls(files=files, tags=list(row.tags), review=_review(row), **records, **own)
+        lists = {"files": files, "tags": list(row.tags), "edited_from": list(row.edited_from)}
+        return cls(review=_review(row), **lists, **records, **own)
 
 
 def _review(row: MotionRow) -> ReviewView | None:

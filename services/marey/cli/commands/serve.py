@@ -18,7 +18,7 @@ def serve(
         typer.Option(
             "--with",
             help="Workers: + joins queues in one child, a comma separates children. "
-            "None given = one child for prompts, every model that has a bundle here, and evaluations.",
+            "None given = one child for prompts, every model that has a bundle here, and evaluations; one for edits.",
         ),
     ] = None,
     port: Annotated[
@@ -58,8 +58,8 @@ def worker(
         str | None,
         typer.Argument(
             metavar="MODEL",
-            help="Queues: a model such as hgm3, text, evaluator; or several, as hgm3+text. models = every model that "
-            "has a bundle here. Default: MAREY_ROLE.",
+            help="Queues: a model such as hgm3, text, edit, evaluator; or several, as hgm3+text. models = every model "
+            "that has a bundle here. Default: MAREY_ROLE.",
             show_default=False,
         ),
     ] = None,

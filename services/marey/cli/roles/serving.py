@@ -16,14 +16,19 @@ if TYPE_CHECKING:
     from marey.runtime.handler import Role
 
 TEXT = "text"
-"""The queue of prompts, which computes on no device."""
+"""The queue of prompts."""
+EDIT = "edit"
+"""The queue of edits of stored motions."""
+WITHOUT_DEVICE = frozenset({TEXT, EDIT})
+"""Queues that compute on no device."""
 EVERY_MODEL = "models"
 """In the queues of a worker: every model that has a bundle here."""
 PLATFORM = {
     TEXT: "marey.text_service.handler:create_handler",
+    EDIT: "marey.editing.handler:create_handler",
     "evaluator": "marey.evaluator.handler:create_handler",
 }
-"""Factories of the queues that are no model's, as strings: only a worker's child imports them, and with them torch."""
+"""Factories of the queues that are no model's, as strings: only a worker's child imports them, and torch with most."""
 
 
 def known_queues() -> tuple[str, ...]:
@@ -38,12 +43,12 @@ def live_models(queues: Iterable[str]) -> dict[str, str]:
 
 
 def default_roles(config: Settings) -> str:
-    """Return the roles of one child: every model with a bundle here, prompts, and evaluations if there is an evaluator.
-    Two children would compete for the cores."""
+    """Return the roles of two children: every model with a bundle here, prompts, and evaluations if there is an
+    evaluator; and edits, which take milliseconds and wait for no batch. More children would compete for the cores."""
     from marey.bundles import list_bundles
 
     judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
-    return "+".join([*models_here(config), TEXT, *judges])
+    return "+".join([*models_here(config), TEXT, *judges]) + f",{EDIT}"
 
 
 def models_here(config: Settings) -> list[str]:
@@ -101,7 +106,7 @@ def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
     Raises:
         InvalidInput: there is no such device.
     """
-    if not device.startswith("cuda") or all(queue == TEXT for role in roles for queue in role):
+    if not device.startswith("cuda") or all(queue in WITHOUT_DEVICE for role in roles for queue in role):
         return
     asked = subprocess.run(
         [sys.executable, "-m", "marey.nn.devices", device], capture_output=True, text=True, check=False

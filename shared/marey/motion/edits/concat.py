@@ -14,6 +14,7 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import heading_of, moved, posed
+from marey.motion.edits.prompts import joined
 from marey.motion.resample import resample
 from marey.motion.rotations import Array, about, conjugate, from_rotvec, multiply, rotate, to_rotvec
 
@@ -52,12 +53,13 @@ def _joined_prompts(clip: MotionClip, second: MotionClip) -> dict[str, Any]:
 
     What was read in the first prompt alone is left out.
     """
-    ours, theirs = clip.manifest.get("prompt"), second.manifest.get("prompt")
-    if not ours or not theirs or ours == theirs:
+    ours = clip.manifest.get("prompt", "")
+    both = joined(ours, second.manifest.get("prompt", ""))
+    if both == ours:
         return dict(clip.manifest)
     prompts = _prompts(clip) + [[frame + clip.frames - 1, text] for frame, text in _prompts(second)]
     kept = {name: value for name, value in clip.manifest.items() if name not in READ_PROMPT}
-    return {**kept, "prompt": f"{ours}, then {theirs}", "prompts": prompts}
+    return {**kept, "prompt": both, "prompts": prompts}
 
 
 def _prompts(clip: MotionClip) -> list[list[Any]]:

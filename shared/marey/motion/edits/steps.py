@@ -9,12 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidInput, TooLarge
 from marey.motion.edits.operation import REQUIRED, Operation, Parameter
 from marey.motion.edits.table import OPERATIONS
 
 MOST = 32
 """Operations of one edit."""
+MOST_PIECES = 32
+"""Motions that one edit makes of a motion; each split doubles them."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,18 @@ def read_steps(ops: object, *, where: str = "ops") -> tuple[Step, ...]:
 
 
 def pieces_of(steps: Sequence[Step]) -> tuple[tuple[Step, ...], ...]:
-    """Return the operations of each resulting motion: one list, or two for each split, which becomes two trims."""
+    """Return the operations of each resulting motion: one list, or two for each split, which becomes two trims.
+
+    Raises:
+        TooLarge: more than `MOST_PIECES` pieces.
+    """
+    splits = [step for step in steps if step.operation.pieces]
+    if 2 ** len(splits) > MOST_PIECES:
+        raise TooLarge(
+            f"{len(splits)} splits make {2 ** len(splits)} pieces; the most is {MOST_PIECES}",
+            where=splits[-1].where,
+            hint="Trim the pieces one by one, or split them in several edits.",
+        )
     for index, step in enumerate(steps):
         if step.operation.pieces:
             at = step.values["at"]

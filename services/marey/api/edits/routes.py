@@ -1,0 +1,61 @@
+"""`/v1/motions/{motion}/edits`."""
+
+from __future__ import annotations
+
+import hashlib
+from uuid import UUID
+
+from fastapi import APIRouter, Response
+
+from marey import db, jobs, takes
+from marey.api.audit import note
+from marey.api.auth import Submitter
+from marey.api.context import Connection, deadline
+from marey.api.edits.schemas import NewEditBody
+from marey.api.jobs.schemas import JobView
+from marey.core import tracing
+from marey.http.problems import RESPONSES
+from marey.http.schemas import IdempotencyKey
+from marey.runtime.logs import logger
+
+log = logger(__name__)
+
+router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
+
+
+@router.post("/{motion}/edits", status_code=202)
+@deadline(db.BULK)
+def edit_motion(
+    motion: UUID,
+    body: NewEditBody,
+    conn: Connection,
+    response: Response,
+    key: Submitter,
+    idempotency_key: IdempotencyKey = None,
+) -> JobView:
+    """Edit a motion: cut, join, loop, mirror, retime or smooth it. The motion itself does not change.
+
+    The job has an item for each resulting motion, with the name, the tags and the seed of the edited one.
+    """
+    new = takes.NewEdit(
+        motion,
+        tenant=key.tenant,
+        idempotency_key=idempotency_key,
+        body_sha256=_sha256(motion, body) if idempotency_key else None,
+        traceparent=tracing.current(),
+        **body.model_dump(),
+    )
+    submitted = takes.submit_edit(conn, new)
+    row = jobs.get_job(conn, key.tenant, submitted.id)
+    response.headers["Location"] = f"/v1/jobs/{submitted.id}"
+    if submitted.replayed:
+        response.headers["Idempotency-Replayed"] = "true"
+    else:
+        note(conn, key, "motion.edit", motion, job=str(row.id), items=row.total)
+    log.info("submitted", job=str(row.id), tenant=key.tenant, items=row.total, replayed=submitted.replayed)
+    return JobView.of(row)
+
+
+def _sha256(motion: UUID, body: NewEditBody) -> str:
+    """Return the digest that identifies equal edits."""
+    return hashlib.sha256(f"edits {motion}\n{body.model_dump_json()}".encode()).hexdigest()

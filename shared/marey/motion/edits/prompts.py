@@ -1,0 +1,28 @@
+"""Prompts of edited motions. Standard library only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from marey.core.sides import swap_sides
+from marey.motion.edits.steps import Step
+
+
+def prompt_of(prompt: str, steps: Sequence[Step], other: Callable[[Step], str]) -> str:
+    """Return the prompt of the result of operations.
+
+    Args:
+        prompt: of the motion; empty if it has none.
+        other: returns the prompt of the motion that a step names in `with`.
+    """
+    for step in steps:
+        if step.operation.name == "mirror":
+            prompt = swap_sides(prompt)
+        elif "with" in step.values:
+            prompt = joined(prompt, other(step))
+    return prompt
+
+
+def joined(first: str, second: str) -> str:
+    """Return the prompt of two motions in sequence; the first one's where either has none, or both are equal."""
+    return f"{first}, then {second}" if first and second and first != second else first

@@ -1,0 +1,192 @@
+"""Edits of stored motions: jobs of the kind `edit`, and what was made from a motion."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from marey.core.errors import Conflict, InvalidInput, NotFound, TooLarge
+from marey.exporters.registry import CANONICAL
+from marey.jobs import EDIT_QUEUE, NO_TEXT, Edits, JobKind, MotionRow, NewItem, NewJob, SubmittedJob, submit, tables
+from marey.jobs.motions import get_motion
+from marey.motion.edits.editing import MOST_FRAMES
+from marey.motion.edits.licences import strictest
+from marey.motion.edits.prompts import prompt_of
+from marey.motion.edits.steps import Step, pieces_of, read_steps
+from marey.tenants import DEFAULT_TENANT
+
+MOST_CHARACTERS = 20_000
+"""Characters of the prompt of joined motions."""
+BATCH_KEY = hashlib.sha256(EDIT_QUEUE.encode()).hexdigest()
+
+HOLD_JOBS = sa.text("""
+    SELECT job.id FROM job JOIN motion ON motion.job_id = job.id WHERE motion.id = ANY(:motions)
+    ORDER BY job.id FOR SHARE OF job
+""")
+
+# With the sources of sources: they stay known when a motion between is deleted.
+LINK = sa.text("""
+    WITH direct AS (
+        SELECT item.id, source::uuid AS source
+        FROM item, jsonb_array_elements_text(item.edits -> 'sources') AS source WHERE item.job_id = :job
+    )
+    INSERT INTO edited_from (item_id, source_id)
+    SELECT id, source FROM direct
+    UNION
+    SELECT direct.id, earlier.source_id FROM direct
+    JOIN motion ON motion.id = direct.source JOIN edited_from AS earlier ON earlier.item_id = motion.item_id
+""")
+
+
+@dataclass(frozen=True)
+class NewEdit:
+    """An edit to submit.
+
+    Attributes:
+        motion: to edit.
+        ops: operations as in JSON; `with` is the id of another motion.
+        name, comment, priority, keep_days, idempotency_key, body_sha256, traceparent: of the job; see `NewJob`.
+    """
+
+    motion: UUID
+    ops: Sequence[Mapping[str, Any]]
+    tenant: str = DEFAULT_TENANT
+    name: str | None = None
+    comment: str | None = None
+    priority: int = 0
+    keep_days: int | None = None
+    idempotency_key: str | None = None
+    body_sha256: str | None = None
+    traceparent: str | None = None
+
+
+def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
+    """Submit a job that edits a stored motion: one item, or two for each split.
+
+    Raises:
+        NotFound: the tenant lacks one of the motions.
+        InvalidInput: an operation that is unknown or has another value, or licences that exclude each other.
+        TooLarge: too many pieces, frames or characters.
+        Conflict: a motion has no npz: its prompt is being erased.
+        QuotaUsedUp, IdempotencyMismatch: as `marey.jobs.submit`.
+    """
+    steps = _read_steps(edit.ops)
+    pieces = pieces_of(steps)
+    others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
+    ids = list(dict.fromkeys((edit.motion, *others.values())))
+    conn.execute(HOLD_JOBS, {"motions": ids})  # an erasure of a source waits, and then finds the edit
+    rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
+    for where, motion in others.items():
+        rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")
+    _check_sources(rows[edit.motion], [rows[motion] for motion in (edit.motion, *others.values())])
+    submitted = submit(
+        conn,
+        NewJob(
+            items=[_item(number, piece, rows, edit.motion) for number, piece in enumerate(pieces)],
+            tenant=edit.tenant,
+            name=edit.name,
+            comment=edit.comment,
+            priority=edit.priority,
+            keep_days=edit.keep_days,
+            count=len(pieces),
+            idempotency_key=edit.idempotency_key,
+            body_sha256=edit.body_sha256,
+            traceparent=edit.traceparent,
+            kind=JobKind.EDIT,
+        ),
+    )
+    if not submitted.replayed:
+        conn.execute(LINK, {"job": submitted.id})
+    return submitted
+
+
+def edit_jobs_of(conn: sa.Connection, job: UUID) -> Sequence[UUID]:
+    """Return the jobs of edits that were made from motions of a job, directly or through other edits; oldest first."""
+    item, motion, made = tables.item.c, tables.motion.c, tables.edited_from
+    query = (
+        sa.select(item.job_id)
+        .join(made, made.c.item_id == item.id)
+        .join(tables.motion, motion.id == made.c.source_id)
+        .where(motion.job_id == job)
+        .distinct()
+        .order_by(item.job_id)
+    )
+    return conn.execute(query).scalars().all()
+
+
+def _read_steps(ops: Sequence[Mapping[str, Any]]) -> tuple[Step, ...]:
+    """Check operations whose other motions are named by ids."""
+    steps = read_steps(ops)
+    for step in steps:
+        if "with" in step.values:
+            try:
+                UUID(str(step.values["with"]))
+            except ValueError:
+                raise InvalidInput(
+                    "is not the id of a motion",
+                    where=f"{step.where}.with",
+                    hint="`marey motions list --full-ids` shows them.",
+                ) from None
+    return steps
+
+
+def _other(conn: sa.Connection, tenant: str, motion: UUID, where: str) -> MotionRow:
+    try:
+        return get_motion(conn, tenant, motion)
+    except NotFound as error:
+        raise NotFound(error.message, where=where, hint=error.hint) from None
+
+
+def _check_sources(first: MotionRow, joined: Sequence[MotionRow]) -> None:
+    """Validate the motions of an edit, in the order of the operations.
+
+    Raises:
+        Conflict, TooLarge, InvalidInput: as `submit_edit`.
+    """
+    for row in joined:
+        if all(file.format != CANONICAL for file in row.files):
+            raise Conflict(
+                f"the motion has no {CANONICAL} to edit",
+                where=f"motion {row.id}",
+                hint="If its prompt is being erased, wait a moment.",
+            )
+    frames = sum(row.frames for row in joined)
+    if frames > MOST_FRAMES:
+        hint = "Trim the motions first."
+        raise TooLarge(f"the motions have {frames} frames; the most is {MOST_FRAMES}", where="ops", hint=hint)
+    strictest((row.licence for row in joined), where=f"licence of motion {first.id}")
+
+
+def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], motion: UUID) -> NewItem:
+    """Return the item of one resulting motion; it has the name, the tags and the seed of the edited one."""
+    source = rows[motion]
+    prompt = prompt_of(source.prompt, steps, lambda step: rows[UUID(step.values["with"])].prompt)
+    if len(prompt) > MOST_CHARACTERS:
+        raise TooLarge(
+            f"the prompts of the motions have {len(prompt)} characters together; the most is {MOST_CHARACTERS}",
+            where="ops",
+            hint="Join fewer motions.",
+        )
+    return NewItem(
+        prompt=prompt,
+        name=source.name,
+        tags=source.tags,
+        index=number,
+        model=EDIT_QUEUE,
+        bundle=EDIT_QUEUE,
+        batch_key=BATCH_KEY,
+        text_key=NO_TEXT,
+        text_batch_key=NO_TEXT,
+        seed=source.seed,
+        edits=Edits(tuple(step.as_json() for step in steps), tuple(_sources(motion, steps))),
+    )
+
+
+def _sources(motion: UUID, steps: Iterable[Step]) -> list[UUID]:
+    others = (UUID(step.values["with"]) for step in steps if "with" in step.values)
+    return list(dict.fromkeys((motion, *others)))

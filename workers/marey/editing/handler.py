@@ -1,0 +1,68 @@
+"""Handler of the queue `edit`: an item is one result of operations on stored motions. Needs no model, and no torch."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from functools import partial
+from uuid import UUID
+
+from marey.editing.judge import judged
+from marey.jobs import EDIT_QUEUE, ClaimedItem, Edits
+from marey.motion.clip import MotionClip, parse_npz
+from marey.motion.edits.editing import EditSource, edit
+from marey.motion.edits.licences import strictest
+from marey.runtime.editing import EditInput
+from marey.runtime.exporting import export_clip
+from marey.runtime.handler import Batch, BatchControl, Done, Handler, Outcome
+
+
+class EditHandler:
+    """Apply operations to stored motions, and judge the results."""
+
+    queue = EDIT_QUEUE
+    batch_size = 8
+
+    def load(self, bundle: str) -> None:
+        """Load nothing: operations need no model."""
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        """Return one bucket per item: one that cannot be edited fails alone."""
+        return [[item] for item in batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        """Edit one motion.
+
+        Raises:
+            InvalidInput: an operation that the motion does not allow.
+            NotFound: a source was deleted.
+            InvalidFile: the npz of a source is broken.
+            Unreachable: the store does not answer.
+        """
+        (item,) = batch.items
+        assert item.edits is not None  # items of this queue have operations
+        assert batch.editing is not None
+        began = time.perf_counter()
+        clip = edited(item.edits, batch.editing)
+        licence = strictest(batch.editing.source(source).licence for source in item.edits.sources)
+        yield Done(item.id, partial(export_clip, clip, licence or ""), time.perf_counter() - began)
+
+
+def edited(edits: Edits, given: EditInput) -> MotionClip:
+    """Return the result of operations that make one motion, with its quality record."""
+
+    def load(name: str) -> EditSource:
+        return _read(UUID(name), given)
+
+    (clip,) = edit(_read(edits.sources[0], given), edits.ops, load=load)
+    return judged(clip)
+
+
+def _read(motion: UUID, given: EditInput) -> EditSource:
+    sha256 = given.source(motion).sha256
+    return EditSource(parse_npz(given.read(sha256), f"motion {motion}"), str(motion), sha256)
+
+
+def create_handler() -> Handler:
+    """Create the handler."""
+    return EditHandler()
