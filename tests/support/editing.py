@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from marey.editing.handler import EditHandler
@@ -26,6 +29,25 @@ def work_edits(api: LiveApi) -> None:
     try:
         loop.run()
     finally:
+        loop.close()
+
+
+@contextmanager
+def working_editor(api: LiveApi) -> Iterator[None]:
+    """Work off the queue `edit` until the end of the block."""
+    loop, over = Loop(api.engine, api.store, EditHandler()), threading.Event()
+
+    def work() -> None:
+        while not over.wait(0.05):
+            loop.run()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join(60)
         loop.close()
 
 

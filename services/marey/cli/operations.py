@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
+from marey.core.documents import parse_json
 from marey.core.errors import InvalidInput
 from marey.motion.edits.operation import value_of_text
 from marey.motion.edits.table import OPERATIONS
+from marey.motion.files import read_limited
 
+Ops = Annotated[
+    Path | None,
+    typer.Option("--ops", metavar="FILE", help='Operations as JSON, such as [{"op": "trim", "from": 0.5}].'),
+]
+MOST = 2**20
+"""Bytes of a file of operations."""
 GIVEN = "marey.operations"
 """Key of the context: the options of operations with their values, in order."""
 
@@ -64,6 +73,25 @@ def operations_of(context: typer.Context) -> list[dict[str, Any]]:
             raise InvalidInput(f"{value!r} is not {error}", where=option) from None
         found.append({"op": operation.name, **values})
     return found
+
+
+def given_operations(context: typer.Context, file: Path | None) -> Any:
+    """Return the operations of a command: those of its options, or those of a file of JSON.
+
+    Raises:
+        InvalidInput: both are given, or none, or a value of another form.
+        NotFound, InvalidFile, TooLarge: of the file.
+    """
+    steps = operations_of(context)
+    if file is not None:
+        if steps:
+            raise InvalidInput("cannot be combined with operations", where="--ops", hint="Write them into the file.")
+        return parse_json(read_limited(file, MOST), str(file))
+    if not steps:
+        raise InvalidInput(
+            "no operation is given", hint=f"Name one, such as --loop; `{context.command_path} --help` lists them."
+        )
+    return steps
 
 
 def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from marey.client.types.jobs import (
         CheckedJob,
         Counters,
+        Edits,
         Erasure,
         Estimate,
         Job,
@@ -122,8 +123,8 @@ __getattr__ = lazy_names(
             "EvaluationRequest MetricChange MetricPair"
         ),
         "marey.client.types.jobs": (
-            "CheckedJob Counters Erasure Estimate Job JobEvent JobItem NamedAction QualityCounts QueuePosition Quota "
-            "Scope ScopeExample ScopeReport Speed SubmittedJob"
+            "CheckedJob Counters Edits Erasure Estimate Job JobEvent JobItem NamedAction QualityCounts QueuePosition "
+            "Quota Scope ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
@@ -156,6 +157,7 @@ __all__ = [
     "Delivery",
     "DeliveryAttempt",
     "DeliveryDetail",
+    "Edits",
     "Erasure",
     "ErrorDetail",
     "Estimate",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from marey.client.evaluations import Evaluations
 from marey.client.jobs import Jobs
@@ -11,9 +12,12 @@ from marey.client.models import Models
 from marey.client.motions import Motions
 from marey.client.place import Server, find_server, server_at
 from marey.client.references import References
+from marey.client.resources import identifier
 from marey.client.schedules import Schedules
 from marey.client.streams import Streams
 from marey.client.transport import Transport
+from marey.client.types.jobs import Job
+from marey.client.types.motions import Motion
 from marey.client.webhooks import Webhooks
 
 
@@ -68,6 +72,39 @@ class Client:
     ) -> None:
         self.close()
 
+    def edit(
+        self,
+        motion: Motion | str,
+        ops: Sequence[Mapping[str, Any]],
+        *,
+        name: str | None = None,
+        comment: str | None = None,
+        priority: int = 0,
+        keep_days: int | None = None,
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Edit a stored motion on the server; `jobs.wait` waits, and `motions.list(job=…)` has the results.
+
+        Args:
+            motion: to edit; it does not change.
+            ops: operations such as `[{"op": "trim", "from": 0.5}, {"op": "loop"}]`, applied in their order; `with` of
+                `concat` is another stored motion or its id. Each `split` makes two motions of one.
+            name, comment: of the job.
+            priority: -1000 to 1000; higher runs first.
+            keep_days: delete the job with its motions this many days after its end; None = the server's default.
+            idempotency_key: of all attempts; None = random.
+
+        Raises:
+            NotFound: there is no such motion.
+            InvalidInput: an operation that is unknown, or a value that it does not allow.
+            TooLarge: too many pieces, or motions that are too long.
+            QuotaUsedUp, Conflict, Refused, Unreachable: as the server says.
+        """
+        given = {"name": name, "comment": comment, "priority": priority or None, "keep_days": keep_days}
+        body = {"ops": [_named(op) for op in ops], **{key: each for key, each in given.items() if each is not None}}
+        path = f"/v1/motions/{identifier(motion)}/edits"
+        return Job.of(self._transport.post_new(path, body, idempotency_key=idempotency_key))
+
     @property
     def server(self) -> Server:
         """The server and the key that this client uses."""
@@ -76,3 +113,8 @@ class Client:
     def close(self) -> None:
         """Close the connections."""
         self._transport.close()
+
+
+def _named(op: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return an operation with the ids of motions."""
+    return {name: identifier(value) if isinstance(value, Motion) else value for name, value in op.items()}

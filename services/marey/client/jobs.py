@@ -313,7 +313,7 @@ class Jobs(Resource):
         return Job.of(self._transport.patch(_path(job), changes, reason=reason))
 
     def erase(self, job: Job | str) -> Erasure:
-        """Erase the prompts of an ended job permanently; its motions, names and tags stay."""
+        """Erase the prompts of an ended job and of its edits permanently; motions, names and tags stay."""
         return Erasure.of(self._transport.post(f"{_path(job)}/erase"))
 
     def delete(self, job: Job | str) -> None:

@@ -104,6 +104,16 @@ class Motions(Resource):
             for each in self._transport.post("/v1/motions/reroll", {"motions": some, "comment": comment})["items"]
         ]
 
+    def revert(self, motion: Motion | str) -> Motion:
+        """Go back from an edit to the motion that it was made from, and return that one; nothing is deleted.
+
+        The edit becomes rejected. Its source becomes kept if the edit was, and is no longer rejected.
+
+        Raises:
+            Conflict: it is not an edit.
+        """
+        return Motion.of(self._transport.post(f"/v1/motions/{identifier(motion)}/revert"))
+
     def fetch(self, motion: Motion | str, path: str | Path, *, overwrite: bool = False) -> Path:
         """Fetch a file of a motion, resumed where an earlier fetch broke off and verified by its sha256.
 

@@ -105,9 +105,9 @@ class Transport:
         """POST a JSON body (None = none) and return the answer's JSON; only for requests that may be repeated."""
         return _json(self._send("POST", path, params=_given(params), json=body))
 
-    def post_new(self, path: str, body: Any) -> Any:
-        """POST with an idempotency key, which all retries share, so that the object is created once."""
-        key = {"Idempotency-Key": str(uuid4())}
+    def post_new(self, path: str, body: Any, *, idempotency_key: str | None = None) -> Any:
+        """POST with an idempotency key (None = random), which all retries share, so that the object is created once."""
+        key = {"Idempotency-Key": idempotency_key or str(uuid4())}
         return _json(self._send("POST", path, patience=SUBMIT_BUSY_SECONDS, json=body, headers=key))
 
     def post_once(self, path: str, body: Any) -> Any:

@@ -1,7 +1,7 @@
 """User actions on motions: search, edits, reviews and re-rolls, references, retention, erasure, files
 made on request, garbage collection."""
 
-from marey.takes.edits import NewEdit, submit_edit
+from marey.takes.edits import NewEdit, revert, submit_edit
 from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
 from marey.takes.made import (
@@ -47,6 +47,7 @@ __all__ = [
     "renew_makings",
     "reroll",
     "resolve_reference",
+    "revert",
     "review",
     "rewrite_files",
     "submit_edit",

@@ -12,16 +12,31 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound, TooLarge
 from marey.exporters.registry import CANONICAL
-from marey.jobs import EDIT_QUEUE, NO_TEXT, Edits, JobKind, MotionRow, NewItem, NewJob, SubmittedJob, submit, tables
+from marey.jobs import (
+    EDIT_QUEUE,
+    NO_TEXT,
+    Edits,
+    JobKind,
+    MotionRow,
+    NewItem,
+    NewJob,
+    Review,
+    SubmittedJob,
+    submit,
+    tables,
+)
 from marey.jobs.motions import get_motion
 from marey.motion.edits.editing import MOST_FRAMES
 from marey.motion.edits.licences import strictest
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import Step, pieces_of, read_steps
+from marey.takes.reviews import review
 from marey.tenants import DEFAULT_TENANT
 
 MOST_CHARACTERS = 20_000
 """Characters of the prompt of joined motions."""
+REVERTED = "reverted to its source"
+"""Comment on the review of an edit."""
 BATCH_KEY = hashlib.sha256(EDIT_QUEUE.encode()).hexdigest()
 
 HOLD_JOBS = sa.text("""
@@ -117,6 +132,44 @@ def edit_jobs_of(conn: sa.Connection, job: UUID) -> Sequence[UUID]:
         .order_by(item.job_id)
     )
     return conn.execute(query).scalars().all()
+
+
+def revert(conn: sa.Connection, tenant: str, motion: UUID, *, by: str) -> MotionRow:
+    """Go back from an edit to the motion that it was made from; nothing is deleted.
+
+    The edit becomes rejected. Its source becomes kept if the edit was, and is no longer rejected. A repeated call
+    changes nothing.
+
+    Args:
+        by: name of the reviewer.
+
+    Returns:
+        The source.
+
+    Raises:
+        NotFound: the tenant has no such motion, or its source was deleted.
+        Conflict: it is not an edit.
+    """
+    edit = get_motion(conn, tenant, motion)
+    if not edit.edited_from:
+        raise Conflict("the motion was not edited", where=f"motion {motion}", hint="Only an edit can be reverted.")
+    source = _source(conn, tenant, edit)
+    if edit.review is Review.KEPT:
+        review(conn, tenant, [source.id], Review.KEPT, by=by)
+    elif source.review is Review.REJECTED:
+        review(conn, tenant, [source.id], None, by=by)
+    if edit.review is not Review.REJECTED:
+        review(conn, tenant, [edit.id], Review.REJECTED, by=by, comment=REVERTED)
+    return get_motion(conn, tenant, source.id)
+
+
+def _source(conn: sa.Connection, tenant: str, edit: MotionRow) -> MotionRow:
+    try:
+        return get_motion(conn, tenant, edit.edited_from[0])
+    except NotFound:
+        raise NotFound(
+            "the motion that it was made from was deleted", where=f"motion {edit.edited_from[0]}", hint="Keep the edit."
+        ) from None
 
 
 def _read_steps(ops: Sequence[Mapping[str, Any]]) -> tuple[Step, ...]:

@@ -27,6 +27,7 @@ NAMES = {
     jobs.Counters: "CountersView",
     jobs.Job: "JobView",
     jobs.SubmittedJob: "SubmittedView",
+    jobs.Edits: "EditsView",
     jobs.JobItem: "ItemView",
     jobs.JobEvent: "EventView",
     jobs.Speed: "SpeedView",

@@ -1,4 +1,4 @@
-"""`/v1/motions/{motion}/edits`."""
+"""`/v1/motions/{motion}/edits` and `…/revert`."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from marey.api.auth import Submitter
 from marey.api.context import Connection, deadline
 from marey.api.edits.schemas import NewEditBody
 from marey.api.jobs.schemas import JobView
+from marey.api.takes.schemas import MotionView
 from marey.core import tracing
 from marey.http.problems import RESPONSES
 from marey.http.schemas import IdempotencyKey
@@ -54,6 +55,17 @@ def edit_motion(
         note(conn, key, "motion.edit", motion, job=str(row.id), items=row.total)
     log.info("submitted", job=str(row.id), tenant=key.tenant, items=row.total, replayed=submitted.replayed)
     return JobView.of(row)
+
+
+@router.post("/{motion}/revert")
+def revert_motion(motion: UUID, conn: Connection, key: Submitter) -> MotionView:
+    """Go back from an edit to the motion that it was made from, and return that one; idempotent. Nothing is deleted.
+
+    The edit becomes rejected. Its source becomes kept if the edit was, and is no longer rejected.
+    """
+    source = takes.revert(conn, key.tenant, motion, by=key.name)
+    note(conn, key, "motion.revert", motion, source=str(source.id))
+    return MotionView.of(source)
 
 
 def _sha256(motion: UUID, body: NewEditBody) -> str:

@@ -8,11 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console, options
-from marey.cli.operations import operations_of, with_operations
-from marey.core.errors import InvalidInput
-
-MOST = 2**20
-"""Bytes of a file of operations."""
+from marey.cli.operations import Ops, given_operations, with_operations
 
 
 @with_operations
@@ -28,10 +24,7 @@ def edit(
             "walk-1.npz, walk-2.npz.",
         ),
     ],
-    ops: Annotated[
-        Path | None,
-        typer.Option("--ops", metavar="FILE", help='Operations as JSON, such as [{"op": "trim", "from": 0.5}].'),
-    ] = None,
+    ops: Ops = None,
     file_format: Annotated[str, typer.Option("--format", help="Format of files in a folder.")] = "npz",
     bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
     root_bone: options.RootBone = False,
@@ -49,14 +42,8 @@ def edit(
     given."""
     from marey.cli.roles.editing import edit_files
 
-    del operations  # `operations_of` has them in their order
-    steps = operations_of(context)
-    if ops is not None:
-        if steps:
-            raise InvalidInput("cannot be combined with operations", where="--ops", hint="Write them into the file.")
-        steps = _read(ops)
-    if not steps:
-        raise InvalidInput("no operation is given", hint="Name one, such as --loop; `marey edit --help` lists them.")
+    del operations  # `given_operations` has them in their order
+    steps = given_operations(context, ops)
     export = options.export_options(
         bvh_root, root_bone, None, tpose_frame, options.RestPoseOption.T, placement, mesh, rig, rig_map, names
     )
@@ -66,13 +53,6 @@ def edit(
             console.result_json(line)
         else:
             console.result(console.home_relative(Path(line["file"])))
-
-
-def _read(path: Path) -> Any:
-    from marey.core.documents import parse_json
-    from marey.motion.files import read_limited
-
-    return parse_json(read_limited(path, MOST), str(path))
 
 
 def _report(line: dict[str, Any]) -> None:

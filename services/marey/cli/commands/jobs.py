@@ -27,7 +27,7 @@ Timeout = Annotated[float | None, typer.Option("--timeout", help="Timeout in sec
 Reason = Annotated[str | None, typer.Option("--reason", help="Reason, recorded in the job's events.")]
 
 FIELDS = (
-    *("id", "name", "comment", "state", "control", "priority", "fail_early"),
+    *("id", "name", "comment", "kind", "state", "control", "priority", "fail_early"),
     *("created", "started", "finished", "expires", "erased"),
 )
 COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
@@ -75,7 +75,7 @@ def show(job: Job, as_json: console.Json = False) -> None:
             console.result_json({**found, "queue": place, "quality": None if quality is None else quality.raw})
             return
         for field in FIELDS:
-            if found[field] is not None:
+            if found.get(field) is not None:  # a server of an earlier release has no kind
                 console.result(f"{field:<10} {found[field]}")
         counts = ", ".join(f"{found['counters'][name]} {name}" for name in COUNTERS if found["counters"][name])
         console.result(f"{'items':<10} {found['total']}: {counts}")
@@ -195,16 +195,17 @@ def erase(
     yes: console.Yes = False,
     as_json: console.Json = False,
 ) -> None:
-    """Erase the prompts of ended jobs permanently; motions, names and tags stay."""
+    """Erase the prompts of ended jobs and of every edit of their motions permanently; motions, names and tags stay."""
 
     def erase_one(client: Client, job: Reference) -> None:
         found = client.jobs.erase(job.id)
         if as_json:
             console.result_json(found.raw)
             return
-        left = found.files_left
+        left, edits = found.files_left, len(found.edits)
+        also = f" and of {edits} jobs of edits" if edits else ""
         more = f"; {left} files are written anew and cannot be fetched before" if left else ""
-        console.say(f"erased the prompts of {job}{more}")
+        console.say(f"erased the prompts of {job}{also}{more}")
 
     bulk.delete_all("job", jobs, erase_one, question="Erase the prompts of {} permanently?", done=None, yes=yes)
 

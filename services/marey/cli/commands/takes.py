@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from marey.cli import console, options
+from marey.cli.operations import OperationsCommand, Ops, given_operations, with_operations
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
+from marey.motion.edits.steps import read_steps
 
 if TYPE_CHECKING:
     from marey.client import Client
 
-app = typer.Typer(help="Motions on the server: find, keep, reject and re-roll them, get files.", no_args_is_help=True)
+app = typer.Typer(
+    help="Motions on the server: find, keep, reject, edit and re-roll them, get files.", no_args_is_help=True
+)
 
 MOST = 1000
 """Motions of one request."""
@@ -106,6 +110,64 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
                     console.result(f"{take.motion} item {take.item} seed {take.seed} job {take.job}{when}")
 
 
+@app.command("edit", cls=OperationsCommand)
+@with_operations
+def edit(
+    context: typer.Context,
+    motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
+    ops: Ops = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
+    priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
+    keep_days: Annotated[
+        int | None,
+        typer.Option("--keep-days", min=1, help="Delete the job with its motions this many days after its end."),
+    ] = None,
+    wait: Annotated[
+        bool, typer.Option("--wait/--no-wait", help="Wait for the motions; without it, print the job's id.")
+    ] = True,
+    timeout: Annotated[
+        float | None, typer.Option("--timeout", help="Timeout in seconds; exit 7 when it passes.")
+    ] = None,
+    as_json: console.Json = False,
+    **operations: Any,
+) -> None:
+    """Edit a motion on the server: cut, join, loop, mirror, retime or smooth it; prints the ids of the new motions.
+
+    The motion itself does not change. Operations apply in the order in which they are given; others to join are motions
+    of the server.
+    """
+    from marey.cli.watching import check_ended, watch_job
+    from marey.client import Client
+
+    del operations  # `given_operations` has them in their order
+    given = read_steps(given_operations(context, ops))
+    with Client() as client:
+        steps = [_with_id(client, step.as_json()) for step in given]
+        found = find(client, "motion", motion).id
+        job = client.edit(found, steps, name=name, priority=priority, keep_days=keep_days)
+        if not wait:
+            _show(job.raw, as_json)
+            return
+        ended = watch_job(client, job.id, timeout=timeout)
+        for made in client.motions.list(job=job):
+            _show(made.raw, as_json)
+    check_ended(ended)
+
+
+@app.command()
+def revert(motions: Motions, as_json: console.Json = False) -> None:
+    """Go back from edits to the motions that they were made from; prints the ids of those. Nothing is deleted.
+
+    The edit becomes rejected; its source becomes kept if the edit was, and is no longer rejected.
+    """
+    from marey.client import Client
+
+    with Client() as client:
+        for some in _ids(client, motions):
+            for motion in some:
+                _show(client.motions.revert(motion).raw, as_json)
+
+
 @app.command("file")
 def make_file(
     motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
@@ -132,6 +194,18 @@ def make_file(
             found.id, output, file_format=file_format, fps=fps, overwrite=overwrite, **chosen
         )
     console.result(console.home_relative(path))
+
+
+def _with_id(client: Client, step: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return an operation with the id of the motion that it refers to."""
+    return {name: find(client, "motion", value).id if name == "with" else value for name, value in step.items()}
+
+
+def _show(found: Mapping[str, Any], as_json: bool) -> None:
+    if as_json:
+        console.result_json(found)
+    else:
+        console.result(str(found["id"]))
 
 
 def _review(

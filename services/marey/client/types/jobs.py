@@ -126,6 +126,8 @@ class Job(Result):
     """When its prompts were erased."""
     scope: str = ""
     """Treatment of prompts with unknown actions: warn, refuse or ignore."""
+    kind: str = ""
+    """generate, or edit: its items are made from stored motions."""
 
     @property
     def has_ended(self) -> bool:
@@ -141,6 +143,16 @@ class SubmittedJob(Job):
     """None with scope `ignore`."""
     warnings: tuple[str, ...] = ()
     """Sentences on what the model does not know or may not do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edits(Result):
+    """Operations on stored motions."""
+
+    ops: tuple[Mapping[str, Any], ...] = ()
+    """Of this result: each split stands as one of its two trims."""
+    sources: tuple[str, ...] = ()
+    """The edited motion, then the others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +183,8 @@ class JobItem(Result):
     """The motion that it is another take of."""
     scope: Scope | None = None
     """None = not examined, erased, or the bundle lists no actions."""
+    edits: Edits | None = None
+    """None if the motion is generated."""
     motion: Motion | None = None
 
 
@@ -283,4 +297,6 @@ class Erasure(Result):
     job: str = ""
     erased: datetime | None = None
     files_left: int = 0
-    """Files that are still to be rewritten; they cannot be fetched before."""
+    """Files that are still to be rewritten, of edits too; they cannot be fetched before."""
+    edits: tuple[str, ...] = ()
+    """Jobs of edits of its motions; their prompts were erased with it."""

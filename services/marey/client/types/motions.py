@@ -119,6 +119,8 @@ class Motion(Result):
     """The motion that it is another take of."""
     replaced_by: str | None = None
     """The item that is another take of it."""
+    edited_from: tuple[str, ...] = ()
+    """Sources of an edit: the edited motion, then the others; empty if the motion was generated."""
     quality: MotionQuality | None = None
     """None for motions of earlier releases and of skeletons other than that of 22 joints."""
     selection: Selection | None = None

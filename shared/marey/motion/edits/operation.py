@@ -115,7 +115,11 @@ class Operation:
         parts = text.split(":") if len(own) > 1 else [text]
         if len(parts) != len(own):
             raise ValueError(self.metavar)
-        return {each.name: value_of_text(part) for each, part in zip(own, parts, strict=True) if part}
+        return {
+            each.name: part if each.read is reference else value_of_text(part)  # names of digits are names
+            for each, part in zip(own, parts, strict=True)
+            if part
+        }
 
 
 def value_of_text(text: str) -> float | str:

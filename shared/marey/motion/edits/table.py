@@ -45,7 +45,7 @@ _ALL = (
                 metavar="SECONDS",
             ),
         ),
-        metavar="FILE",
+        metavar="MOTION",
     ),
     Operation(
         "loop",
