@@ -12,7 +12,6 @@ import typer
 from marey.client.names import DEFAULT_TEMPLATE
 from marey.core.errors import InvalidInput
 from marey.items.item import MAX_BEST_OF, MAX_REDRAWS, read_setting
-from marey.motion.export_options import ExportOptions
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:
@@ -57,75 +56,6 @@ class VarietyOption(StrEnum):
     LOW = "low"
     NORMAL = "normal"
     HIGH = "high"
-
-
-class BvhRootOption(StrEnum):
-    """The OFFSET of a BVH file's root."""
-
-    ZERO = "zero"
-    OFFSET = "offset"
-
-
-class InPlaceOption(StrEnum):
-    """Parts of a motion's way that are removed."""
-
-    TRAVEL = "travel"
-    HEADING = "heading"
-
-
-class RestPoseOption(StrEnum):
-    """Rest poses of a rig."""
-
-    T = "t"
-    A = "a"
-
-
-class PlacementOption(StrEnum):
-    """Places of a motion in a file."""
-
-    ORIGIN = "origin"
-    KEEP = "keep"
-
-
-class NamesOption(StrEnum):
-    """Spellings of joint names."""
-
-    MIXAMO = "mixamo"
-    UE5 = "ue5"
-    HUMANIK = "humanik"
-    SMPLX = "smplx"
-    VRM = "vrm"
-
-
-def export_options(
-    bvh_root: BvhRootOption,
-    root_bone: bool,
-    in_place: InPlaceOption | None,
-    tpose_frame: bool,
-    rest_pose: RestPoseOption,
-    placement: PlacementOption,
-    mesh: bool,
-    rig: str | None = None,
-    rig_map: Path | None = None,
-    names: NamesOption | None = None,
-) -> ExportOptions:
-    """Return the options of the files.
-
-    Raises:
-        InvalidInput: two contradict each other.
-    """
-    return ExportOptions(
-        bvh_root=bvh_root.value,
-        root_bone=root_bone,
-        in_place=None if in_place is None else in_place.value,
-        tpose_frame=tpose_frame,
-        rest_pose=rest_pose.value,
-        placement=placement.value,
-        mesh=mesh,
-        rig=rig,
-        rig_map=None if rig_map is None else str(rig_map),
-        names=None if names is None else names.value,
-    )
 
 
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
@@ -208,65 +138,8 @@ Scope = Annotated[
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]
 BundleOrFolder = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]
-BvhRoot = Annotated[
-    BvhRootOption,
-    typer.Option(
-        "--bvh-root",
-        help="OFFSET of the root in BVH files: zero, or offset = the pelvis height, for programs in which position "
-        "channels replace it.",
-    ),
-]
-RootBone = Annotated[
-    bool,
-    typer.Option("--root-bone", help="Add a bone `root` on the floor with X, Z and heading; the pelvis has the rest."),
-]
-InPlace = Annotated[
-    InPlaceOption | None,
-    typer.Option(
-        "--in-place", help="Remove the travel (X and Z), or with `heading` the turning too; default: neither."
-    ),
-]
-TPoseFrame = Annotated[
-    bool, typer.Option("--tpose-frame", help="Put the T-pose in frame 0; the motion begins in frame 1.")
-]
-RestPose = Annotated[
-    RestPoseOption,
-    typer.Option(
-        "--rest-pose", help="Rest pose of BVH, FBX and USD files: T-pose, or the A-pose of a rig whose A-pose is known."
-    ),
-]
-Placement = Annotated[
-    PlacementOption,
-    typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
-]
-Mesh = Annotated[
-    bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
-]
 Loop = Annotated[
     bool,
     typer.Option("--loop", help="Cut a cycle out of each motion that can be played on, as `marey edit --loop`."),
-]
-Rig = Annotated[
-    str | None,
-    typer.Option(
-        "--rig",
-        metavar="NAME|FILE",
-        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json,"
-        " .npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
-    ),
-]
-RigMap = Annotated[
-    Path | None,
-    typer.Option(
-        "--map", metavar="FILE", help="JSON of parts of the body and joint names of the rig, where they are not found."
-    ),
-]
-JointNames = Annotated[
-    NamesOption | None,
-    typer.Option(
-        "--names",
-        help="Rename the joints, and nothing else, for tools that retarget by name. A renamed clip put straight onto a "
-        "Mixamo or Manny character collapses, for the joints of those have other axes: use --rig.",
-    ),
 ]
 TEMPLATE = DEFAULT_TEMPLATE

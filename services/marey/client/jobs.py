@@ -28,7 +28,7 @@ from marey.client.types.jobs import (
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
 from marey.items.item import Item
-from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Names, Placement
+from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Names, Placement, RestPose
 from marey.vocabulary.scope import ScopePolicy
 
 Row = Item | Mapping[str, object] | str
@@ -386,6 +386,7 @@ class Jobs(Resource):
         root_bone: bool = False,
         in_place: InPlace | None = None,
         tpose_frame: bool = False,
+        rest_pose: RestPose = "t",
         placement: Placement = "origin",
         mesh: bool = False,
         rig: str | None = None,
@@ -405,8 +406,8 @@ class Jobs(Resource):
             review: only motions with this review.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
-            bvh_root, root_bone, in_place, tpose_frame, placement, mesh, rig, rig_map, names: of files whose formats
-                have these options; see `docs/reference/formats.md`.
+            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names: of files whose
+                formats have these options; see `docs/reference/formats.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
 
@@ -435,6 +436,7 @@ class Jobs(Resource):
                 root_bone=root_bone,
                 in_place=in_place,
                 tpose_frame=tpose_frame,
+                rest_pose=rest_pose,
                 placement=placement,
                 mesh=mesh,
                 rig=rig,

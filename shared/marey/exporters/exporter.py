@@ -34,7 +34,7 @@ class Coordinates(ExportOptions):
     @classmethod
     def of(cls, export: ExportOptions, unit: Unit = "cm", up: Up = "y") -> Coordinates:
         """Return coordinates with these options."""
-        return cls(unit, up, **{name: getattr(export, name) for name in export.chosen})
+        return cls(unit, up, **export.values)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class FileRecipe:
     @property
     def chosen(self) -> dict[str, Any]:
         """Options that differ from the defaults, by name in alphabetical order."""
-        return {name: getattr(self.export, name) for name in sorted(self.export.chosen)}
+        return dict(sorted(self.export.values.items()))
 
     def key(self, source: str) -> str:
         """Return the sha256 that identifies the file among all that were ever made.

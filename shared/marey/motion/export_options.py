@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 from marey.core.errors import InvalidInput
 
@@ -89,6 +89,11 @@ class ExportOptions:
         """Names of the options that differ from the defaults."""
         known = fields(ExportOptions)
         return tuple(each.name for each in known if getattr(self, each.name) != each.default)
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values of the options that differ from the defaults, as keyword arguments."""
+        return {name: getattr(self, name) for name in self.chosen}
 
 
 PLAIN = ExportOptions()

@@ -18,6 +18,7 @@ from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
+from tests.support.walker import walker
 
 NAMES = ("--name-template", "{name}")
 
@@ -68,6 +69,17 @@ def test_files_of_takes_that_are_not_chosen_any_more_are_told_and_pruned(
     assert {"take00.txt", "take00.npz.bak", "manifest.csv"} < {path.name for path in folder.iterdir()}
     assert not (folder / RECORD).exists()
     assert "earlier" not in marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok().err
+
+
+def test_every_option_of_an_export_reaches_the_files(marey: Command, api: LiveApi, tmp_path: Path) -> None:
+    with api.client() as client:
+        job = client.submit([{"prompt": "a person walks", "name": "walk"}])["id"]
+    api.work(walker(seconds=0.5).to_npz())
+    options = ["--root-bone", "--in-place", "heading", "--tpose-frame"]
+    marey("fetch", job, "-o", tmp_path, "--format", "bvh", *options, *NAMES).ok()
+    assert (tmp_path / "walk.bvh").read_text().startswith("HIERARCHY\nROOT root")
+    refused = marey("fetch", job, "-o", tmp_path / "a", "--format", "bvh", "--rest-pose", "a", *NAMES)
+    refused.refused(2, "no A-pose is known of this skeleton")
 
 
 def test_one_call_may_fetch_and_prune_and_a_take_that_is_kept_again_is_not_left(

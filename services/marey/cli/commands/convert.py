@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console, options
+from marey.cli.exporting import RestPoseOption, with_export
 from marey.core.errors import InvalidInput
+from marey.motion.export_options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -37,6 +39,7 @@ FromUnit = Annotated[Unit, typer.Option("--from-unit", help="Unit of a BVH sourc
 FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that points up.")]
 
 
+@with_export()
 def convert(
     source: Source,
     target: Annotated[
@@ -45,22 +48,13 @@ def convert(
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH, FBX or USD result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH, FBX or USD result that points up.")] = Up.Y,
-    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
-    root_bone: options.RootBone = False,
-    in_place: options.InPlace = None,
-    tpose_frame: options.TPoseFrame = False,
-    rest_pose: options.RestPose = options.RestPoseOption.T,
-    placement: options.Placement = options.PlacementOption.ORIGIN,
-    mesh: options.Mesh = False,
-    rig: options.Rig = None,
-    rig_map: options.RigMap = None,
-    names: options.JointNames = None,
+    export: ExportOptions = PLAIN,
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
     from_rest_pose: Annotated[
-        options.RestPoseOption,
+        RestPoseOption,
         typer.Option("--from-rest-pose", help="Rest pose of a BVH source whose A-pose is known."),
-    ] = options.RestPoseOption.T,
+    ] = RestPoseOption.T,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Convert a motion between BVH, FBX, glb, npz and other formats, with another rate, unit, axis, root or pose."""
@@ -76,9 +70,7 @@ def convert(
         fps=fps,
         unit=unit.value,
         up=up.value,
-        export=options.export_options(
-            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
-        ),
+        export=export,
         source_unit=from_unit.value,
         source_up=from_up.value,
         source_rest_pose=from_rest_pose.value,

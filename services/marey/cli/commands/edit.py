@@ -8,10 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console, options
+from marey.cli.exporting import with_export
 from marey.cli.operations import Ops, given_operations, with_operations
+from marey.motion.export_options import PLAIN, ExportOptions
 
 
 @with_operations
+@with_export(without=("in_place", "rest_pose"))
 def edit(
     context: typer.Context,
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Motion files, such as .npz, .bvh or .glb.")],
@@ -26,14 +29,7 @@ def edit(
     ],
     ops: Ops = None,
     file_format: Annotated[str, typer.Option("--format", help="Format of files in a folder.")] = "npz",
-    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
-    root_bone: options.RootBone = False,
-    tpose_frame: options.TPoseFrame = False,
-    placement: options.Placement = options.PlacementOption.ORIGIN,
-    mesh: options.Mesh = False,
-    rig: options.Rig = None,
-    rig_map: options.RigMap = None,
-    names: options.JointNames = None,
+    export: ExportOptions = PLAIN,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
     **operations: Any,
@@ -44,9 +40,6 @@ def edit(
 
     del operations  # `given_operations` has them in their order
     steps = given_operations(context, ops)
-    export = options.export_options(
-        bvh_root, root_bone, None, tpose_frame, options.RestPoseOption.T, placement, mesh, rig, rig_map, names
-    )
     for line in edit_files(sources, output, steps, file_format=file_format, export=export, overwrite=overwrite):
         _report(line)
         if as_json:

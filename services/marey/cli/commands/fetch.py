@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console, options
+from marey.cli.exporting import with_export
 from marey.cli.references import FORMS, find_all
 from marey.client.names import check_template
 from marey.motion.export_options import PLAIN, ExportOptions
@@ -28,21 +29,13 @@ class FetchReviewOption(StrEnum):
     REROLLED = "rerolled"
 
 
+@with_export()
 def fetch(
     jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help=f"Jobs whose motions to fetch: {FORMS}.")],
     output: options.Folder = Path(),
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
-    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
-    root_bone: options.RootBone = False,
-    in_place: options.InPlace = None,
-    tpose_frame: options.TPoseFrame = False,
-    rest_pose: options.RestPose = options.RestPoseOption.T,
-    placement: options.Placement = options.PlacementOption.ORIGIN,
-    mesh: options.Mesh = False,
-    rig: options.Rig = None,
-    rig_map: options.RigMap = None,
-    names: options.JointNames = None,
+    export: ExportOptions = PLAIN,
     only: Annotated[FetchReviewOption | None, typer.Option("--only", help="Only motions with this review.")] = None,
     prune: Annotated[
         bool,
@@ -59,9 +52,6 @@ def fetch(
     from marey.client import Client
 
     check_template(name_template)
-    export = options.export_options(
-        bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
-    )
     with Client() as client:
         found = find_all(client, "job", jobs)
         for job in found:
@@ -148,9 +138,7 @@ def fetch_job(
         fetched = client.jobs.fetch(
             job, folder,
             formats=formats or None, name_template=template, review=None if only is None else only.value, prune=prune,
-            overwrite=overwrite, on_progress=Observer(), bvh_root=export.bvh_root, root_bone=export.root_bone,
-            in_place=export.in_place, tpose_frame=export.tpose_frame, placement=export.placement, mesh=export.mesh,
-            rig=export.rig, rig_map=export.rig_map, names=export.names,
+            overwrite=overwrite, on_progress=Observer(), **export.values,
         )  # fmt: skip
     for message in left:
         console.say(message)

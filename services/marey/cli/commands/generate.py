@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts, row_defaults
+from marey.cli.exporting import with_export
 from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.core.extras import needs_extra
 from marey.items.item import MAX_SEED, Item, Problem
+from marey.motion.export_options import PLAIN, ExportOptions
 
 OFF_PROMPT = "off-prompt"
 """The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
-    from marey.motion.export_options import ExportOptions
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Planned:
     """The path of each format."""
 
 
+@with_export()
 def generate(
     prompts: options.Prompts = None,
     file: options.PromptFile = None,
@@ -61,16 +63,7 @@ def generate(
     scope: options.Scope = options.ScopeOption.WARN,
     loop: options.Loop = False,
     formats: options.Formats = None,
-    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
-    root_bone: options.RootBone = False,
-    in_place: options.InPlace = None,
-    tpose_frame: options.TPoseFrame = False,
-    rest_pose: options.RestPose = options.RestPoseOption.T,
-    placement: options.Placement = options.PlacementOption.ORIGIN,
-    mesh: options.Mesh = False,
-    rig: options.Rig = None,
-    rig_map: options.RigMap = None,
-    names: options.JointNames = None,
+    export: ExportOptions = PLAIN,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
     overwrite: options.Overwrite = False,
@@ -82,9 +75,6 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
-    export = options.export_options(
-        bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names
-    )
     kinds = _exporters(formats, export)
     defaults = row_defaults(
         sampling,

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marey.cli import console, options
+from marey.cli import console
+from marey.cli.exporting import RigMap
 
 if TYPE_CHECKING:
     from marey.motion.rigs.body import RigBody
@@ -24,7 +25,7 @@ def show(
     rig: Annotated[
         str, typer.Argument(metavar="NAME|FILE", help="mixamo, ue4, humanik, or a file such as .glb, .bvh or .json.")
     ],
-    rig_map: options.RigMap = None,
+    rig_map: RigMap = None,
     as_json: console.Json = False,
 ) -> None:
     """Show which joint of a rig is which part of the body, how it was found, and what the other joints do."""

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from marey.cli import console, options
+from marey.cli.exporting import with_export
 from marey.cli.operations import OperationsCommand, Ops, given_operations, with_operations
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
 from marey.motion.edits.steps import read_steps
+from marey.motion.export_options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
     from marey.client import Client
@@ -169,29 +171,22 @@ def revert(motions: Motions, as_json: console.Json = False) -> None:
 
 
 @app.command("file")
+@with_export(without=("rig", "rig_map", "names"))
 def make_file(
     motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
     file_format: Annotated[str, typer.Argument(metavar="FORMAT", help="Format of the file, such as glb or mp4.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
     fps: options.Fps = None,
-    bvh_root: options.BvhRoot = options.BvhRootOption.ZERO,
-    root_bone: options.RootBone = False,
-    in_place: options.InPlace = None,
-    tpose_frame: options.TPoseFrame = False,
-    rest_pose: options.RestPose = options.RestPoseOption.T,
-    placement: options.Placement = options.PlacementOption.ORIGIN,
-    mesh: options.Mesh = False,
+    export: ExportOptions = PLAIN,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Have the server make a file of a motion, and fetch it; nothing is computed on this machine."""
     from marey.client import Client
 
-    export = options.export_options(bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh)
-    chosen = {name: getattr(export, name) for name in export.chosen}
     with Client() as client:
         found = find(client, "motion", motion)
         path = client.motions.make_file(
-            found.id, output, file_format=file_format, fps=fps, overwrite=overwrite, **chosen
+            found.id, output, file_format=file_format, fps=fps, overwrite=overwrite, **export.values
         )
     console.result(console.home_relative(path))
 

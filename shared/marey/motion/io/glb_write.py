@@ -218,7 +218,7 @@ def _extras(clip: Posed, posed: Arranged, options: ExportOptions) -> dict[str, A
 
 def chosen_options(options: ExportOptions) -> dict[str, Any]:
     """Return the options that a file was written with, for its readers; a rig stands in the manifest, not as a path."""
-    return {name: getattr(options, name) for name in options.chosen if name not in ("bvh_root", "rig", "rig_map")}
+    return {name: value for name, value in options.values.items() if name not in ("bvh_root", "rig", "rig_map")}
 
 
 def spans(stands: NDArray[np.bool_], first: int) -> list[list[int]]:

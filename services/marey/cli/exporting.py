@@ -1,0 +1,161 @@
+"""Options of the command line for exports, in the same words on every command that writes motion files."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Collection, Mapping
+from enum import Enum, StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from marey.motion.export_options import ExportOptions
+
+
+class BvhRootOption(StrEnum):
+    """The OFFSET of a BVH file's root."""
+
+    ZERO = "zero"
+    OFFSET = "offset"
+
+
+class InPlaceOption(StrEnum):
+    """Parts of a motion's way that are removed."""
+
+    TRAVEL = "travel"
+    HEADING = "heading"
+
+
+class RestPoseOption(StrEnum):
+    """Rest poses of a rig."""
+
+    T = "t"
+    A = "a"
+
+
+class PlacementOption(StrEnum):
+    """Places of a motion in a file."""
+
+    ORIGIN = "origin"
+    KEEP = "keep"
+
+
+class NamesOption(StrEnum):
+    """Spellings of joint names."""
+
+    MIXAMO = "mixamo"
+    UE5 = "ue5"
+    HUMANIK = "humanik"
+    SMPLX = "smplx"
+    VRM = "vrm"
+
+
+BvhRoot = Annotated[
+    BvhRootOption,
+    typer.Option(
+        "--bvh-root",
+        help="OFFSET of the root in BVH files: zero, or offset = the pelvis height, for programs in which position "
+        "channels replace it.",
+    ),
+]
+RootBone = Annotated[
+    bool,
+    typer.Option("--root-bone", help="Add a bone `root` on the floor with X, Z and heading; the pelvis has the rest."),
+]
+InPlace = Annotated[
+    InPlaceOption | None,
+    typer.Option(
+        "--in-place", help="Remove the travel (X and Z), or with `heading` the turning too; default: neither."
+    ),
+]
+TPoseFrame = Annotated[
+    bool, typer.Option("--tpose-frame", help="Put the T-pose in frame 0; the motion begins in frame 1.")
+]
+RestPose = Annotated[
+    RestPoseOption,
+    typer.Option(
+        "--rest-pose", help="Rest pose of BVH, FBX and USD files: T-pose, or the A-pose of a rig whose A-pose is known."
+    ),
+]
+Placement = Annotated[
+    PlacementOption,
+    typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
+]
+Mesh = Annotated[
+    bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
+]
+Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="NAME|FILE",
+        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json,"
+        " .npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
+    ),
+]
+RigMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--map", metavar="FILE", help="JSON of parts of the body and joint names of the rig, where they are not found."
+    ),
+]
+JointNames = Annotated[
+    NamesOption | None,
+    typer.Option(
+        "--names",
+        help="Rename the joints, and nothing else, for tools that retarget by name. A renamed clip put straight onto a "
+        "Mixamo or Manny character collapses, for the joints of those have other axes: use --rig.",
+    ),
+]
+
+OPTIONS: Mapping[str, tuple[Any, object]] = {
+    "bvh_root": (BvhRoot, BvhRootOption.ZERO),
+    "root_bone": (RootBone, False),
+    "in_place": (InPlace, None),
+    "tpose_frame": (TPoseFrame, False),
+    "rest_pose": (RestPose, RestPoseOption.T),
+    "placement": (Placement, PlacementOption.ORIGIN),
+    "mesh": (Mesh, False),
+    "rig": (Rig, None),
+    "rig_map": (RigMap, None),
+    "names": (JointNames, None),
+}
+"""Annotation and default of the option for each field of `ExportOptions`, in the order of the help."""
+
+
+def with_export(*, without: Collection[str] = ()) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of exports in place of its parameter `export: ExportOptions`.
+
+    Args:
+        without: fields that the command leaves at their defaults.
+    """
+    chosen = {name: option for name, option in OPTIONS.items() if name not in without}
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(*args: Any, **given: Any) -> None:
+            export = ExportOptions(**{name: _plain(given.pop(name)) for name in chosen})
+            command(*args, **given, export=export)
+
+        own = inspect.signature(command, eval_str=True)
+        options = [
+            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation)
+            for name, (annotation, default) in chosen.items()
+        ]
+        parameters = [
+            each
+            for parameter in own.parameters.values()
+            for each in (options if parameter.name == "export" else [parameter])
+        ]
+        run.__signature__ = own.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
+        return run
+
+    return decorate
+
+
+def _plain(value: object) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    return str(value) if isinstance(value, Path) else value
