@@ -20,10 +20,12 @@ from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction
 from marey.exporters.making import FileRecipe
 from marey.jobs import asset_key
+from marey.motion.clip import parse_npz
 from marey.motion.export_options import ExportOptions
 from marey.storage import open_store
 from marey.storage.s3 import S3Store
 from marey.tenants import DEFAULT_TENANT, create_key
+from tests.support.editing import edited, stored
 from tests.support.live_api import ApiThread, LiveApi, settings_of
 from tests.support.walker import walker
 
@@ -93,6 +95,16 @@ def test_a_file_made_on_request_is_fetched_from_the_bucket(
         answer = http.get(f"/v1/motions/{motion['id']}/files/glb?fps=24&root_bone=true")
     assert answer.status_code == 307
     assert httpx2.get(answer.headers["location"]).content == wanted
+
+
+def test_a_motion_in_the_bucket_is_edited_and_its_result_is_stored_there(api: LiveApi) -> None:
+    source = stored(api)
+    (motion,) = edited(api, source["id"], {"op": "trim", "from": "f5", "to": "f20"})
+    assert (motion["frames"], motion["edited_from"]) == (16, [source["id"]])
+    with api.http() as http:
+        answer = http.get(f"/v1/motions/{motion['id']}/files/npz")
+    assert answer.status_code == 307
+    assert parse_npz(httpx2.get(answer.headers["location"]).content).frames == 16
 
 
 def test_signed_urls_that_expired_are_asked_for_anew(

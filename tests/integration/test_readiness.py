@@ -8,15 +8,19 @@ from pathlib import Path
 
 import httpx2
 import pytest
+import sqlalchemy as sa
 from pydantic import SecretStr
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from marey.api import readiness
+from marey.api.health.checks import ModelCheck
 from marey.api.readiness import DependencyCheck, Readiness
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
+from marey.db import transaction
 from marey.embedded import EmbeddedServer
+from marey.jobs import WorkerHeartbeat, beat
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of, wait_until
 
@@ -126,3 +130,15 @@ def test_nobody_without_a_key_is_told_where_anything_is(nowhere: tuple[Settings,
 def test_an_error_says_in_the_log_what_clients_are_not_told() -> None:
     error = Unreachable("db-7:5432 refused", where="database", public="the database does not answer")
     assert "db-7:5432" in str(error)
+
+
+def test_a_worker_of_edits_has_no_model(engine: sa.Engine) -> None:
+    check = ModelCheck(engine)
+    for queue, bundle in (("edit", "edit"), ("text", "light")):
+        with transaction(engine) as conn:
+            beat(conn, WorkerHeartbeat(queue, queue, "host", 7, "cpu", bundle))
+        with pytest.raises(Unreachable, match="no worker has its model loaded yet"):
+            check()
+    with transaction(engine) as conn:
+        beat(conn, WorkerHeartbeat("w", "hgm3", "host", 8, "cpu", "tiny@0"))
+    check()

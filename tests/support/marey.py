@@ -117,7 +117,7 @@ class Serving:
     log: Path
 
     def children(self) -> dict[str, psutil.Process]:
-        """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`, `live`."""
+        """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`, `editor`, `live`."""
         found: dict[str, psutil.Process] = {}
         for child in psutil.Process(self.process.pid).children():
             with contextlib.suppress(psutil.Error):  # just killed, and not waited for yet
@@ -171,6 +171,8 @@ def tiny(model: str) -> str:
 def _role(process: psutil.Process) -> str:
     command = process.cmdline()
     if "marey.cli" in command:
+        if "edit" in command:
+            return "editor"
         return "live" if command[-2:] == ["--only", "live"] else command[command.index("marey.cli") + 1]
     return process.name()
 

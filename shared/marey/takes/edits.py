@@ -40,7 +40,8 @@ REVERTED = "reverted to its source"
 BATCH_KEY = hashlib.sha256(EDIT_QUEUE.encode()).hexdigest()
 
 HOLD_JOBS = sa.text("""
-    SELECT job.id FROM job JOIN motion ON motion.job_id = job.id WHERE motion.id = ANY(:motions)
+    SELECT job.id FROM job JOIN motion ON motion.job_id = job.id
+    WHERE motion.id = ANY(:motions) AND motion.tenant_id = :tenant
     ORDER BY job.id FOR SHARE OF job
 """)
 
@@ -94,7 +95,8 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
     pieces = pieces_of(steps)
     others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
     ids = list(dict.fromkeys((edit.motion, *others.values())))
-    conn.execute(HOLD_JOBS, {"motions": ids})  # an erasure of a source waits, and then finds the edit
+    # An erasure of a source waits, and then finds the edit.
+    conn.execute(HOLD_JOBS, {"motions": ids, "tenant": edit.tenant})
     rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
     for where, motion in others.items():
         rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")

@@ -19,7 +19,7 @@ from tests.support.editing import edited, stored, working_editor
 from tests.support.live_api import LiveApi
 
 
-def test_operations_apply_in_the_order_of_the_command_line(marey: Command, api: LiveApi) -> None:
+def test_operations_apply_in_the_order_of_the_command_line(marey: Command, api: LiveApi, tmp_path: Path) -> None:
     source, other = stored(api, "a person walks"), stored(api, "a person waves")
     with working_editor(api):
         done = marey(
@@ -32,6 +32,8 @@ def test_operations_apply_in_the_order_of_the_command_line(marey: Command, api: 
     assert first["edited_from"] == second["edited_from"] == [source["id"], other["id"]]
     with Client(api.url, api.key) as client:
         (item, _) = client.jobs.items(first["job"])
+        pieces = [fetched.files["npz"] for fetched in client.jobs.fetch(first["job"], tmp_path)]
+    assert len({*pieces}) == 2
     assert item.edits is not None
     assert [op["op"] for op in item.edits.ops] == ["trim", "concat", "trim", "mirror"]
     assert item.edits.ops[1] == {"op": "concat", "with": other["id"], "blend": 0.1}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from uuid import UUID, uuid4
 
 import httpx2
@@ -12,7 +14,7 @@ from marey.core.errors import Conflict
 from marey.db import transaction
 from marey.jobs import cancel, claim, list_items, tables
 from marey.motion.edits.editing import MOST_FRAMES
-from marey.takes import NewEdit, collect_garbage, delete, erase, rewrite_files, submit_edit
+from marey.takes import Erasure, NewEdit, collect_garbage, delete, erase, rewrite_files, submit_edit
 from marey.tenants import DEFAULT_TENANT, Quotas, create_key, create_tenant
 from tests.integration.takes.test_retention import SECRET, dump, objects
 from tests.servers.audit import audit
@@ -237,6 +239,40 @@ def test_erasure_waits_for_edits_that_are_open(api: LiveApi) -> None:
     with transaction(api.engine) as conn:
         assert claim(conn, "edit", "w", 1) is None
         assert erase(conn, DEFAULT_TENANT, UUID(source["job"]), by="ann").edits == (made.id,)
+
+
+def test_an_edit_under_way_is_found_by_an_erasure_beside_it_and_the_other_way_round(api: LiveApi) -> None:
+    source = stored(api, f"a person walks to {SECRET}")
+    (middle,) = edited(api, source["id"], {"op": "mirror"})
+    job = UUID(source["job"])
+
+    def erase_now() -> Erasure:
+        with transaction(api.engine) as conn:
+            return erase(conn, DEFAULT_TENANT, job, by="ann")
+
+    def edit_now() -> UUID:
+        with transaction(api.engine) as conn:
+            return submit_edit(conn, NewEdit(UUID(middle["id"]), [{"op": "mirror"}])).id
+
+    with ThreadPoolExecutor(1) as pool:
+        with transaction(api.engine) as conn:
+            made = submit_edit(conn, NewEdit(UUID(middle["id"]), [{"op": "reverse"}])).id
+            erasing = pool.submit(erase_now)
+            time.sleep(0.3)
+            assert not erasing.done()
+        with pytest.raises(Conflict, match="queued"):
+            erasing.result(60)
+        work_edits(api)
+        with transaction(api.engine) as conn:
+            assert set(erase(conn, DEFAULT_TENANT, job, by="ann").edits) == {UUID(middle["job"]), made}
+            editing = pool.submit(edit_now)
+            time.sleep(0.3)
+            assert not editing.done()
+        with pytest.raises(Conflict, match="has no npz to edit"):  # it waits for the file without the prompt
+            editing.result(60)
+    rewrite_files(api.engine, api.store)
+    (item,) = edited(api, middle["id"], {"op": "mirror"})
+    assert item["prompt"] == ""
 
 
 def test_an_edit_is_noted_in_the_audit_log_and_the_tables_stay_sound(api: LiveApi, http: httpx2.Client) -> None:

@@ -10,10 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidInput, TooLarge
 from marey.motion import MotionClip, edit, load_npz
 from marey.motion.arrange import placement_of
 from marey.motion.edits.editing import EditSource
+from marey.motion.edits.prompts import prompt_of
+from marey.motion.edits.steps import pieces_of, read_steps
 from marey.motion.edits.table import OPERATIONS
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
@@ -261,6 +263,25 @@ def test_results_have_no_features_and_name_their_source(tmp_path):
     assert twice.manifest["edited_from"]["sources"][0]["edited_from"] == record
     kept.save_npz(tmp_path / "b.npz")
     same(load_npz(tmp_path / "b.npz"), kept)
+
+
+def test_splits_make_at_most_32_pieces():
+    steps = read_steps([{"op": "split", "at": "f2"}] * 5)
+    assert len(pieces_of(steps)) == 32
+    with pytest.raises(TooLarge, match="6 splits make 64 pieces"):
+        pieces_of(read_steps([{"op": "split", "at": "f2"}] * 32)[:6])
+
+
+def test_the_prompt_of_a_result_is_known_before_it_is_made():
+    clip, other = walker(prompt="a person turns left"), walker(prompt="a person waves")
+    ops = [{"op": "mirror"}, {"op": "concat", "with": other}, {"op": "reverse"}]
+    (made,) = edit(clip, ops)
+    assert prompt_of("a person turns left", read_steps(ops), lambda _: "a person waves") == made.manifest["prompt"]
+
+
+def test_names_of_digits_are_no_numbers():
+    assert OPERATIONS["concat"].values_of_text("01234567") == {"with": "01234567"}
+    assert OPERATIONS["concat"].values_of_text("1234e567") == {"with": "1234e567"}
 
 
 def test_unknown_sides_are_not_mirrored():

@@ -8,9 +8,12 @@ from marey.api.readiness import DependencyCheck
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
 from marey.db import check_revision, transaction
-from marey.jobs import TEXT_QUEUE, list_schedulers, list_workers
+from marey.jobs import EDIT_QUEUE, TEXT_QUEUE, list_schedulers, list_workers
 from marey.runtime.queue import check_queue
 from marey.storage import AssetStore
+
+WITHOUT_MODEL = frozenset({TEXT_QUEUE, EDIT_QUEUE})
+"""Queues whose workers generate nothing."""
 
 
 def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> dict[str, DependencyCheck]:
@@ -46,7 +49,7 @@ class ModelCheck:
             return
         with transaction(self._engine) as conn:
             workers = list_workers(conn)
-        if not any(w.live and w.bundle is not None and w.queue != TEXT_QUEUE for w in workers):
+        if not any(w.live and w.bundle is not None and w.queue not in WITHOUT_MODEL for w in workers):
             raise Unreachable("no worker has its model loaded yet")
         self._seen = True
 
