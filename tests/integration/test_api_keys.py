@@ -27,6 +27,8 @@ OTHERS = {
     "POST /v1/jobs": "submit",
     "POST /v1/motions/review": "submit",
     "POST /v1/motions/reroll": "submit",
+    "POST /v1/motions/{motion}/edits": "submit",
+    "POST /v1/motions/{motion}/revert": "submit",
     "POST /v1/streams": "submit",
     "DELETE /v1/streams/{stream}": "submit",
     "POST /v1/evaluations": "submit",

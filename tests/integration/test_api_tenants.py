@@ -54,6 +54,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "PATCH /v1/schedules/{schedule}": {"paused": True},
     "POST /v1/motions/review": {"motions": ["<motion>"], "verdict": "kept"},
     "POST /v1/motions/reroll": {"motions": ["<motion>"]},
+    "POST /v1/motions/{motion}/edits": {"ops": [{"op": "mirror"}]},
 }
 """`<motion>` stands for the id of one."""
 NOBODYS = {

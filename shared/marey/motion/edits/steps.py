@@ -101,7 +101,7 @@ def _read(row: object, where: str) -> Step:
     known = {each.name: each for each in operation.parameters}
     if unknown := [str(name) for name in given if name not in known]:
         hint = f"Known: {', '.join(known)}." if known else f"{operation.name} has none."
-        raise InvalidInput(f"unknown parameter {unknown[0]!r} of {operation.name}", where=where, hint=hint)
+        raise InvalidInput(f"unknown parameter {unknown[0]!r:.80} of {operation.name}", where=where, hint=hint)
     return Step(operation, {name: _value(each, given.get(name), where) for name, each in known.items()}, where)
 
 
@@ -113,4 +113,4 @@ def _value(parameter: Parameter, value: Any, where: str) -> Any:
     try:
         return parameter.read(value)
     except ValueError as error:
-        raise InvalidInput(f"{value!r} is not {error}", where=f"{where}.{parameter.name}") from None
+        raise InvalidInput(f"{value!r:.80} is not {error}", where=f"{where}.{parameter.name}") from None
