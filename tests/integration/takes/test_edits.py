@@ -79,13 +79,13 @@ def test_pieces_are_items_and_other_motions_follow_by_their_ids(api: LiveApi, ht
 @pytest.mark.parametrize(
     ("ops", "status", "where", "words"),
     [
-        ([{"op": "explode"}], 422, "ops[0].op", "Known: trim"),
-        ([{"op": "trim", "form": 1}], 422, "ops[0]", "unknown parameter 'form' of trim"),
-        ([{"op": "speed", "factor": 99}], 422, "ops[0].factor", "99 is not a number from 0.1 to 10"),
-        ([{"op": "mirror"}, {"op": "concat", "with": "wave.npz"}], 422, "ops[1].with", "is not the id of a motion"),
-        ([{"op": "concat"}], 422, "ops[0].with", "is missing"),
+        ([{"op": "explode"}], 422, "ops.0.op", "Known: trim"),
+        ([{"op": "trim", "form": 1}], 422, "ops.0", "unknown parameter 'form' of trim"),
+        ([{"op": "speed", "factor": 99}], 422, "ops.0.factor", "99 is not a number from 0.1 to 10"),
+        ([{"op": "mirror"}, {"op": "concat", "with": "wave.npz"}], 422, "ops.1.with", "is not the id of a motion"),
+        ([{"op": "concat"}], 422, "ops.0.with", "is missing"),
         ([], 422, "ops", "at least 1 item"),
-        ([{"op": "split", "at": 0.1}] * 6, 413, "ops[5]", "6 splits make 64 pieces; the most is 32"),
+        ([{"op": "split", "at": 0.1}] * 6, 413, "ops.5", "6 splits make 64 pieces; the most is 32"),
     ],
 )
 def test_an_error_names_the_operation_and_what_is_allowed(
@@ -108,7 +108,7 @@ def test_motions_of_others_are_not_found(api: LiveApi, http: httpx2.Client) -> N
         assert (answer.status_code, answer.json()["where"]) == (404, f"motion {ours['id']}")
     missing = str(uuid4())
     answer = post(http, ours["id"], {"op": "concat", "with": missing})
-    assert (answer.status_code, answer.json()["where"]) == (404, "ops[0].with")
+    assert (answer.status_code, answer.json()["where"]) == (404, "ops.0.with")
     with api.http("read") as reader:
         assert post(reader, ours["id"], {"op": "mirror"}).status_code == 403
 
@@ -159,7 +159,7 @@ def test_an_operation_that_the_motion_does_not_allow_fails_its_item_alone(api: L
     work_edits(api)
     good, bad = http.get(f"/v1/jobs/{job['id']}/items").json()["items"][::-1]
     assert (good["state"], bad["state"]) == ("succeeded", "failed")
-    assert bad["error"]["where"] == "ops[1] (trim)"
+    assert bad["error"]["where"] == "ops.1 (trim)"
     assert "after the end of the motion" in bad["error"]["message"]
     assert http.get(f"/v1/jobs/{job['id']}").json()["state"] == "partial"
     kinds = [event["kind"] for event in http.get(f"/v1/jobs/{job['id']}/events").json()["items"]]

@@ -53,7 +53,7 @@ def read_steps(ops: object, *, where: str = "ops") -> tuple[Step, ...]:
     rows = cast("Sequence[object]", ops)
     if not 1 <= len(rows) <= MOST:
         raise InvalidInput(f"{len(rows)} operations; allowed: 1 to {MOST}", where=where)
-    return tuple(_read(row, f"{where}[{number}]") for number, row in enumerate(rows))
+    return tuple(_read(row, f"{where}.{number}") for number, row in enumerate(rows))
 
 
 def pieces_of(steps: Sequence[Step]) -> tuple[tuple[Step, ...], ...]:
