@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from marey.api.jobs.schemas import CommonJobFields
 from marey.motion.edits.steps import MOST
+from marey.motion.edits.table import OPERATIONS
+
+
+def _schema() -> Mapping[str, Any]:
+    """Describe an operation; `marey.motion.edits.steps` checks which parameters each has."""
+    about = dict[str, str]()
+    for operation in OPERATIONS.values():
+        for each in operation.parameters:
+            before = f"{about[each.name]} " if each.name in about else ""
+            about[each.name] = f"{before}`{operation.name}`: {each.about}"
+    op = {"type": "string", "enum": [*OPERATIONS], "description": "The operation."}
+    parameters = {name: {"description": text} for name, text in about.items()}
+    return {"type": "object", "required": ["op"], "properties": {"op": op, **parameters}}
+
+
+EditOperation = Annotated[dict[str, Any], WithJsonSchema(dict(_schema()))]
 
 
 class NewEditBody(CommonJobFields):
     """Operations on a motion, as a job."""
 
-    ops: list[dict[str, Any]] = Field(
+    ops: list[EditOperation] = Field(
         min_length=1,
         max_length=MOST,
         description="Operations, applied in their order; `with` of `concat` is the id of another motion. Each `split` "
