@@ -19,6 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from marey.api.app import ROUTERS
 from marey.db import transaction
 from marey.embedded import EmbeddedServer
+from marey.exporters import Coordinates, exporter_of
 from marey.tenants import (
     Quotas,
     authenticate,
@@ -34,6 +35,7 @@ from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
 from tests.support.live_streams import BUNDLE as STREAMER
 from tests.support.live_streams import add_streamer, watching
+from tests.support.walker import walker
 
 PROMPT = "a secretive person waltzes"
 NAME = "unreleased film"
@@ -63,6 +65,7 @@ NOBODYS = {
 """Paths that tell the same to everybody."""
 OF_ALL = {"/metrics"}
 """Paths that tell of all tenants, and want a scope that no other holds."""
+RIG, RIG_FILE = "unreleased-hero", exporter_of("bvh").encode(walker(seconds=0.5), Coordinates())
 ORDER = ("GET", "PATCH", "POST", "DELETE")
 
 
@@ -101,6 +104,8 @@ class Mine:
         own = {"before": self.ids["evaluation"]} if template.endswith("/comparison") else None
         if template == "/v1/resolve":
             own = {"kind": "job", "reference": self.ids["job"][-8:]}
+        if (method, template) == ("POST", "/v1/rigs"):
+            return http.post(template, params={"name": "another", "format": "bvh"}, content=RIG_FILE)
         return http.request(method, self.path(template), json=self.body(f"{method} {template}"), params=own)
 
     def secrets(self) -> list[str]:
@@ -133,12 +138,13 @@ def mine(place: Studio) -> Iterator[Mine]:
                 ("schedule", "/v1/schedules"), ("webhook", "/v1/webhooks"),
             )
         }  # fmt: skip
+        accepted(http.post("/v1/rigs", params={"name": RIG, "format": "bvh"}, content=RIG_FILE))
         ids["event"] = accepted(http.post(f"/v1/webhooks/{ids['webhook']}/test"))["event"]
         place.work()
         motion = http.get(f"/v1/jobs/{ids['job']}/motions").json()["items"][0]
         sha256 = next(file["sha256"] for file in motion["files"] if file["format"] == "npz")
         assert accepted(http.get(f"/v1/evaluations/{ids['evaluation']}"))["state"] == "done"
-        yield Mine({**ids, "motion": motion["id"]}, sha256)
+        yield Mine({**ids, "motion": motion["id"], "rig": RIG}, sha256)
         http.delete(f"/v1/streams/{ids['stream']}")
 
 

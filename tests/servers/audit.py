@@ -68,6 +68,10 @@ CHECKS = {
         SELECT made_file.motion_id, asset.sha256 FROM made_file JOIN asset ON asset.id = made_file.asset_id
         WHERE asset.state <> 'stored' OR asset.size <> made_file.size OR asset.tenant_id <> made_file.tenant_id
     """,
+    "a rig is not stored": """
+        SELECT rig.name, asset.sha256 FROM rig JOIN asset ON asset.id = rig.asset_id
+        WHERE asset.state <> 'stored' OR asset.tenant_id <> rig.tenant_id
+    """,
     "a generated item has no text features": """
         SELECT item.id FROM item
         WHERE stage = 'generate' AND text_key <> ''

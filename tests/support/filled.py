@@ -9,6 +9,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from marey.db import transaction
+from marey.db.ids import new_id
 from marey.evaluations import EvaluationState, lock_evaluation, move_evaluation
 from marey.evaluations import tables as evaluation_tables
 from marey.jobs import (
@@ -103,6 +104,7 @@ def _jobs(engine: sa.Engine) -> None:
         review(conn, DEFAULT_TENANT, motions[1:2], Review.REJECTED, by="ann")
         reroll(conn, DEFAULT_TENANT, motions[2:3], lambda item: new_item(item.index, item.prompt), by="ann")
     _made_files(engine, motions[0])
+    _rigs(engine, motions[0])
     with transaction(engine) as conn:
         submit_edit(conn, NewEdit(motions[0], [{"op": "mirror"}]))
     _end(engine, retryable=False)
@@ -133,6 +135,19 @@ def _made_files(engine: sa.Engine, motion: UUID) -> None:
             ("refused", {"problem": {"type": "invalid-input", "message": "no"}, **late}),
         ):
             conn.execute(sa.insert(job_tables.made_file).values(**row, key=name, format="glb", **values))
+
+
+def _rigs(engine: sa.Engine, motion: UUID) -> None:
+    """A rig with a map and one without, and a file made on one."""
+    row = {"tenant_id": DEFAULT_TENANT, "format": "glb", "added_by": "ann", "report": {"family": "mixamo"}}
+    with transaction(engine) as conn:
+        asset = conn.execute(sa.select(job_tables.asset.c.id).limit(1)).scalar_one()
+        for name, rig_map in (("hero", {"left_hand": "Hand_L"}), ("extra", sa.null())):
+            rig = {"id": new_id(), "name": name, "asset_id": asset, "map": rig_map, **row}
+            conn.execute(sa.insert(job_tables.rig).values(**rig))
+        made = {"motion_id": motion, "tenant_id": DEFAULT_TENANT, "format": "glb", "key": "on a rig"}
+        values = {**made, "rig_id": rig["id"], "claim": motion, "expires_at": sa.func.now()}
+        conn.execute(sa.insert(job_tables.made_file).values(**values))
 
 
 def _end(engine: sa.Engine, *, retryable: bool) -> None:

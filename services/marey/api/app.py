@@ -34,6 +34,7 @@ from marey.api.rates import RateLimiter
 from marey.api.readiness import Readiness
 from marey.api.reference import build_reference
 from marey.api.references.routes import router as references_router
+from marey.api.rigs.routes import router as rigs_router
 from marey.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from marey.api.schedules.routes import router as schedules_router
 from marey.api.stream_hub import Hub
@@ -62,7 +63,7 @@ from marey.webhooks.vault import Vault
 ROUTERS = (
     *(health_router, home_router, jobs_router, motions_router, edits_router, streams_router, live_router, docs_router),
     *(models_router, texts_router),
-    *(evaluations_router, schedules_router, webhooks_router, references_router),
+    *(evaluations_router, schedules_router, webhooks_router, references_router, rigs_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."

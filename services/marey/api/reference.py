@@ -73,7 +73,8 @@ def _bodies(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]
     """Return schema name, media type and description of each body."""
     for operation in _operations(document):
         for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
-            yield content["schema"]["$ref"].rpartition("/")[2], media_type, content
+            if "$ref" in content["schema"]:  # not a file
+                yield content["schema"]["$ref"].rpartition("/")[2], media_type, content
 
 
 def _answer_problems(document: dict[str, Any]) -> None:

@@ -23,13 +23,13 @@ from marey.items.item import MAX_BODY_BYTES
 
 Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20
-"""Maximum bytes of any body except those with many prompts."""
+"""Maximum bytes of any body except those with many prompts, and files."""
 SMALL_BODY = 2**16
 """Bytes that any request may hold in memory."""
 OTHER_BODIES = 64 * MAX_OTHER_BODY
 """Total bytes of larger bodies in memory. They are read before authentication."""
 NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
-PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
+LARGE_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules", "/v1/rigs")
 """Paths of such bodies; their routes read them, after authentication."""
 MIN_RATE = 4096
 """Minimum bytes a second, on average: half of a modem's rate."""
@@ -115,8 +115,8 @@ class Incoming:
 
 
 class BodyGuard:
-    """Reads bodies up to their limits before a route sees them. Routes that take many prompts read their own, within
-    the same time limits.
+    """Reads bodies up to their limits before a route sees them. Routes that take many prompts or a file read their own,
+    within the same time limits.
 
     An answer before the end of the body closes the connection: the rest would otherwise be read for as long as the
     client sends.
@@ -134,7 +134,7 @@ class BodyGuard:
             return
         incoming = Incoming(scope, receive, self.deadline)
         answer = _Answer(incoming, send)
-        if _holds_prompts(scope):
+        if _may_be_large(scope):
             scope[INCOMING] = incoming
             await self.app(scope, incoming, answer)
             return
@@ -215,7 +215,7 @@ class BodyLimits(Protocol):
 
 @asynccontextmanager
 async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncGenerator[KeptBody]:
-    """Receive the body of a request with many prompts, in a file above a size; the file is removed after the block.
+    """Receive a body that may be large, in a file above a size; the file is removed after the block.
 
     A large body waits for budget before it is read. One without a declared length takes the maximum.
 
@@ -284,10 +284,10 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
         raise InvalidInput("the client disconnected before the end of the body", where="body") from None
 
 
-def _holds_prompts(scope: Scope) -> bool:
+def _may_be_large(scope: Scope) -> bool:
     if scope["method"] == "PATCH":
         return scope["path"].startswith("/v1/schedules/")
-    return scope["method"] == "POST" and scope["path"] in PROMPTS_PATHS
+    return scope["method"] == "POST" and scope["path"] in LARGE_PATHS
 
 
 def _too_large(limit: int) -> TooLarge:

@@ -181,6 +181,10 @@ class Settings(BaseSettings):
     event_streams_per_key: int = Field(default=1000, ge=1, le=100_000)
     made_files_bytes: int = Field(default=2**30, ge=0, le=2**50)
     """Bytes of the files of one tenant that the API made on request and keeps; the oldest are removed first."""
+    rig_bytes: int = Field(default=64 * 2**20, ge=1, le=64 * 2**20)
+    """Bytes of the file of one rig that a tenant adds."""
+    rigs_per_tenant: int = Field(default=100, ge=0, le=100_000)
+    """Rigs that one tenant may have."""
     text_url: TextService | None = None
     """URL of the text service (`marey text serve`) for the API; `marey serve` starts its own."""
     text_key: SecretStr | None = None

@@ -347,6 +347,26 @@ motion_file = sa.Table(
     sa.Index("ix_motion_file_erasing", "motion_id", postgresql_where=sa.text("erasing")),
 )
 
+# Rigs that motions are put on, by name. A new file or map under a name is a new version; files made on the version
+# before it are removed.
+rig = sa.Table(
+    "rig",
+    metadata,
+    sa.Column("id", Id, primary_key=True),
+    sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("version", sa.Integer, nullable=False, server_default="1"),
+    sa.Column("format", sa.Text, nullable=False),  # ending of the file's name
+    sa.Column("asset_id", Id, sa.ForeignKey("asset.id"), nullable=False),
+    sa.Column("map", JSONB),  # parts and joints that its owner named; null = none
+    sa.Column("report", JSONB, nullable=False),  # `marey.motion.rigs.report.describe`
+    sa.Column("added_by", sa.Text, nullable=False),  # name of an API key
+    sa.Column("created_at", Time, nullable=False, server_default=NOW),
+    sa.Column("updated_at", Time, nullable=False, server_default=NOW),  # of the version
+    sa.UniqueConstraint("tenant_id", "name"),
+    sa.Index("ix_rig_asset_id", "asset_id"),
+)
+
 # Files that the API made of a motion's npz on request: a cache, which loses its oldest files. A row has an asset; or,
 # until `expires_at`, the claim of the process that makes the file, or the reason why it cannot be made. A trigger
 # (migration 0019) removes the rows of a motion whose prompt is erased.
@@ -364,6 +384,7 @@ made_file = sa.Table(
     sa.Column("problem", JSONB),
     sa.Column("expires_at", Time),
     sa.Column("made_at", Time, nullable=False, server_default=NOW),
+    sa.Column("rig_id", Id, sa.ForeignKey("rig.id", ondelete="CASCADE")),  # a rig of the tenant that it was made on
     sa.CheckConstraint("num_nonnulls(asset_id, claim, problem) = 1", name="state"),
     sa.CheckConstraint("(expires_at IS NULL) = (asset_id IS NOT NULL)", name="expires"),
     sa.Index("ix_made_file_asset_id", "asset_id", postgresql_where=sa.text("asset_id IS NOT NULL")),
@@ -373,5 +394,6 @@ made_file = sa.Table(
         postgresql_include=["size"],
         postgresql_where=sa.text("asset_id IS NOT NULL"),
     ),
+    sa.Index("ix_made_file_rig_id", "rig_id", postgresql_where=sa.text("rig_id IS NOT NULL")),
     sa.Index("ix_made_file_expires_at", "expires_at", postgresql_where=sa.text("expires_at IS NOT NULL")),
 )

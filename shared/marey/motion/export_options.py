@@ -12,6 +12,8 @@ InPlace = Literal["travel", "heading"]
 Placement = Literal["origin", "keep"]
 RestPose = Literal["t", "a"]
 Names = Literal["mixamo", "ue5", "humanik", "smplx", "vrm"]
+REFERENCE_RIGS = ("mixamo", "ue4", "humanik")
+"""Names of the reference skeletons that `rig` may name; their tables need numpy (`marey.motion.retarget.reference`)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,8 @@
-"""User actions on motions: search, edits, reviews and re-rolls, references, retention, erasure, files
+"""User actions on motions: search, edits, reviews and re-rolls, references, retention, erasure, rigs, files
 made on request, garbage collection."""
 
 from marey.takes.edits import NewEdit, revert, submit_edit
-from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
+from marey.takes.gc import collect_garbage, remove_assets, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
 from marey.takes.made import (
     MadeFile,
@@ -18,19 +18,24 @@ from marey.takes.made import (
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
 from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
+from marey.takes.rigs import AddedRig, NewRig, RigRow, add_rig, get_rig, list_rigs, remove_rig
 from marey.takes.types import Erasure, GarbageReport, MotionFilter, Reroll
 
 __all__ = [
     "MAX_REVIEWED",
+    "AddedRig",
     "Erasure",
     "GarbageReport",
     "MadeFile",
     "MakingClaim",
     "MotionFilter",
     "NewEdit",
+    "NewRig",
     "ReferenceKind",
     "ReferenceMatch",
     "Reroll",
+    "RigRow",
+    "add_rig",
     "claim_making",
     "collect_garbage",
     "delete",
@@ -38,10 +43,14 @@ __all__ = [
     "erase",
     "fail_making",
     "find_made",
+    "get_rig",
     "keep_made",
     "list_motions",
+    "list_rigs",
     "release_makings",
+    "remove_assets",
     "remove_expired_makings",
+    "remove_rig",
     "remove_stale_assets",
     "remove_unused_assets",
     "renew_makings",

@@ -92,6 +92,7 @@ def _unreferenced() -> sa.ColumnElement[bool]:
     return ~(
         sa.exists().where(job_tables.motion_file.c.asset_id == asset)
         | sa.exists().where(job_tables.made_file.c.asset_id == asset)
+        | sa.exists().where(job_tables.rig.c.asset_id == asset)
         | sa.exists().where(evaluation_tables.evaluation_report.c.asset_id == asset)
         | sa.exists().where(job_tables.asset_writer.c.asset_id == asset)
     )

@@ -35,6 +35,7 @@ STORED = sa.text("""
           AND id IN (SELECT asset_id FROM made_file WHERE tenant_id = :tenant AND asset_id IS NOT NULL)
           AND NOT EXISTS (SELECT FROM motion_file WHERE motion_file.asset_id = asset.id)
           AND NOT EXISTS (SELECT FROM evaluation_report WHERE evaluation_report.asset_id = asset.id)
+          AND NOT EXISTS (SELECT FROM rig WHERE rig.asset_id = asset.id)
     )
     FROM asset WHERE tenant_id = :tenant AND state = 'stored'
 """)
@@ -108,6 +109,21 @@ def reserve_quotas(conn: sa.Connection, tenant: str, items: int) -> None:
         return
     _lock(conn, tenant)
     check_quotas(conn, tenant, items)
+
+
+def reserve_bytes(conn: sa.Connection, tenant: str, size: int) -> None:
+    """Validate that a tenant may store `size` bytes more, and reserve them until the transaction ends.
+
+    Raises:
+        QuotaUsedUp: the quota of bytes is exhausted.
+        NotFound: there is no such tenant.
+    """
+    limit = get_tenant(conn, tenant).quotas.bytes
+    if limit is None:
+        return
+    _lock(conn, tenant)
+    expected = _open_items(conn, tenant)[0] * bytes_of_a_motion(conn, tenant)
+    _refuse_beyond(tenant, QuotaHeadroom("bytes", limit, _stored(conn, tenant), expected, size))
 
 
 def runnable_items(conn: sa.Connection, tenant: str, wanted: int) -> int:

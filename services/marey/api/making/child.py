@@ -1,10 +1,12 @@
-"""A process that makes files: `python -m marey.api.making.child SECONDS BYTES` reads requests from stdin until its end.
+"""A process that makes files and reads rigs: `python -m marey.api.making.child SECONDS BYTES` reads requests from
+stdin until its end.
 
-It has neither a database nor a store: the API sends the npz, and gets the file back.
+It has neither a database nor a store: the API sends the npz or the file of the rig, and gets the result back.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import signal
@@ -15,8 +17,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from marey.api.making.messages import read_message, write_message
+from marey.core.characters import check_text
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
-from marey.core.extras import MissingExtra
+from marey.core.extras import MissingExtra, needs_extra
 from marey.exporters.making import FileRecipe
 from marey.motion.export_options import ExportOptions
 
@@ -24,6 +27,8 @@ NICENESS = 5
 """Behind the API, which answers others meanwhile."""
 MAX_FILE = 64 * 2**20
 """Bytes of a file."""
+MAX_REPORT = 2**20
+"""Bytes of what is found in a rig; two thousand joints with long names take a quarter of it."""
 
 
 def main(seconds: int, memory: int) -> None:
@@ -43,28 +48,62 @@ def main(seconds: int, memory: int) -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what an exporter prints is no answer
     with suppress(EOFError, BrokenPipeError):
         while True:
-            request, npz = read_message(requests)
+            request, content = read_message(requests)
             signal.alarm(seconds)
-            _answer(answers, request, npz)
+            _answer(answers, request, content)
             signal.alarm(0)
 
 
-def _answer(answers: BinaryIO, request: dict[str, Any], npz: bytes) -> None:
+def _answer(answers: BinaryIO, request: dict[str, Any], content: bytes) -> None:
+    answer, problem = (_report, _rig_problem) if request["task"] == "report" else (_make, _problem)
     try:
-        recipe = FileRecipe(request["format"], ExportOptions(**request["options"]), request["fps"])
-        content = recipe.make(npz, request["where"])
-        if len(content) > MAX_FILE:
-            raise TooLarge(f"the file would have {len(content) / 2**20:.0f} MiB, over {MAX_FILE // 2**20}")
+        result = answer(request, content)
     except MemoryError:
         error: MareyError = TooLarge("the file takes more memory than this server gives")
-        write_message(answers, _problem(error, request))
+        write_message(answers, problem(error, request))
     except MareyError as error:
-        write_message(answers, _problem(error, request))
+        write_message(answers, problem(error, request))
     except Exception:
         traceback.print_exc()
         write_message(answers, {"type": MareyError.problem_type, "message": "an internal error"})
     else:
-        write_message(answers, {}, content)
+        write_message(answers, {}, result)
+
+
+def _make(request: dict[str, Any], npz: bytes) -> bytes:
+    recipe = FileRecipe(request["format"], ExportOptions(**request["options"]), request["fps"])
+    content = recipe.make(npz, request["where"])
+    if len(content) > MAX_FILE:
+        raise TooLarge(f"the file would have {len(content) / 2**20:.0f} MiB, over {MAX_FILE // 2**20}")
+    return content
+
+
+def _report(request: dict[str, Any], data: bytes) -> bytes:
+    """Return what is found in a rig, as JSON that the database can hold."""
+    try:
+        from marey.motion.retarget.load import parse_body
+        from marey.motion.rigs.read import READERS
+        from marey.motion.rigs.report import describe
+    except ImportError as error:
+        raise needs_extra("motion", error) from error
+    if request["format"] not in READERS:
+        raise InvalidInput("is not a rig format", where="format", hint=f"Known: {', '.join(READERS)}.")
+    body = parse_body(data, f"{request['name']}.{request['format']}", request["map"])
+    for joint in body.rig.joint_names:
+        check_text(joint, subject="the name of a joint", where="body")
+    report = json.dumps(describe(body), allow_nan=False).encode()
+    if len(report) > MAX_REPORT:
+        raise TooLarge("its joints have names that are too long", hint="Export the skeleton with shorter names.")
+    return report
+
+
+def _rig_problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
+    """Describe why a rig cannot be read, by the field of the request that is wrong."""
+    where = error.where if error.where in ("format", "map") else "body"
+    if isinstance(error, MissingExtra):
+        hint = f"Ask its operator for the extra {error.extra!r}."
+        error = InvalidInput("this server reads no rigs", hint=hint)
+    return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}
 
 
 def _problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:

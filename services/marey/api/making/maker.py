@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -14,7 +14,7 @@ import structlog
 from anyio import to_thread
 
 from marey.api.making.processes import MakingProcesses
-from marey.core.errors import Conflict, InvalidInput, MareyError, TooLarge, Unreachable
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge, Unreachable
 from marey.core.metrics import MADE_FILES
 from marey.core.settings import Settings
 from marey.db import transaction
@@ -43,7 +43,7 @@ LOOK_SECONDS = 0.2
 RENEW_SECONDS = 4.0
 SLOTS = SlotLimits(total=64, tenant=32, key=16)
 """Files that one API process makes, or that wait in it for their turn."""
-ERRORS = {kind.problem_type: kind for kind in (InvalidInput, TooLarge, Conflict)}
+ERRORS = {kind.problem_type: kind for kind in (InvalidInput, InvalidFile, TooLarge, Conflict)}
 
 Found = TypeVar("Found")
 log = structlog.get_logger(__name__)
@@ -104,6 +104,24 @@ class FileMaker:
                 await asyncio.sleep(min(LOOK_SECONDS, left))
             elif (await asyncio.wait([task], timeout=left))[0]:
                 task.result()
+
+    async def report(self, key: ApiKey, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any]:
+        """Return what is found in the file of a rig (`marey.motion.rigs.report.describe`).
+
+        Args:
+            name: of the rig.
+            format: ending of the file's name.
+            rig_map: JSON value of the map of its joints; None = no map.
+
+        Raises:
+            InvalidInput, InvalidFile, TooLarge: the file cannot be read, or motion cannot be put on it.
+            Busy: too many files are waiting.
+        """
+        with self._slots.take(key):
+            found = await self._processes.report(name, format, rig_map, data)
+        if isinstance(found, FailureReason):
+            raise _error(found)
+        return found
 
     async def close(self) -> None:
         """Stop: files in the making are left to the next request."""

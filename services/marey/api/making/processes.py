@@ -1,15 +1,17 @@
-"""The child processes that make files: started when needed, two at most, ended when idle."""
+"""The child processes that make files and read rigs: started when needed, two at most, ended when idle."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
-from typing import IO
+from typing import IO, Any, TypeVar
 
 import structlog
 from anyio import CapacityLimiter, to_thread
@@ -26,6 +28,7 @@ FILE_SECONDS = 120
 MEMORY = 768 * 2**20
 """Bytes of address space of one process."""
 IDLE_SECONDS = 60.0
+Answer = TypeVar("Answer")
 
 log = structlog.get_logger(__name__)
 
@@ -62,12 +65,29 @@ class MakingProcess:
             where: its name in errors.
         """
         request = {"format": recipe.format, "options": recipe.chosen, "fps": recipe.fps, "where": where}
+        return self._ask({"task": "make", **request}, npz, "format")
+
+    def report(self, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any] | FailureReason:
+        """Return what is found in a rig, or why it cannot be used. Blocks.
+
+        Args:
+            name: of the rig.
+            format: ending of the file's name.
+            rig_map: JSON value of the map of its joints; None = no map.
+            data: the file.
+        """
+        request = {"task": "report", "name": name, "format": format, "map": rig_map}
+        answer = self._ask(request, data, "body")
+        return answer if isinstance(answer, FailureReason) else json.loads(answer)
+
+    def _ask(self, request: dict[str, Any], content: bytes, where: str) -> bytes | FailureReason:
+        """Return the answer to a request; `where` names its field in the errors of a process that ends."""
         try:
-            write_message(_pipe(self._process.stdin), request, npz)
-            answer, content = read_message(_pipe(self._process.stdout))
+            write_message(_pipe(self._process.stdin), request, content)
+            answer, result = read_message(_pipe(self._process.stdout))
         except (OSError, EOFError, ValueError):  # it died, or was closed
-            return self._ended()
-        return FailureReason(**answer) if answer else content
+            return self._ended(where)
+        return FailureReason(**answer) if answer else result
 
     def close(self) -> None:
         """End the process, whatever it is doing."""
@@ -77,13 +97,13 @@ class MakingProcess:
             with suppress(OSError):
                 _pipe(pipe).close()
 
-    def _ended(self) -> FailureReason:
+    def _ended(self, where: str) -> FailureReason:
         code = self._process.wait()
         if code == -signal.SIGALRM:
-            return FailureReason.of(TooLarge(f"the file takes longer than {self._seconds} s to make", where="format"))
+            return FailureReason.of(TooLarge(f"the file takes longer than {self._seconds} s to make", where=where))
         log.error("making_process_died", code=code)
         if code == -signal.SIGKILL:
-            return FailureReason.of(TooLarge("the file takes more memory than this server gives", where="format"))
+            return FailureReason.of(TooLarge("the file takes more memory than this server gives", where=where))
         return FailureReason.of(MareyError("an internal error"))
 
 
@@ -105,11 +125,18 @@ class MakingProcesses:
 
     async def make(self, recipe: FileRecipe, npz: bytes, where: str) -> bytes | FailureReason:
         """Return the content of a file, or why it cannot be made; waits for its turn."""
-        made = await to_thread.run_sync(self._make, recipe, npz, where, limiter=self._threads)
+        return await self._run(lambda process: process.make(recipe, npz, where))
+
+    async def report(self, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any] | FailureReason:
+        """Return what is found in a rig, or why it cannot be used; waits for its turn."""
+        return await self._run(lambda process: process.report(name, format, rig_map, data))
+
+    async def _run(self, call: Callable[[MakingProcess], Answer]) -> Answer:
+        answer = await to_thread.run_sync(self._call, call, limiter=self._threads)
         if self._reaping is not None:
             self._reaping.cancel()
         self._reaping = asyncio.get_running_loop().call_later(IDLE_SECONDS, self._reap)
-        return made
+        return answer
 
     def close(self) -> None:
         """End all processes; files in the making fail."""
@@ -121,11 +148,11 @@ class MakingProcesses:
         for process in open_processes:
             process.close()
 
-    def _make(self, recipe: FileRecipe, npz: bytes, where: str) -> bytes | FailureReason:
+    def _call(self, call: Callable[[MakingProcess], Answer]) -> Answer:
         process = self._take()
-        made = process.make(recipe, npz, where)
+        answer = call(process)
         self._return(process)
-        return made
+        return answer
 
     def _take(self) -> MakingProcess:
         with self._lock:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidInput, NotFound
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints, read_map
-from marey.motion.rigs.read import READERS, read_rig
+from marey.motion.rigs.read import READERS, parse_rig, read_rig
 
 
 def load_body(rig: str | Path, rig_map: str | Path | None = None) -> RigBody:
@@ -25,6 +26,22 @@ def load_body(rig: str | Path, rig_map: str | Path | None = None) -> RigBody:
         NotFound, InvalidFile, TooLarge: a file cannot be read.
     """
     return _load(str(rig), _stamp(rig), None if rig_map is None else str(rig_map), _stamp(rig_map))
+
+
+def parse_body(data: bytes, name: str, rig_map: Any = None) -> RigBody:
+    """Return the rig of a file's bytes, with its parts.
+
+    Args:
+        data: the whole file.
+        name: of the file; its ending tells the format.
+        rig_map: JSON value of parts and joints that override what is found; None = no map.
+
+    Raises:
+        InvalidInput, InvalidFile, TooLarge: as `load_body`; of the map, `where` is `map`.
+    """
+    given = None if rig_map is None else read_map(rig_map, "map")
+    found = parse_rig(data, name)
+    return RigBody.of(found, map_joints(found, given, where="map"))
 
 
 def _stamp(path: str | Path | None) -> tuple[int, int]:

@@ -39,13 +39,31 @@ def read_rig(path: Path | str) -> Rig:
         TooLarge: over 64 MiB or 2,000 joints.
     """
     path = Path(path)
-    extension = path.suffix.lower().removeprefix(".")
+    reader = _reader(path)
+    return reader(read_limited(path, LIMITS.get(_extension(path), MAX_BYTES)), str(path))
+
+
+def parse_rig(data: bytes, name: str) -> Rig:
+    """Read the bytes of a rig file.
+
+    Args:
+        data: the whole file.
+        name: of the file; its ending tells the format.
+
+    Raises:
+        InvalidInput, InvalidFile, TooLarge: as `read_rig`.
+    """
+    return _reader(Path(name))(data, name)
+
+
+def _extension(path: Path) -> str:
+    return path.suffix.lower().removeprefix(".")
+
+
+def _reader(path: Path) -> Reader:
+    extension = _extension(path)
     if extension not in READERS:
         known = ", ".join(f".{each}" for each in READERS)
         raise InvalidInput(f"`{path.suffix}` is not a rig format", where=str(path), hint=f"Known: {known}.")
-    return _reader(extension)(read_limited(path, LIMITS.get(extension, MAX_BYTES)), str(path))
-
-
-def _reader(extension: str) -> Reader:
     module, _, function = READERS[extension].partition(":")
     return getattr(importlib.import_module(module), function)

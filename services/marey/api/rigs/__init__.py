@@ -1,0 +1,1 @@
+"""Rigs: characters of a tenant that motions are put on."""
