@@ -12,6 +12,7 @@ from marey.motion.export_options import ExportOptions
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
     from marey.motion.io.bvh import BvhClip
+    from marey.motion.rigs.body import RigBody
     from marey.motion.rigs.rigged import RiggedMotion
     from marey.motion.units import Unit, Up
 
@@ -86,8 +87,11 @@ class Exporter(Generic[Decoded]):
         if unknown := self.options - _DEFAULTS.keys():
             raise ValueError(f"{self.format} has unknown options: {', '.join(sorted(unknown))}")
 
-    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates) -> bytes:
+    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates, body: RigBody | None = None) -> bytes:
         """Encode a clip with those of the coordinates that the format has.
+
+        Args:
+            body: the rig that the coordinates name; None = find it (`marey.motion.retarget.load.load_body`).
 
         Raises:
             InvalidInput: the clip cannot be written with these options, or put on the rig.
@@ -99,4 +103,4 @@ class Exporter(Generic[Decoded]):
         from marey.motion.io.convert import as_motion_clip
         from marey.motion.retarget.apply import put_on_rig
 
-        return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept), kept)
+        return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept, body), kept)

@@ -6,13 +6,42 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
 from marey.exporters.exporter import Coordinates
 from marey.exporters.registry import CANONICAL, exporter_of, exporters, version_of
 from marey.motion.export_options import PLAIN, ExportOptions
+
+if TYPE_CHECKING:
+    from marey.motion.rigs.body import RigBody
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """A rig whose file comes with the npz.
+
+    Attributes:
+        format: ending of the file's name.
+        sha256: of the file.
+        map: JSON value of the map of its joints; None = no map.
+    """
+
+    name: str
+    format: str
+    sha256: str
+    map: Any = None
+
+    def body(self, data: bytes) -> RigBody:
+        """Return the rig of the file's bytes.
+
+        Raises:
+            InvalidInput, InvalidFile, TooLarge: they cannot be read, or motion cannot be put on it.
+        """
+        from marey.motion.retarget.load import parse_body
+
+        return parse_body(data, f"{self.name}.{self.format}", self.map)
 
 
 @dataclass(frozen=True)
@@ -24,11 +53,13 @@ class FileRecipe:
         export: options of the file.
             Those that the format does not have are ignored: `check_options` refuses them.
         fps: its frame rate; None = that of the motion.
+        rig: the rig that the options name; None = none, or a reference rig.
     """
 
     format: str
     export: ExportOptions = PLAIN
     fps: float | None = None
+    rig: RigFile | None = None
 
     @property
     def plain(self) -> bool:
@@ -50,14 +81,18 @@ class FileRecipe:
             PluginError: the format is not installed.
         """
         parts = [source, self.format, self.chosen, self.fps, version_of(self.format)]
-        return hashlib.sha256(json.dumps(parts, separators=(",", ":"), allow_nan=False).encode()).hexdigest()
+        if self.rig is not None:
+            parts += [self.rig.sha256, self.rig.format, self.rig.map]
+        text = json.dumps(parts, separators=(",", ":"), allow_nan=False, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
 
-    def make(self, npz: bytes, where: str) -> bytes:
+    def make(self, npz: bytes, where: str, rig: bytes = b"") -> bytes:
         """Return the content of the file; equal arguments give equal bytes.
 
         Args:
             npz: the motion.
             where: its name in errors.
+            rig: the file of the rig, where the recipe has one.
 
         Raises:
             MissingExtra: an extra that writes the format is not installed.
@@ -69,10 +104,11 @@ class FileRecipe:
         decode = exporters()[CANONICAL].decode
         assert decode is not None
         try:
+            body = None if self.rig is None else self.rig.body(rig)
             clip = decode(npz, where, Coordinates())
             if self.fps is not None:
                 clip = _at_rate(clip, self.fps)
-            return exporter.write(clip, Coordinates.of(self.export))
+            return exporter.write(clip, Coordinates.of(self.export), body)
         except ImportError as error:
             raise needs_extra("motion", error) from error
 

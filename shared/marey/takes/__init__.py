@@ -18,8 +18,8 @@ from marey.takes.made import (
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
 from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
-from marey.takes.rigs import AddedRig, NewRig, RigRow, add_rig, get_rig, list_rigs, remove_rig
-from marey.takes.types import Erasure, GarbageReport, MotionFilter, Reroll
+from marey.takes.rigs import add_rig, get_rig, list_rigs, remove_rig
+from marey.takes.types import AddedRig, Erasure, GarbageReport, MotionFilter, NewRig, Reroll, RigRow
 
 __all__ = [
     "MAX_REVIEWED",

@@ -20,6 +20,7 @@ from marey.jobs.leased import document
 from marey.jobs.types import FailureReason, MotionFile
 from marey.takes.assets import ContentStore, keep_content, write_content
 from marey.takes.gc import ObjectStore, remove_assets
+from marey.takes.types import RigRow
 
 CLAIM_SECONDS = 15.0
 """Seconds until another process may take over a file whose maker is silent."""
@@ -31,19 +32,22 @@ MADE_LOCK = 0x6D616465
 ATTEMPTS = 3
 """Times that content is written which garbage collection removes before it is referred to."""
 
-# Locks the motion first, as its deletion does.
+# Locks the motion and the rig first, as their deletions do.
 CLAIM = sa.text("""
-    WITH wanted AS (
+    WITH rig_there AS (
+        SELECT id FROM rig WHERE id = :rig AND tenant_id = :tenant AND version = :rig_version FOR SHARE
+    ), wanted AS (
         SELECT id, tenant_id FROM motion
         WHERE id = :motion AND tenant_id = :tenant AND EXISTS (
             SELECT FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
             WHERE motion_file.motion_id = motion.id AND motion_file.format = :canonical AND asset.sha256 = :source
               AND NOT motion_file.erasing
-        )
+        ) AND (CAST(:rig AS uuid) IS NULL OR EXISTS (SELECT FROM rig_there))
         FOR KEY SHARE
     )
-    INSERT INTO made_file (motion_id, key, tenant_id, format, claim, expires_at)
-    SELECT id, :key, tenant_id, :format, :claim, clock_timestamp() + make_interval(secs => :seconds) FROM wanted
+    INSERT INTO made_file (motion_id, key, tenant_id, format, rig_id, claim, expires_at)
+    SELECT id, :key, tenant_id, :format, CAST(:rig AS uuid), :claim,
+           clock_timestamp() + make_interval(secs => :seconds) FROM wanted
     ON CONFLICT (motion_id, key) DO UPDATE SET claim = excluded.claim, problem = NULL, expires_at = excluded.expires_at
         WHERE made_file.expires_at < clock_timestamp()
     RETURNING claim
@@ -118,12 +122,20 @@ def find_made(conn: sa.Connection, motion: UUID, key: str) -> MadeFile | None:
 
 
 def claim_making(
-    conn: sa.Connection, tenant: str, motion: UUID, *, source: str, key: str, format: str
+    conn: sa.Connection,
+    tenant: str,
+    motion: UUID,
+    *,
+    source: str,
+    key: str,
+    format: str,
+    rig: RigRow | None = None,
 ) -> MakingClaim | None:
     """Claim the making of a file; None if it is there, another process makes it, or the motion
-    has no such npz any more."""
+    has no such npz or the tenant no such version of the rig any more."""
     motions = {"tenant": tenant, "motion": motion, "canonical": CANONICAL, "source": source}
     values = {"key": key, "format": format, "claim": uuid4(), "seconds": CLAIM_SECONDS}
+    values |= {"rig": None if rig is None else rig.id, "rig_version": None if rig is None else rig.version}
     token = conn.execute(CLAIM, {**motions, **values}).scalar_one_or_none()
     return None if token is None else MakingClaim(tenant, motion, source, key, format, token)
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass
 from typing import Any
 from uuid import UUID
 
@@ -20,63 +19,13 @@ from marey.jobs import tables
 from marey.takes.assets import keep_content, write_content
 from marey.takes.gc import remove_assets
 from marey.takes.made import ATTEMPTS, WritableStore
+from marey.takes.types import AddedRig, NewRig, RigRow
 from marey.tenants import Actor, audit
 from marey.tenants.quotas import reserve_bytes
 
 MEDIA_TYPE = "application/octet-stream"
 RIG_LOCK = 0x7269_6773
 """First key of the advisory locks under which a tenant's rigs are counted and changed."""
-
-
-@dataclass(frozen=True)
-class NewRig:
-    """A rig to add.
-
-    Attributes:
-        format: ending of the file's name, which tells how it is read.
-        data: the file.
-        map: names of the joints of some parts of the body; None = no map.
-        report: what was found in it (`marey.motion.rigs.report.describe`).
-    """
-
-    tenant: str
-    name: str
-    format: str
-    data: bytes = field(repr=False)
-    map: Mapping[str, str | None] | None
-    report: Mapping[str, Any] = field(repr=False)
-
-
-@dataclass(frozen=True)
-class RigRow:
-    """A stored rig; `map` and `report` as in `NewRig`.
-
-    Attributes:
-        version: counts the changes of file and map, from 1.
-        added_by: name of the key that added this version.
-        created: time of the first version.
-        updated: time of this version.
-    """
-
-    id: UUID
-    name: str
-    version: int
-    format: str
-    sha256: str
-    size: int
-    map: Mapping[str, str | None] | None
-    report: Mapping[str, Any] = field(repr=False)
-    added_by: str
-    created: datetime
-    updated: datetime
-
-
-@dataclass(frozen=True)
-class AddedRig:
-    """A rig that was added; `changed` is False if it was there already with the same file and map."""
-
-    rig: RigRow
-    changed: bool
 
 
 def add_rig(engine: sa.Engine, store: WritableStore, new: NewRig, actor: Actor, *, limit: int) -> AddedRig:

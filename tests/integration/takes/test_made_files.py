@@ -6,6 +6,7 @@ import hashlib
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 from uuid import UUID
 
 import httpx2
@@ -21,6 +22,9 @@ from marey.motion.export_options import ExportOptions
 from marey.storage import FolderStore
 from marey.takes import (
     MakingClaim,
+    NewRig,
+    RigRow,
+    add_rig,
     claim_making,
     collect_garbage,
     delete,
@@ -29,10 +33,11 @@ from marey.takes import (
     find_made,
     keep_made,
     remove_expired_makings,
+    remove_rig,
     renew_makings,
     rewrite_files,
 )
-from marey.tenants import usage
+from marey.tenants import Actor, usage
 from tests.integration.takes.test_retention import SECRET, digest, dump, made, objects
 from tests.servers.audit import audit
 from tests.servers.ports import free_ports
@@ -166,9 +171,9 @@ def test_two_processes_make_a_file_once(
     times: list[str] = []
     make = MakingProcesses.make
 
-    async def counted(self: MakingProcesses, recipe: FileRecipe, npz: bytes, where: str) -> bytes | FailureReason:
+    async def counted(self: MakingProcesses, recipe: FileRecipe, *sources: Any) -> bytes | FailureReason:
         times.append(recipe.format)
-        return await make(self, recipe, npz, where)
+        return await make(self, recipe, *sources)
 
     monkeypatch.setattr(MakingProcesses, "make", counted)
     assert isinstance(api.store, FolderStore)
@@ -213,7 +218,9 @@ def job(engine: sa.Engine, folder_store: FolderStore) -> UUID:
     return made(engine, folder_store, PROMPT)
 
 
-def claim(engine: sa.Engine, job: UUID, key: str = "k", seconds: float | None = None) -> MakingClaim | None:
+def claim(
+    engine: sa.Engine, job: UUID, key: str = "k", seconds: float | None = None, rig: RigRow | None = None
+) -> MakingClaim | None:
     with transaction(engine) as conn:
         motion = conn.execute(sa.select(tables.motion.c.id).where(tables.motion.c.job_id == job)).scalar_one()
         source = conn.execute(
@@ -221,7 +228,7 @@ def claim(engine: sa.Engine, job: UUID, key: str = "k", seconds: float | None = 
             .join(tables.motion_file, tables.motion_file.c.asset_id == tables.asset.c.id)
             .where(tables.motion_file.c.motion_id == motion, tables.motion_file.c.format == "npz")
         ).scalar_one()
-        found = claim_making(conn, "default", motion, source=source, key=key, format="glb")
+        found = claim_making(conn, "default", motion, source=source, key=key, format="glb", rig=rig)
         if seconds is not None:
             clock = sa.func.clock_timestamp() + sa.func.make_interval(0, 0, 0, 0, 0, 0, seconds)
             conn.execute(sa.update(tables.made_file).where(tables.made_file.c.key == key).values(expires_at=clock))
@@ -322,6 +329,24 @@ def test_made_files_go_with_their_job(engine: sa.Engine, folder_store: FolderSto
     assert not keep_made(engine, folder_store, unfinished, b"too late", "x/y", quota=QUOTA)
     collect_garbage(engine, folder_store)
     assert objects(folder_store) == []
+
+
+def test_made_files_go_with_their_rig_and_are_claimed_for_its_version_alone(
+    engine: sa.Engine, folder_store: FolderStore, job: UUID
+) -> None:
+    hero, ann = NewRig("default", "hero", "glb", b"file", None, {}), Actor("ann", None)
+    first = add_rig(engine, folder_store, hero, ann, limit=9).rig
+    late = claim(engine, job, "first", rig=first)
+    assert late is not None
+    second = add_rig(engine, folder_store, replace(hero, map={"left_toes": None}), ann, limit=9).rig
+    assert rows(engine) == []
+    assert not keep_made(engine, folder_store, late, b"too late", "x/y", quota=QUOTA)
+    assert claim(engine, job, "first", rig=first) is None
+    assert claim(engine, job, "second", rig=second) is not None
+    with transaction(engine) as conn:
+        remove_rig(conn, "default", "hero")
+    assert rows(engine) == []
+    assert claim(engine, job, "second", rig=second) is None
 
 
 def test_made_files_go_with_the_prompt(engine: sa.Engine, folder_store: FolderStore, job: UUID) -> None:

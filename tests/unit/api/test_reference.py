@@ -159,7 +159,8 @@ def test_every_body_has_an_example_that_is_accepted(document: dict[str, Any]) ->
     for operations in document["paths"].values():
         for operation in operations.values():
             for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
-                shown[content["schema"]["$ref"].rpartition("/")[2], media_type] = content["example"]
+                if content["schema"].get("format") != "binary":
+                    shown[content["schema"]["$ref"].rpartition("/")[2], media_type] = content["example"]
     assert shown == EXAMPLES
     for (name, _), example in EXAMPLES.items():
         if name == "NewItemBody":

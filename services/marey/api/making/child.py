@@ -20,7 +20,7 @@ from marey.api.making.messages import read_message, write_message
 from marey.core.characters import check_text
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.core.extras import MissingExtra, needs_extra
-from marey.exporters.making import FileRecipe
+from marey.exporters.making import FileRecipe, RigFile
 from marey.motion.export_options import ExportOptions
 
 NICENESS = 5
@@ -70,9 +70,12 @@ def _answer(answers: BinaryIO, request: dict[str, Any], content: bytes) -> None:
         write_message(answers, {}, result)
 
 
-def _make(request: dict[str, Any], npz: bytes) -> bytes:
-    recipe = FileRecipe(request["format"], ExportOptions(**request["options"]), request["fps"])
-    content = recipe.make(npz, request["where"])
+def _make(request: dict[str, Any], sources: bytes) -> bytes:
+    """Return the file of an npz, which the file of a rig may follow."""
+    rig = None if request["rig"] is None else RigFile(**request["rig"])
+    recipe = FileRecipe(request["format"], ExportOptions(**request["options"]), request["fps"], rig)
+    npz = request["npz"]
+    content = recipe.make(sources[:npz], request["where"], sources[npz:])
     if len(content) > MAX_FILE:
         raise TooLarge(f"the file would have {len(content) / 2**20:.0f} MiB, over {MAX_FILE // 2**20}")
     return content
@@ -111,9 +114,12 @@ def _problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
     if isinstance(error, MissingExtra):
         hint = f"Ask its operator for the extra {error.extra!r}, or make the file where you have it: `marey convert`."
         error = InvalidInput(f"this server makes no {request['format']} files", where="format", hint=hint)
-    elif isinstance(error, InvalidFile):
+    elif isinstance(error, InvalidFile) and error.where == request["where"]:
         error = Conflict(f"the npz of the motion cannot be read: {error.message}", where=request["where"])
-    where = error.where if error.where in {*request["options"], "fps", request["where"]} else "format"
+    elif isinstance(error, InvalidFile):  # an upgrade may change what is read
+        error = Conflict(f"the rig cannot be read: {error.message}", where="rig", hint="Add it again: marey rigs add.")
+    known = {*request["options"], "fps", request["where"]}
+    where = next((each for each in (error.where, error.argument) if each in known), "format")
     return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}
 
 

@@ -27,6 +27,7 @@ from marey.storage import AssetStore
 from marey.takes import (
     MadeFile,
     MakingClaim,
+    RigRow,
     claim_making,
     fail_making,
     find_made,
@@ -55,12 +56,14 @@ class FileOrder:
 
     Attributes:
         source: sha256 of the npz that it is made of.
+        rig: the tenant's rig that it is made on; None = none, or a reference rig.
     """
 
     key: ApiKey
     motion: UUID
     source: str
     recipe: FileRecipe
+    rig: RigRow | None = None
 
     @property
     def identity(self) -> str:
@@ -149,7 +152,13 @@ class FileMaker:
             with transaction(self._engine) as conn:
                 format = order.recipe.format
                 return claim_making(
-                    conn, order.key.tenant, order.motion, source=order.source, key=order.identity, format=format
+                    conn,
+                    order.key.tenant,
+                    order.motion,
+                    source=order.source,
+                    key=order.identity,
+                    format=format,
+                    rig=order.rig,
                 )
 
         stack = ExitStack()
@@ -188,7 +197,10 @@ class FileMaker:
 
     async def _make(self, order: FileOrder, claim: MakingClaim) -> None:
         npz = await _in_thread(lambda: self._store.get(asset_key(claim.tenant, claim.source)))
-        made = await self._processes.make(order.recipe, npz, f"motion {claim.motion}")
+        rig = b""
+        if (file := order.recipe.rig) is not None:
+            rig = await _in_thread(lambda: self._store.get(asset_key(claim.tenant, file.sha256)))
+        made = await self._processes.make(order.recipe, npz, f"motion {claim.motion}", rig)
         if isinstance(made, FailureReason):
             problem = made
             await _in_thread(lambda: fail_making(self._engine, claim, problem))

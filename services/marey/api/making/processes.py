@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import json
 import os
 import signal
@@ -57,15 +58,17 @@ class MakingProcess:
         """False after the process has ended: it takes no more requests."""
         return self._process.poll() is None
 
-    def make(self, recipe: FileRecipe, npz: bytes, where: str) -> bytes | FailureReason:
+    def make(self, recipe: FileRecipe, npz: bytes, where: str, rig: bytes = b"") -> bytes | FailureReason:
         """Return the content of a file, or why it cannot be made. Blocks.
 
         Args:
             npz: the motion.
             where: its name in errors.
+            rig: the file of the rig, where the recipe has one.
         """
         request = {"format": recipe.format, "options": recipe.chosen, "fps": recipe.fps, "where": where}
-        return self._ask({"task": "make", **request}, npz, "format")
+        request["rig"] = None if recipe.rig is None else dataclasses.asdict(recipe.rig)
+        return self._ask({"task": "make", "npz": len(npz), **request}, npz + rig, "format")
 
     def report(self, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any] | FailureReason:
         """Return what is found in a rig, or why it cannot be used. Blocks.
@@ -123,9 +126,9 @@ class MakingProcesses:
         self._closed = False
         self._reaping: asyncio.TimerHandle | None = None
 
-    async def make(self, recipe: FileRecipe, npz: bytes, where: str) -> bytes | FailureReason:
+    async def make(self, recipe: FileRecipe, npz: bytes, where: str, rig: bytes = b"") -> bytes | FailureReason:
         """Return the content of a file, or why it cannot be made; waits for its turn."""
-        return await self._run(lambda process: process.make(recipe, npz, where))
+        return await self._run(lambda process: process.make(recipe, npz, where, rig))
 
     async def report(self, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any] | FailureReason:
         """Return what is found in a rig, or why it cannot be used; waits for its turn."""

@@ -10,8 +10,10 @@ from dataclasses import Field, fields
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from fastapi import Depends, Query
+from pydantic import Field as Bounds
 
 from marey.core.errors import InvalidInput
+from marey.http.schemas import FreeText
 from marey.items.item import MAX_OUTPUT_FPS, MIN_OUTPUT_FPS
 from marey.motion.export_options import ExportOptions
 
@@ -74,6 +76,10 @@ def _reader() -> Callable[..., Mapping[str, Any]]:
 
 
 GivenOptions = Annotated[Mapping[str, Any], Depends(_reader())]
+WantedRig = Annotated[
+    Annotated[str, Bounds(min_length=1, max_length=63), FreeText()] | None,
+    Query(description="Put the motion on a rig: one of `GET /v1/rigs`, or `mixamo`, `ue4`, `humanik`."),
+]
 Rate = Annotated[
     float | None,
     Query(

@@ -15,10 +15,12 @@ from marey.api.making.query import export_options
 from marey.core.errors import NotFound
 from marey.db import transaction
 from marey.exporters import check_options, exporters
-from marey.exporters.making import FileRecipe
+from marey.exporters.making import FileRecipe, RigFile
 from marey.exporters.registry import CANONICAL
 from marey.http.schemas import View
 from marey.jobs.types import MotionFile
+from marey.motion.export_options import REFERENCE_RIGS
+from marey.takes import RigRow, get_rig
 
 RETRY_SECONDS = 2
 
@@ -45,12 +47,32 @@ def motion_of(shared: Context, tenant: str, motion: UUID) -> jobs.MotionRow:
         return jobs.get_motion(conn, tenant, motion)
 
 
-def recipe(row: jobs.MotionRow, format: str, given: Mapping[str, Any], fps: float | None) -> FileRecipe:
+def rig_of(shared: Context, tenant: str, name: str | None) -> RigRow | None:
+    """Return the tenant's rig of a name; None for no name, and for a reference rig.
+
+    Raises:
+        NotFound: the tenant has no such rig.
+    """
+    if name is None or name in REFERENCE_RIGS:
+        return None
+    with transaction(shared.engine) as conn:
+        return get_rig(conn, tenant, name)
+
+
+def rig_header(rig: RigRow) -> dict[str, str]:
+    """Return the header that says which version of a rig a file is made on."""
+    return {"Marey-Rig": f"{rig.name}; version={rig.version}; sha256={rig.sha256}"}
+
+
+def recipe(
+    row: jobs.MotionRow, format: str, given: Mapping[str, Any], fps: float | None, rig: RigRow | None
+) -> FileRecipe:
     """Return the file that a request asks for.
 
     Args:
         given: options, by name.
         fps: frames a second; None = the motion's.
+        rig: the tenant's rig that the options name; None = none, or a reference rig.
 
     Raises:
         NotFound: the motion has no such file, and no installed exporter makes it.
@@ -62,7 +84,8 @@ def recipe(row: jobs.MotionRow, format: str, given: Mapping[str, Any], fps: floa
     export = export_options(given)
     if exporter is not None:
         check_options([exporter], export)
-    return FileRecipe(format, export, None if fps == row.fps else fps)
+    file = None if rig is None else RigFile(rig.name, rig.format, rig.sha256, rig.map)
+    return FileRecipe(format, export, None if fps == row.fps else fps, file)
 
 
 def stored_file(row: jobs.MotionRow, wanted: FileRecipe) -> MotionFile | None:

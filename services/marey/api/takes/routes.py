@@ -17,8 +17,17 @@ from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
 from marey.api.files import CHECKED, FILE_RESPONSES, FOR_EVER, FileRequest, FileView, file_response
 from marey.api.making.maker import FileOrder
-from marey.api.making.query import GivenOptions, Rate
-from marey.api.takes.files import MAKING_RESPONSES, being_made, motion_of, recipe, source_of, stored_file
+from marey.api.making.query import GivenOptions, Rate, WantedRig
+from marey.api.takes.files import (
+    MAKING_RESPONSES,
+    being_made,
+    motion_of,
+    recipe,
+    rig_header,
+    rig_of,
+    source_of,
+    stored_file,
+)
 from marey.api.takes.schemas import (
     MotionDetailView,
     MotionView,
@@ -126,6 +135,7 @@ async def get_file(
     part: FileRequest,
     options: GivenOptions,
     fps: Rate = None,
+    rig: WantedRig = None,
 ) -> Response:
     """Get a file of a motion; its ETag is its SHA-256.
 
@@ -133,11 +143,15 @@ async def get_file(
     while; 202 if that takes longer than 5 s: ask again.
     """
     row = await run_in_threadpool(motion_of, shared, key.tenant, motion)
-    file = stored_file(row, wanted := recipe(row, format, options, fps))
+    own_rig = await run_in_threadpool(rig_of, shared, key.tenant, rig)
+    file = stored_file(row, wanted := recipe(row, format, {**options, "rig": rig}, fps, own_rig))
     caching = FOR_EVER if file is not None else CHECKED
     if file is None:
-        file = await shared.maker.get(FileOrder(key, motion, source_of(row), wanted))
+        file = await shared.maker.get(FileOrder(key, motion, source_of(row), wanted, own_rig))
     if file is None:
         return being_made(format)
     name, view = download_name(file_stem(row), extension_of(format)), FileView(**vars(file))
-    return await run_in_threadpool(file_response, shared, key.tenant, name, view, part, caching=caching)
+    answer = await run_in_threadpool(file_response, shared, key.tenant, name, view, part, caching=caching)
+    if own_rig is not None:
+        answer.headers.update(rig_header(own_rig))
+    return answer

@@ -19,8 +19,11 @@ from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import Array, multiply, rotate
 
 
-def put_on_rig(clip: MotionClip, options: ExportOptions) -> RiggedMotion:
+def put_on_rig(clip: MotionClip, options: ExportOptions, body: RigBody | None = None) -> RiggedMotion:
     """Put a clip on the rig that the options name.
+
+    Args:
+        body: that rig; None = load it.
 
     Raises:
         InvalidInput: the rig is unknown, has no legs or the wrong size, has no bone for `root_bone`, or the clip has
@@ -28,7 +31,7 @@ def put_on_rig(clip: MotionClip, options: ExportOptions) -> RiggedMotion:
         NotFound, InvalidFile, TooLarge: the file of the rig or of the map cannot be read.
     """
     assert options.rig is not None
-    return on_body(clip, load_body(options.rig, options.rig_map), options)
+    return on_body(clip, body or load_body(options.rig, options.rig_map), options)
 
 
 def on_body(clip: MotionClip, body: RigBody, options: ExportOptions = PLAIN, *, hands: bool = False) -> RiggedMotion:

@@ -1,4 +1,4 @@
-"""What is found in a rig, as JSON."""
+"""Parts, other joints and properties of a rig, as JSON."""
 
 from __future__ import annotations
 
