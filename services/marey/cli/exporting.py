@@ -7,6 +7,7 @@ import inspect
 from collections.abc import Callable, Collection, Mapping
 from enum import Enum, StrEnum
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import typer
@@ -110,6 +111,14 @@ JointNames = Annotated[
     ),
 ]
 
+ServerRig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="NAME",
+        help="Put the motion on a rig: one of `marey rigs list`, or mixamo, ue4, humanik; of BVH, glb, FBX and USD.",
+    ),
+]
 OPTIONS: Mapping[str, tuple[Any, object]] = {
     "bvh_root": (BvhRoot, BvhRootOption.ZERO),
     "root_bone": (RootBone, False),
@@ -123,15 +132,23 @@ OPTIONS: Mapping[str, tuple[Any, object]] = {
     "names": (JointNames, None),
 }
 """Annotation and default of the option for each field of `ExportOptions`, in the order of the help."""
+NO_OTHERS: Mapping[str, Any] = MappingProxyType({})
 
 
-def with_export(*, without: Collection[str] = ()) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_export(
+    *, without: Collection[str] = (), instead: Mapping[str, Any] = NO_OTHERS
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Give a command the options of exports in place of its parameter `export: ExportOptions`.
 
     Args:
         without: fields that the command leaves at their defaults.
+        instead: other annotations of options, by field.
     """
-    chosen = {name: option for name, option in OPTIONS.items() if name not in without}
+    chosen = {
+        name: (instead.get(name, annotation), default)
+        for name, (annotation, default) in OPTIONS.items()
+        if name not in without
+    }
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(command)

@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         Selection,
     )
     from marey.client.types.references import ReferenceMatch
+    from marey.client.types.rigs import Rig, RigDetail
     from marey.client.types.schedules import Schedule
     from marey.client.types.streams import Stream, StreamDetail, StreamPrompt, StreamSkeleton
     from marey.client.types.webhooks import Delivery, DeliveryAttempt, DeliveryDetail, Webhook, WebhookSecret
@@ -129,6 +130,7 @@ __getattr__ = lazy_names(
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
         "marey.client.types.references": "ReferenceMatch",
+        "marey.client.types.rigs": "Rig RigDetail",
         "marey.client.types.schedules": "Schedule",
         "marey.client.types.streams": "Stream StreamDetail StreamPrompt StreamSkeleton",
         "marey.client.types.webhooks": "Delivery DeliveryAttempt DeliveryDetail Webhook WebhookSecret",
@@ -210,6 +212,8 @@ __all__ = [
     "Reroll",
     "Result",
     "Review",
+    "Rig",
+    "RigDetail",
     "SamplingSetting",
     "Schedule",
     "ScheduleChanges",

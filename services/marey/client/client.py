@@ -13,6 +13,7 @@ from marey.client.motions import Motions
 from marey.client.place import Server, find_server, server_at
 from marey.client.references import References
 from marey.client.resources import identifier
+from marey.client.rigs import Rigs
 from marey.client.schedules import Schedules
 from marey.client.streams import Streams
 from marey.client.transport import Transport
@@ -39,7 +40,7 @@ class Client:
         InvalidInput: the URL is not one.
 
     Attributes:
-        jobs, motions, streams, evaluations, schedules, webhooks, models, references: the nouns of the API.
+        jobs, motions, streams, evaluations, schedules, webhooks, models, references, rigs: the nouns of the API.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Client:
         self.webhooks = Webhooks(self._transport)
         self.models = Models(self._transport)
         self.references = References(self._transport)
+        self.rigs = Rigs(self._transport)
 
     def __enter__(self) -> Self:
         return self

@@ -155,10 +155,10 @@ class Motions(Resource):
             timeout: seconds to wait until the file is made.
             overwrite: replace a file with other content.
             options: of the format, such as `root_bone=True` or `in_place="heading"`; the reference of the HTTP API
-                lists them.
+                lists them. `rig="hero"` puts the motion on a rig of `client.rigs`, or on `mixamo`, `ue4` or `humanik`.
 
         Raises:
-            NotFound: there is no such motion, or the server does not make such files.
+            NotFound: there is no such motion or rig, or the server does not make such files.
             InvalidInput: the server does not know an option, the motion cannot be written like this, or the folder
                 cannot be written.
             TimedOut: the file is not made in time.

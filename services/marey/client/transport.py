@@ -105,6 +105,13 @@ class Transport:
         """POST a JSON body (None = none) and return the answer's JSON; only for requests that may be repeated."""
         return _json(self._send("POST", path, params=_given(params), json=body))
 
+    def post_file(self, path: str, content: bytes, **params: Any) -> Any:
+        """POST a file and return the answer's JSON; only for requests that may be repeated."""
+        headers = {"Content-Type": "application/octet-stream"}
+        timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
+        sent: dict[str, Any] = {"content": content, "headers": headers, "timeout": timeout}
+        return _json(self._send("POST", path, params=_given(params), **sent))
+
     def post_new(self, path: str, body: Any, *, idempotency_key: str | None = None) -> Any:
         """POST with an idempotency key (None = random), which all retries share, so that the object is created once."""
         key = {"Idempotency-Key": idempotency_key or str(uuid4())}

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import json
+from pathlib import Path
 
 import httpx2
 import pytest
 import sqlalchemy as sa
 
 from marey.api.making import maker
+from marey.client import Client
+from marey.core.errors import NotFound
 from marey.db import transaction
 from marey.exporters import Coordinates, exporter_of
 from marey.exporters.making import FileRecipe, RigFile
@@ -17,6 +21,7 @@ from marey.motion.export_options import REFERENCE_RIGS, ExportOptions
 from marey.motion.io.glb_read import parse_glb
 from marey.motion.retarget.reference import REFERENCES
 from tests.servers.audit import audit
+from tests.support.command import Command
 from tests.support.live_api import LiveApi
 from tests.support.walker import walker
 
@@ -121,3 +126,31 @@ def test_files_go_with_the_version_of_the_rig_and_with_the_rig(api: LiveApi, htt
     assert http.delete("/v1/rigs/changing").status_code == 204
     assert rows(api.engine) == before
     assert get(http, motion, "glb", rig="changing").status_code == 404
+
+
+def test_the_client_and_the_command_line(api: LiveApi, marey: Command, motion: str, tmp_path: Path) -> None:
+    hero, odd, walk = tmp_path / "hero.glb", tmp_path / "my hero.glb", tmp_path / "walk.fbx"
+    rig_map = tmp_path / "map.json"
+    hero.write_bytes(GLB)
+    odd.write_bytes(b"no glb")
+    rig_map.write_text('{"left_toes": null}')
+    done = marey("rigs", "add", hero, "--name", "lead").ok()
+    assert (done.out.strip(), "version 1" in done.err) == ("lead", True)
+    assert json.loads(marey("rigs", "add", hero, "--name", "lead", "--json").ok().out)["version"] == 1
+    assert "version 2" in marey("rigs", "add", hero, "--name", "lead", "--map", rig_map).ok().err
+    assert "lead" in marey("rigs", "list").ok().out
+    marey("rigs", "add", odd).refused(2, "--name")
+    marey("rigs", "add", odd, "--name", "odd").refused(2, f"{odd}: is not a glb file")
+    rig_map.write_text('{"left_hand": "nobody"}')
+    marey("rigs", "add", hero, "--map", rig_map).refused(2, f"{rig_map}: left_hand")
+    marey("motions", "file", motion, "fbx", "--rig", "lead", "-o", walk).ok()
+    with Client(api.url, api.key) as client:
+        assert client.rigs.get("lead").map == {"left_toes": None}
+        same = client.motions.make_file(motion, tmp_path / "same.fbx", rig="lead")
+        assert same.read_bytes() == walk.read_bytes()
+        assert [rig.name for rig in client.rigs.list(limit=1)] == ["lead"]
+        with pytest.raises(NotFound, match="no rig 'nobody'"):
+            client.motions.make_file(motion, tmp_path / "no.fbx", rig="nobody")
+    marey("rigs", "remove", "lead", "nobody", "--yes").refused(3, "no rig 'nobody'")
+    marey("rigs", "remove", "lead", "--yes").ok()
+    marey("rigs", "remove", "lead", "--yes").refused(3, "marey rigs list")

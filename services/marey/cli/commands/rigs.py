@@ -1,8 +1,10 @@
-"""`marey rigs …`: what is found in the skeleton of a character."""
+"""`marey rigs …`: the skeletons of characters."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -12,9 +14,60 @@ from marey.cli.exporting import RigMap
 app = typer.Typer(help="Rigs that motions are put on.", no_args_is_help=True)
 
 
-@app.callback()
-def main() -> None:
-    """Keep `show` a command of its own while it is the only one."""
+COLUMNS = ("name", "version", "format", "size", "added_by", "updated", "sha256")
+
+
+@app.command()
+def add(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The character: .glb, .gltf, .vrm, .fbx, .bvh, .json.")],
+    name: Annotated[str | None, typer.Option("--name", help="Name of the rig; the file's by default.")] = None,
+    rig_map: RigMap = None,
+    as_json: console.Json = False,
+) -> None:
+    """Add a rig to the server, for `marey motions file ID fbx --rig NAME`.
+
+    The same file changes nothing; another file under a name is a new version.
+    """
+    from marey.client import Client
+
+    with Client() as client:
+        rig = client.rigs.add(file, name, rig_map=rig_map)
+    if as_json:
+        console.result_json(rig.raw)
+        return
+    console.result(rig.name)
+    family, parts = rig.report.get("family"), rig.report.get("parts", {})
+    console.say(f"version {rig.version}, {len(parts)} parts of the body found, family {family or 'unknown'}")
+    for note in rig.report.get("notes", ()):
+        console.say(f"note: {note}")
+
+
+@app.command("list")
+def list_rigs(as_json: console.Json = False) -> None:
+    """List the rigs of the server, newest first; mixamo, ue4 and humanik are always there."""
+    from marey.client import Client
+
+    with Client() as client:
+        console.listing((rig.raw for rig in client.rigs.list()), COLUMNS, _cell, as_json=as_json)
+
+
+@app.command()
+def remove(
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Rigs of the server.")], yes: console.Yes = False
+) -> None:
+    """Remove rigs from the server, with the files that it made on them."""
+    from marey.client import Client
+
+    with Client() as client:
+        found = [client.rigs.get(name) for name in dict.fromkeys(names)]
+        console.confirm(f"Remove {', '.join(rig.name for rig in found)}?", yes=yes)
+        for rig in found:
+            client.rigs.remove(rig)
+            console.say(f"removed {rig.name}")
+
+
+def _cell(rig: Mapping[str, Any], column: str) -> object:
+    return rig[column][:12] if column == "sha256" else rig[column]
 
 
 @app.command()
