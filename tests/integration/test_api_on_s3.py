@@ -18,6 +18,7 @@ from marey.client.fetching import ATTEMPTS, FileToFetch, download_all
 from marey.core.errors import InvalidInput, Unreachable
 from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction
+from marey.exporters import Coordinates, exporter_of
 from marey.exporters.making import FileRecipe
 from marey.jobs import asset_key
 from marey.motion.clip import parse_npz
@@ -74,6 +75,25 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
         download_all(client, [target], overwrite=False, done=lambda _: None)
     assert sha256_of(tmp_path / "x.npz") == digest["sha256"]
     assert parsedate_to_datetime(answer.headers["expires"]) > parsedate_to_datetime(answer.headers["date"])
+
+
+def test_a_file_on_a_rig_of_the_bucket_is_fetched_from_the_bucket(api: LiveApi, tmp_path: Path) -> None:
+    clip = walker(seconds=0.5)
+    hero = tmp_path / "hero.glb"
+    hero.write_bytes(exporter_of("glb").encode(clip, Coordinates()))
+    with api.client() as client:
+        job = client.submit([{"prompt": "a person walks"}])
+        api.work(clip.to_npz())
+        (motion,) = client.pages(f"/v1/jobs/{job['id']}/motions")
+    with Client(api.url, api.key) as client, api.http() as http:
+        rig = client.rigs.add(hero)
+        path = client.motions.make_file(motion["id"], tmp_path / "walk.fbx", rig="hero")
+        answer = http.get(f"/v1/motions/{motion['id']}/files/fbx", params={"rig": "hero"})
+        assert answer.status_code == 307
+        assert answer.headers["marey-rig"] == f"hero; version=1; sha256={rig.sha256}"
+        assert httpx2.get(answer.headers["location"]).content == path.read_bytes()
+        client.rigs.remove(rig)
+    assert not api.store.exists(asset_key(DEFAULT_TENANT, rig.sha256))
 
 
 def test_a_file_made_on_request_is_fetched_from_the_bucket(
