@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
 from pydantic import TypeAdapter
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from marey.core.documents import read_json
-from marey.core.errors import InvalidFile, NotFound
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.licences import Terms
 
 _TERMS = TypeAdapter(tuple[Terms, ...])
@@ -30,6 +32,40 @@ class TrainedPart:
     budget: dict[str, Any]
     sources: tuple[Terms, ...] = ()
     """Data sets that it was trained on, and those of every part that it began from or was trained upon."""
+
+
+def mean_part(parts: Mapping[str, TrainedPart]) -> TrainedPart:
+    """Return the mean of the weights of several trainings of a stage (Wortsman et al. 2022, "Model soups").
+
+    They must have begun from the same weights, or their mean is noise. The configuration is that of the last, and the
+    mean has no metrics: it was not validated.
+
+    Args:
+        parts: at least two, by what they are called in errors.
+
+    Raises:
+        InvalidInput: a single part, other networks, or other data.
+    """
+    first, *rest = parts.values()
+    if not rest:
+        raise InvalidInput("is the only training", where=next(iter(parts)), hint="Name two or more.")
+    shapes = {name: value.shape for name, value in first.state.items()}
+    for where, part in parts.items():
+        if {name: value.shape for name, value in part.state.items()} != shapes:
+            raise InvalidInput("holds another network than the first", where=where)
+        if part.data_sha256 != first.data_sha256:
+            raise InvalidInput("was trained on other data than the first", where=where)
+    state = {name: _mean([part.state[name] for part in parts.values()]) for name in shapes}
+    budget = {"mean_of": [part.budget for part in parts.values()]}
+    sources = tuple(dict.fromkeys(source for part in parts.values() for source in part.sources))
+    return TrainedPart(state, rest[-1].config, {}, first.data_sha256, budget, sources)
+
+
+def _mean(values: Sequence[Tensor]) -> Tensor:
+    """Return the mean of floating numbers; of others, such as counters, the last."""
+    if not values[0].is_floating_point():
+        return values[-1]
+    return torch.stack([value.float() for value in values]).mean(0).to(values[0].dtype)
 
 
 def save_part(folder: Path, part: TrainedPart) -> None:

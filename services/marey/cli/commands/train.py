@@ -294,6 +294,22 @@ def self_train(
 
 
 @app.command()
+def mean(
+    stage: Annotated[str, typer.Argument(metavar="STAGE", help="Such as masked.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN…", help="Runs that have finished the stage.")],
+    run: Annotated[Path, typer.Option("--run", help="The run that gets the mean; its part of the stage is replaced.")],
+) -> None:
+    """Take the mean of the weights of several trainings of one stage, which began from the same weights.
+
+    It often does better than each of them. Nothing is trained.
+    """
+    from marey.cli.roles.training import mean_of_runs
+
+    mean_of_runs(stage, runs, run)
+    console.result(console.home_relative(run / stage))
+
+
+@app.command()
 def ablate(
     data: Data,
     bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Gives the configuration and the other parts.")],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +105,17 @@ def assemble_bundle(
     text = None if card is None else card.read_text(encoding="utf-8")
     chosen = open_config(named_config, config, choices)
     return assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
+
+
+def mean_of_runs(stage: str, runs: Sequence[Path], run: Path) -> None:
+    """Write the mean of the finished parts of a stage in several runs into a run folder."""
+    try:
+        from marey.training.parts import load_part, mean_part, save_part
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    folders = [each / stage / "part" for each in runs]
+    mean = mean_part({str(folder): load_part(folder) for folder in folders})
+    save_part(run / stage / "part", mean)
 
 
 def unpack_bundle(training: Training, bundle: str, run: Path) -> str:

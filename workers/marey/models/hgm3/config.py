@@ -220,11 +220,12 @@ STARTER = HGM3Config(
 OPEN = replace(
     STARTER,
     name="open",
-    # 81 actions, most of them with one to five takes, must be known by heart: more capacity than for ten.
-    masked=replace(STARTER.masked, layers=8, feedforward=1024),
+    # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
+    phases=1,
+    speeds=False,
     residual=replace(STARTER.residual, layers=6, feedforward=768),
-    # Decoding reads the whole condition from the first pass on.
-    mining=replace(STARTER.mining, level_shares=(1.0, 1.0, 4.0)),
+    # Decoding reads the whole condition from the first pass on; hard masks cost a third of a step.
+    mining=replace(STARTER.mining, conditions="specific", mask="random"),
 )
 
 TINY = HGM3Config(
