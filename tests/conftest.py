@@ -20,6 +20,7 @@ from pathlib import Path
 import psycopg
 import pytest
 import sqlalchemy as sa
+from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler.loadfile import LoadFileScheduling
 
@@ -37,6 +38,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 """A run starts hundreds of processes: each would compile the whole package anew."""
+settings.register_profile("shared machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("shared machine")
+"""No test depends on the time that it takes: other work may be on the machine."""
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 """Tests run in several processes, which share the cores already; those of more threads set their number."""
 

@@ -5,12 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
 from tests.support.tiny_encoders import write_tiny_clip, write_tiny_t5
-
-settings.register_profile("shared machine", deadline=None)  # never a timed test
-settings.load_profile("shared machine")
 
 
 @pytest.fixture(scope="session")
