@@ -29,6 +29,7 @@ OTHERS = {
     "POST /v1/motions/reroll": "submit",
     "POST /v1/motions/{motion}/edits": "submit",
     "POST /v1/motions/{motion}/revert": "submit",
+    "POST /v1/rigs": "submit",
     "POST /v1/streams": "submit",
     "DELETE /v1/streams/{stream}": "submit",
     "POST /v1/evaluations": "submit",

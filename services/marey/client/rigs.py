@@ -47,7 +47,7 @@ class Rigs(Resource):
         """
         path = Path(path)
         if name is None and not NAME.fullmatch(path.stem):
-            hint = "Give the rig another one with --name: letters, digits, `_` and `-`."
+            hint = "Give the rig a name of letters, digits, `_` and `-`."
             raise InvalidInput("a rig cannot have the name of this file", where=str(path), hint=hint)
         data = read_bytes(path, limit=MAX_BYTES, hint="Export the skeleton without the scene.")
         asked = {"name": path.stem if name is None else name, "format": path.suffix.removeprefix(".").lower()}

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import torch
 
-from marey.bundles import find_bundle
 from marey.bundles.eight_bit import write_eight_bit
-from marey.models.hgm3.bundle import load_networks
+from marey.models.hgm3.bundle import load_networks, random_bundle
 
 
 def test_the_networks_have_the_weights_to_a_hundredth(tmp_path: Path) -> None:
-    bundle = find_bundle("hgm3-starter")
+    bundle = random_bundle(tmp_path / "bundle", "starter")
     copy = write_eight_bit(bundle, tmp_path / "copy")
     sizes = [sum(entry.bytes for entry in each.manifest.files.values()) for each in (copy, bundle)]
     assert sizes[0] < 0.62 * sizes[1]

@@ -36,4 +36,4 @@ class RigDetail(Rig):
     """A rig, and what is found in it."""
 
     report: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """Family, pose, unit, notes, and the joint of each part of the body; as `marey rigs show --json`."""
+    """Family, pose, unit, notes, and the joint of each part of the body; as `marey rigs show` tells."""
