@@ -10,11 +10,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from marey.core.documents import parse_json
 from marey.core.errors import InvalidInput
 from marey.motion.edits.operation import value_of_text
 from marey.motion.edits.table import OPERATIONS
-from marey.motion.files import read_limited
 
 Ops = Annotated[
     Path | None,
@@ -82,6 +80,9 @@ def given_operations(context: typer.Context, file: Path | None) -> Any:
         InvalidInput: both are given, or none, or a value of another form.
         NotFound, InvalidFile, TooLarge: of the file.
     """
+    from marey.core.documents import parse_json
+    from marey.motion.files import read_limited
+
     steps = operations_of(context)
     if file is not None:
         if steps:

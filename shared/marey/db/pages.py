@@ -76,6 +76,22 @@ class Order:
         """Return the condition of rows that come after a cursor; raises as `place`."""
         return self.beyond(self.place(cursor, scope))
 
+    def read(
+        self, conn: sa.Connection, query: sa.Select[Any], scope: sa.ColumnElement[bool], cursor: str | None, limit: int
+    ) -> Sequence[sa.RowMapping]:
+        """Return the rows of a page, and one more if there is a next one, for `cut_page`.
+
+        Args:
+            query: the rows that are wanted, in any order.
+            scope: as in `place`.
+
+        Raises:
+            InvalidInput: not a cursor of this listing, or a limit out of range.
+        """
+        if cursor is not None:
+            query = query.where(self.after(cursor, scope))
+        return conn.execute(query.order_by(*self.by()).limit(page_limit(limit) + 1)).mappings().all()
+
 
 @dataclass(frozen=True)
 class _Mark:

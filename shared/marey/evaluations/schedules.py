@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import Order, Page, cut_page, mark_of
 from marey.db.sql import CLOCK, check_text
 from marey.evaluations import tables
 from marey.evaluations.cron import check_cron, check_zone, last_time, next_time
@@ -67,9 +67,7 @@ def list_schedules(
     table = tables.schedule.c
     ours = table.tenant_id == tenant
     query, order = _schedules().where(ours), Order(table.created_at, table.id)
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 

@@ -40,9 +40,7 @@ def list_jobs(
     query, order = _jobs().where(ours), Order(table.created_at, table.id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([_job(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 

@@ -14,6 +14,8 @@ RestPose = Literal["t", "a"]
 Names = Literal["mixamo", "ue5", "humanik", "smplx", "vrm"]
 REFERENCE_RIGS = ("mixamo", "ue4", "humanik")
 """Names of the reference skeletons that `rig` may name; their tables need numpy (`marey.motion.retarget.reference`)."""
+RIG_NAME = r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}"
+"""Pattern of the names of rigs on a server: without a dot, so that none looks like a file."""
 
 
 @dataclass(frozen=True, kw_only=True)

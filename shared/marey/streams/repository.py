@@ -16,7 +16,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Busy, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import Order, Page, cut_page, mark_of
 from marey.db.sql import CLOCK, check_text, interval
 from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
@@ -101,9 +101,7 @@ def list_streams(
     query, order = _streams().where(ours), Order(table.created_at, table.id)
     if is_open:
         query = query.where(table.ended_at.is_(None))
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 

@@ -94,9 +94,8 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
     steps = _read_steps(edit.ops)
     pieces = pieces_of(steps)
     others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
-    ids = list(dict.fromkeys((edit.motion, *others.values())))
     # An erasure of a source waits, and then finds the edit.
-    conn.execute(HOLD_JOBS, {"motions": ids, "tenant": edit.tenant})
+    conn.execute(HOLD_JOBS, {"motions": _sources(edit.motion, steps), "tenant": edit.tenant})
     rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
     for where, motion in others.items():
         rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")

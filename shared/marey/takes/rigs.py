@@ -13,7 +13,7 @@ from marey.core.errors import Conflict, NotFound, Unreachable
 from marey.db.database import transaction
 from marey.db.deadlines import MAINTENANCE
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import Order, Page, cut_page, mark_of
 from marey.db.sql import CLOCK
 from marey.jobs import tables
 from marey.takes.assets import keep_content, write_content
@@ -61,9 +61,7 @@ def list_rigs(conn: sa.Connection, tenant: str, *, cursor: str | None = None, li
     table = tables.rig.c
     ours = table.tenant_id == tenant
     query, order = _rigs().where(ours), Order(table.created_at, table.id)
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([RigRow(**row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import Order, Page, cut_page, mark_of
 from marey.db.sql import CLOCK, interval
 from marey.tenants.audit import audit
 from marey.tenants.types import Actor
@@ -214,9 +214,7 @@ def list_deliveries(
     query, order = _deliveries().where(ours), Order(table.created_at, table.event_id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.event))
 
 

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import Order, Page, cut_page, mark_of
 from marey.db.sql import CLOCK, check_text, interval
 from marey.tenants import tables
 from marey.webhooks.tables import webhook, webhook_delivery
@@ -69,9 +69,7 @@ def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None
     table = webhook.c
     ours = table.tenant_id == tenant
     query, order = _webhooks().where(ours), Order(table.created_at, table.id)
-    if cursor is not None:
-        query = query.where(order.after(cursor, ours))
-    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 

@@ -9,10 +9,10 @@ from fastapi import Path, Query
 from pydantic import Field
 
 from marey.http.schemas import FreeText, View
+from marey.motion.export_options import RIG_NAME
 from marey.takes import RigRow
 
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,62}$"
-"""Names of rigs: without a dot, so that none looks like a file."""
+NAME = f"^{RIG_NAME}$"
 MAX_MAP = 8192
 """Characters of a map; all parts of the body with long names of joints take half of it."""
 

@@ -47,13 +47,13 @@ def motion_of(shared: Context, tenant: str, motion: UUID) -> jobs.MotionRow:
         return jobs.get_motion(conn, tenant, motion)
 
 
-def rig_of(shared: Context, tenant: str, name: str | None) -> RigRow | None:
-    """Return the tenant's rig of a name; None for no name, and for a reference rig.
+def rig_of(shared: Context, tenant: str, name: str) -> RigRow | None:
+    """Return the tenant's rig of a name; None for a reference rig.
 
     Raises:
         NotFound: the tenant has no such rig.
     """
-    if name is None or name in REFERENCE_RIGS:
+    if name in REFERENCE_RIGS:
         return None
     with transaction(shared.engine) as conn:
         return get_rig(conn, tenant, name)

@@ -143,7 +143,7 @@ async def get_file(
     while; 202 if that takes longer than 5 s: ask again.
     """
     row = await run_in_threadpool(motion_of, shared, key.tenant, motion)
-    own_rig = await run_in_threadpool(rig_of, shared, key.tenant, rig)
+    own_rig = None if rig is None else await run_in_threadpool(rig_of, shared, key.tenant, rig)
     file = stored_file(row, wanted := recipe(row, format, {**options, "rig": rig}, fps, own_rig))
     caching = FOR_EVER if file is not None else CHECKED
     if file is None:
