@@ -18,6 +18,7 @@ OPTIONS = {
     "licence": "--licence",
     "mesh": "--mesh",
     "model": "--model",
+    "name": "--name",
     "name_template": "--name-template",
     "overwrite": "--overwrite",
     "placement": "--placement",

@@ -12,11 +12,10 @@ from marey.client.resources import Resource, identifier
 from marey.client.types.rigs import Rig, RigDetail
 from marey.core.documents import read_bytes, read_json
 from marey.core.errors import InvalidInput, MareyError
+from marey.motion.export_options import RIG_NAME
 
 MAX_BYTES = 64 * 2**20
 """Of the file of a rig."""
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
-"""Names of rigs."""
 
 
 class Rigs(Resource):
@@ -46,9 +45,9 @@ class Rigs(Resource):
             QuotaUsedUp: the tenant's quota of bytes is exhausted.
         """
         path = Path(path)
-        if name is None and not NAME.fullmatch(path.stem):
-            hint = "Give the rig a name of letters, digits, `_` and `-`."
-            raise InvalidInput("a rig cannot have the name of this file", where=str(path), hint=hint)
+        if name is None and not re.fullmatch(RIG_NAME, path.stem):
+            hint = "Give the rig another one by name: letters, digits, `_` and `-`."
+            raise InvalidInput("a rig cannot have the name of this file", where=str(path), hint=hint, argument="name")
         data = read_bytes(path, limit=MAX_BYTES, hint="Export the skeleton without the scene.")
         asked = {"name": path.stem if name is None else name, "format": path.suffix.removeprefix(".").lower()}
         if rig_map is not None:
