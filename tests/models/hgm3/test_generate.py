@@ -12,7 +12,7 @@ import torch
 
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.groups import group_rows
-from marey.generation.port import Request
+from marey.generation.port import KeptFrames, Request
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
@@ -237,3 +237,65 @@ def test_the_longest_motions_come_first(generator: Generator) -> None:
 
 def test_a_pass_may_keep_no_token_unless_progress_is_asked_for() -> None:
     assert not DecodeOptions().min_progress
+
+
+def keeping(generator: Generator, index: int) -> Request:
+    """Request that keeps the first and the last frames of a generated motion, and fills those between."""
+    (source,) = generator.generate([Request(text_features(index), index, 88)])
+    assert source is not None
+    spans = (KeptFrames(0, source.features[:24]), KeptFrames(56, source.features[56:]))
+    return Request(text_features(index + 1, 2, 2), index + 50, 88, kept=spans, free=index % 2 == 1)
+
+
+def test_the_tokens_of_kept_frames_stay_and_the_others_are_generated(generator: Generator) -> None:
+    asked = keeping(generator, 0)
+    (made,) = generator.generate([asked])
+    (plain,) = generator.generate([replace(asked, kept=())])
+    assert made is not None
+    assert plain is not None
+    encoder = generator.networks.tokenizer
+    for span in asked.kept:
+        first, last = span.start // 4, span.end // 4
+        encoded = encoder.encode(torch.from_numpy(span.features)[None])[0].T.numpy()
+        assert np.array_equal(made.tokens[:, first:last], encoded)
+    assert (made.tokens >= 0).all()
+    assert not np.array_equal(made.tokens[:, 6:14], plain.tokens[:, 6:14])
+    assert sum(made.decided) == 8
+
+
+def test_motions_with_kept_frames_are_equal_in_any_batch(generator: Generator) -> None:
+    asked = [*(keeping(generator, index) for index in range(5)), *requests()[:3]]
+    together = generator.generate(asked)
+    alone = [made for each in asked for made in generator.generate([each])]
+    assert equal(together, alone)
+
+
+def test_a_free_request_does_not_read_its_text(generator: Generator) -> None:
+    asked = keeping(generator, 1)
+    other = replace(asked, text=text_features(9, 3, 1))
+    assert equal(generator.generate([asked]), generator.generate([other]))
+    assert not equal(generator.generate([replace(asked, free=False)]), generator.generate([replace(other, free=False)]))
+
+
+@pytest.mark.parametrize(
+    ("spans", "message"),
+    [
+        ([(0, 24), (20, 40)], "overlap"),
+        ([(60, 40)], "outside"),
+        ([(2, 24)], "multiples of 4"),
+        ([(0, 22)], "multiples of 4"),
+        ([(0, 88)], "none is left"),
+    ],
+)
+def test_kept_frames_off_the_grid_or_outside_are_refused(
+    generator: Generator, spans: list[tuple[int, int]], message: str
+) -> None:
+    kept = tuple(KeptFrames(start, np.zeros((count, 263), np.float32)) for start, count in spans)
+    with pytest.raises(InvalidInput, match=message):
+        generator.generate([Request(text_features(0), 1, 88, kept=kept)])
+
+
+def test_kept_frames_need_a_length(generator: Generator) -> None:
+    kept = (KeptFrames(0, np.zeros((8, 263), np.float32)),)
+    with pytest.raises(InvalidInput, match="needs a length"):
+        generator.generate([Request(text_features(0), 1, kept=kept)])

@@ -241,7 +241,9 @@ def _items(batch: int, size: int) -> Items:
         condition=torch.randn(batch, slots, TINY.masked.width),
         present=torch.ones(batch, slots, dtype=torch.bool),
         sentence=torch.zeros(batch, TINY.residual.width),
+        free=torch.zeros(batch, dtype=torch.bool),
         tokens=torch.full((batch, size, TINY.tokenizer.levels), -1),
+        kept=torch.zeros(batch, size, dtype=torch.bool),
         decided=torch.zeros(batch, 3, dtype=torch.long),
     )
 

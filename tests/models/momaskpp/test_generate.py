@@ -11,7 +11,7 @@ import torch
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.port import Request
+from marey.generation.port import KeptFrames, Request
 from marey.models.momaskpp.bundle import load_networks, random_bundle
 from marey.models.momaskpp.config import CONFIGS, TINY, MoMaskPPConfig
 from marey.models.momaskpp.generate import Generated, Generator, SamplingSettings
@@ -220,3 +220,48 @@ def test_absent_words_are_zero_and_masked() -> None:
 def test_configurations_survive_their_manifest() -> None:
     for config in CONFIGS.values():
         assert MoMaskPPConfig.from_dict(config.to_dict()) == config
+
+
+def keeping(generator: Generator, index: int) -> Request:
+    """Request that keeps the first and the last frames of a generated motion, and fills those between."""
+    (source,) = generator.generate([request(index, index, 96)])
+    assert source is not None
+    spans = (KeptFrames(0, source.features[:32]), KeptFrames(64, source.features[64:]))
+    return replace(request(index + 1, index + 50, 96), kept=spans, free=index % 2 == 1)
+
+
+def test_tokens_that_cover_kept_frames_alone_stay(variant: Generator) -> None:
+    asked = keeping(variant, 0)
+    (made,), (plain,) = variant.generate([asked]), variant.generate([replace(asked, kept=())])
+    assert made is not None
+    assert plain is not None
+    written = variant._kept_tokens(asked).numpy()
+    kept = written >= 0
+    assert np.array_equal(made.tokens[0][kept], written[kept])
+    blocks = [block[0] for block in variant.scales.split(torch.from_numpy(kept)[None])]
+    assert blocks[-1][:24].tolist() == [True] * 8 + [False] * 8 + [True] * 8
+    valid = variant.scales.valid(torch.tensor([24]))[0].numpy()
+    assert (made.tokens[0][valid] >= 0).all()
+    assert not np.array_equal(made.tokens[0][valid & ~kept], plain.tokens[0][valid & ~kept])
+
+
+def test_coarse_tokens_are_kept_only_where_all_they_cover_is(variant: Generator) -> None:
+    chosen = torch.ones(16, dtype=torch.bool)
+    chosen[5] = False
+    for divisor, block in zip(
+        variant.scales.divisors, variant.scales.split(variant.scales.within(chosen)[None]), strict=True
+    ):
+        covered = block[0, : 16 // divisor]
+        if variant.scales.layout == "own":
+            assert (~covered).nonzero().flatten().tolist() == [5 // divisor]
+
+
+def test_motions_with_kept_frames_are_equal_in_any_batch(variant: Generator) -> None:
+    asked = [*(keeping(variant, index) for index in range(3)), *requests()[:2]]
+    assert equal(variant.generate(asked), [made for each in asked for made in variant.generate([each])])
+
+
+def test_a_free_request_does_not_read_its_text(variant: Generator) -> None:
+    asked = keeping(variant, 1)
+    other = replace(asked, text=request(3, 1).text)
+    assert equal(variant.generate([asked]), variant.generate([other]))

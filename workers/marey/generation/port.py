@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -21,6 +21,24 @@ if TYPE_CHECKING:
     from marey.streams.recording import StreamRecording  # it would import the database
 
 
+@dataclass(frozen=True, eq=False)
+class KeptFrames:
+    """Frames that stand in a motion already: the model reads them, and generates those around them.
+
+    Attributes:
+        start: first frame of the motion that they are.
+        features: (t, D), in the layout's own units.
+    """
+
+    start: int
+    features: NDArray[np.float32] = field(repr=False)
+
+    @property
+    def end(self) -> int:
+        """Return the frame after the last."""
+        return self.start + len(self.features)
+
+
 @dataclass(frozen=True)
 class Request:
     """Request for one motion."""
@@ -30,6 +48,8 @@ class Request:
     frames: int | None = None  # at the model's fps; None = the model decides
     recording: StreamRecording | None = None  # of a live stream: tokens exist, only decoding is left
     scope: Mapping[str, Any] | None = None  # of the prompt, for the manifest; None = by its words
+    kept: tuple[KeptFrames, ...] = ()  # in the order of time; needs `frames`
+    free: bool = False  # the text is not read: kept frames alone decide
 
 
 @dataclass(frozen=True)
@@ -40,6 +60,7 @@ class Limits:
     max_frames: int
     fps: float
     text_width: int
+    keeps: int = 0  # kept frames begin and end at multiples of it; 0 = the model cannot generate around frames
 
     def frames_of(self, seconds: float | None, text: TextFeatures | None = None) -> int | None:
         """Return the frames of a length, or of what the rewriter of a prompt proposes, brought into the range of the
@@ -54,7 +75,8 @@ class Limits:
         """Check that a request is within the limits.
 
         Raises:
-            InvalidInput: a length or seed out of range, or features of another encoder.
+            InvalidInput: a length or seed out of range, features of another encoder, or kept frames that overlap, lie
+                outside the motion or between tokens.
         """
         low, high = self.min_frames, self.max_frames
         frames = request.frames if request.recording is None else None
@@ -70,6 +92,28 @@ class Limits:
                 where="text",
                 hint="They come from another encoder. Parse the prompt again for this bundle.",
             )
+        if request.kept:
+            self._check_kept(request)
+
+    def _check_kept(self, request: Request) -> None:
+        """Check that kept frames lie within the motion, in order, on the grid of the model's tokens."""
+        if not self.keeps:
+            raise InvalidInput("this model cannot generate frames around others", where="kept")
+        if request.frames is None:
+            raise InvalidInput("a motion with kept frames needs a length", where="frames")
+        before = 0
+        for span in request.kept:
+            if span.start < before or span.end > request.frames or not len(span.features):
+                raise InvalidInput(
+                    f"frames {span.start} to {span.end} overlap others or lie outside the motion", where="kept"
+                )
+            if span.start % self.keeps or (span.end % self.keeps and span.end != request.frames):
+                raise InvalidInput(
+                    f"frames {span.start} to {span.end} do not begin and end at multiples of {self.keeps}", where="kept"
+                )
+            before = span.end
+        if sum(len(span.features) for span in request.kept) == request.frames:
+            raise InvalidInput("all frames are kept; none is left to generate", where="kept")
 
 
 def open_bundle(

@@ -1,7 +1,7 @@
 """The decoding loops of HGM³ (Sec. 3.4): base tokens by confidence under three conditions, then residual levels.
 
-An item's tokens depend on its own seed, text and length alone. A forward holds items of one bucket (a multiple of 8
-tokens) and both branches of guidance; each sequence has its readable rows first, so padding changes no bit.
+An item's tokens depend on its own seed, text, length and kept tokens alone. A forward holds items of one bucket (a
+multiple of 8 tokens) and both branches of guidance; each sequence has its readable rows first, so padding changes no bit.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from marey.models.hgm3.config import InferenceConfig
 from marey.models.hgm3.model import MaskedTransformer, ResidualTransformer, SeparateTransformers
 from marey.nn.convolution import frame_mask
 from marey.nn.masking import remaining_masks
+from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import sample_top_k, uniform
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
@@ -44,7 +45,9 @@ class Items:
     condition: Tensor  # (B, S, w) condition tokens of the masked transformer
     present: Tensor  # (B, S) bool
     sentence: Tensor  # (B, w') text token of the residual transformer
-    tokens: Tensor  # (B, n_bucket, V) int64, -1 where not decoded
+    free: Tensor  # (B,) bool: generated without condition
+    tokens: Tensor  # (B, n_bucket, V) int64, NO_TOKEN where not decoded
+    kept: Tensor  # (B, n_bucket) bool: tokens that stay as they are, at all levels
     decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
 
     def select(self, rows: Tensor) -> Items:
@@ -68,8 +71,9 @@ def decode_base(
     keep: KeepRows,
 ) -> Items:
     """Fill `tokens[..., 0]`: L passes; each keeps the most confident tokens and never masks them again."""
-    base = torch.full_like(items.tokens[..., 0], model.mask_token)  # (B, n)
-    schedule = _schedules(items.lengths, config.steps, options)  # (L + 1, B): masked before each pass, at last 0
+    base = items.tokens[..., 0].masked_fill(~items.kept, model.mask_token)  # (B, n)
+    open_counts = items.lengths - items.kept.sum(1)
+    schedule = _schedules(open_counts, config.steps, options)  # (L + 1, B): masked before each pass, at last 0
     for step in range(1, config.steps + 1):
         before, after = schedule[step - 1], schedule[step]
         active = (after < before).nonzero().squeeze(1)
@@ -90,7 +94,7 @@ def decode_base(
             items, base, schedule = items.select(stay), base[stay], schedule[:, stay]
     valid = frame_mask(items.lengths, base.shape[1])
     tokens = items.tokens.clone()
-    tokens[..., 0] = base.masked_fill(~valid, -1)
+    tokens[..., 0] = base.masked_fill(~valid, NO_TOKEN)
     return replace(items, tokens=tokens)
 
 
@@ -135,6 +139,8 @@ def _base_logits(
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
     first[:, 0] = True
+    condition = torch.where(items.free[:, None, None], null, condition)
+    visible = torch.where(items.free[:, None], first, visible)
     return model(
         base.repeat(2, 1),
         valid.repeat(2, 1),
@@ -156,7 +162,8 @@ def decode_residual(
         below = [model.embed(items.tokens[..., v], v) for v in range(level)]
         total = torch.stack(below).sum(0)  # (B, n, d)
         levels = torch.full_like(items.lengths, level).repeat(2)
-        both = torch.cat([items.sentence, model.null.expand_as(items.sentence)])  # (2 B, w')
+        null = model.null.expand_as(items.sentence)
+        both = torch.cat([torch.where(items.free[:, None], null, items.sentence), null])  # (2 B, w')
         guided = model(
             total.repeat(2, 1, 1),
             valid.repeat(2, 1),
@@ -168,16 +175,16 @@ def decode_residual(
         noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
         drawn = sample_top_k(
             guided, noise, temperature=config.residual_temperature, share=config.residual_top_k
-        ).masked_fill(~valid, -1)
+        ).masked_fill(~valid, NO_TOKEN)
         tokens = items.tokens.clone()
-        tokens[..., level] = drawn
+        tokens[..., level] = torch.where(items.kept, tokens[..., level], drawn)
         items = replace(items, tokens=tokens)
         stay = keep()
         items = items if stay is None else items.select(stay)
     return items
 
 
-def _schedules(lengths: Tensor, steps: int, options: DecodeOptions) -> Tensor:
-    """Return the number of masked tokens before pass 1 and after each pass: (L + 1, B)."""
-    columns = [[n, *remaining_masks(n, steps, min_progress=options.min_progress)] for n in lengths.tolist()]
-    return torch.tensor(columns, device=lengths.device).T.contiguous()
+def _schedules(counts: Tensor, steps: int, options: DecodeOptions) -> Tensor:
+    """Return the number of masked tokens before pass 1 and after each pass, (L + 1, B), of `counts` (B,) to decode."""
+    columns = [[n, *remaining_masks(n, steps, min_progress=options.min_progress)] for n in counts.tolist()]
+    return torch.tensor(columns, device=counts.device).T.contiguous()

@@ -14,6 +14,7 @@ from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
 from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
+from marey.generation.kept import write_kept
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
@@ -22,6 +23,7 @@ from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, deco
 from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
+from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import draw_class
 
 BUCKET = 8
@@ -100,7 +102,13 @@ class Generator:
         self.device = device
         self.dtype = dtype
         self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
+        self.limits = Limits(
+            config.min_frames,
+            config.max_frames,
+            config.fps,
+            config.condition.text_width,
+            keeps=config.tokenizer.frames_per_token,
+        )
         self.batch = MAX_ROWS
 
     @classmethod
@@ -236,12 +244,17 @@ class Generator:
         # One by one, once a batch: a float32 product of few rows rounds differently with their number.
         graphs = [graph_batch([r.text], self.config.condition, device) for r in requests]
         base, residual = self.base, self.networks.residual
+        tokens = torch.full((len(requests), bucket, levels), NO_TOKEN, device=device)
+        for row, request in enumerate(requests):
+            write_kept(tokens[row], request, self.networks.tokenizer)
         return Items(
             lengths=torch.tensor(lengths, device=device),
             seeds=torch.tensor([r.seed for r in requests], device=device),
             condition=torch.cat([base.read(graph) for graph in graphs]),
             present=torch.cat([graph.present for graph in graphs]),
             sentence=torch.cat([residual.sentence(graph.nodes[:, 0]) for graph in graphs]),
-            tokens=torch.full((len(requests), bucket, levels), -1, device=device),
+            free=torch.tensor([r.free for r in requests], device=device),
+            tokens=tokens,
+            kept=tokens[..., 0] != NO_TOKEN,
             decided=torch.zeros(len(requests), 3, dtype=torch.long, device=device),
         )

@@ -15,6 +15,7 @@ from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
+from marey.generation.kept import bridged, whole_tokens
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
@@ -81,7 +82,9 @@ class Generator:
         self.dtype = torch.float32
         self.batch_threads = batch_threads
         self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.text.width)
+        self.limits = Limits(
+            config.min_frames, config.max_frames, config.fps, config.text.width, keeps=config.tokenizer.frames_per_token
+        )
         self.batch = MAX_ROWS
         self.scales = networks.tokenizer.scales
 
@@ -207,16 +210,30 @@ class Generator:
     ) -> ScaleItems:
         masked, device = self.networks.masked, self.device
         text = pad_states(words, self.config.text.max_words, device)
-        size = (len(requests), self.scales.size)
+        tokens = torch.stack([self._kept_tokens(request) for request in requests])
+        null = masked.words(text.states, torch.ones(len(requests), dtype=torch.bool, device=device))
+        free = torch.tensor([r.free for r in requests], device=device)
         return ScaleItems(
             lengths=torch.tensor([self._tokens(f) for f in frames], device=device),
             seeds=torch.tensor([r.seed for r in requests], device=device),
-            words=masked.words(text.states),
-            null=masked.words(text.states, torch.ones(len(requests), dtype=torch.bool, device=device)),
-            present=text.present,
-            tokens=torch.full(size, NO_TOKEN, device=device),
-            kept=torch.zeros(size, dtype=torch.bool, device=device),
+            words=torch.where(free[:, None, None], null, masked.words(text.states)),
+            null=null,
+            present=torch.where(free[:, None], torch.arange(text.present.shape[1], device=device) == 0, text.present),
+            tokens=tokens,
+            kept=tokens != NO_TOKEN,
         )
+
+    def _kept_tokens(self, request: Request) -> Tensor:
+        """Return the tokens (N,) of the kept frames of a request; NO_TOKEN where a token covers another frame too."""
+        if not request.kept or request.frames is None:
+            return torch.full((self.scales.size,), NO_TOKEN, device=self.device)
+        rate = self.frames_per_token
+        features, is_kept = bridged(request.kept, request.frames)
+        whole = torch.from_numpy(whole_tokens(features, rate)).to(self.device)[None]
+        length = torch.tensor([whole.shape[1]], device=self.device)
+        tokens = self.networks.tokenizer.encode(whole, length)[0, :, 0]
+        kept = np.pad(is_kept, (0, -len(is_kept) % rate), mode="edge").reshape(-1, rate).all(1)  # (n,)
+        return tokens.masked_fill(~self.scales.within(torch.from_numpy(kept).to(self.device)), NO_TOKEN)
 
     def _generated(self, items: ScaleItems, position: int, frames: int) -> Generated:
         """Decode one item alone: a convolution rounds differently in another batch, and files would differ."""

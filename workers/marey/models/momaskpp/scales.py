@@ -62,6 +62,17 @@ class Scales:
         """Return the number of tokens, all scales together, of a clip of `length`."""
         return int(self.valid(torch.tensor([length])).sum())
 
+    def within(self, chosen: Tensor) -> Tensor:
+        """Return the positions (N,) of one clip that cover chosen full-scale tokens (n,) alone."""
+        length = torch.tensor([len(chosen)], device=chosen.device)
+        blocks: list[Tensor] = []
+        for scale, width in enumerate(self.widths):
+            covers = shrinking(self.span(length), self.positions(length, scale), self.longest, width)[0] > 0  # (P, T)
+            others = torch.ones(self.longest, dtype=torch.bool, device=chosen.device)
+            others[: len(chosen)] = ~chosen
+            blocks.append(covers.any(1) & ~(covers & others).any(1))
+        return torch.cat(blocks)
+
     def split(self, tokens: Tensor) -> tuple[Tensor, ...]:
         """Split tokens (B, N) into their blocks, each (B, P_v)."""
         return tokens.split(self.widths, 1)

@@ -1,0 +1,1 @@
+"""Shots: motion that a model generates around other motion. Edits by a model, timelines of prompts, constraints."""
