@@ -1,7 +1,7 @@
 """The decoding loops of HGM³ (Sec. 3.4): base tokens by confidence under three conditions, then residual levels.
 
 An item's tokens depend on its own seed, text, length and kept tokens alone. A forward holds items of one bucket (a
-multiple of 8 tokens) and both branches of guidance; each sequence has its readable rows first, so padding changes no bit.
+multiple of 8 tokens) and both branches of guidance; each sequence has its readable rows first: padding changes no bit.
 """
 
 from __future__ import annotations
