@@ -100,7 +100,7 @@ def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:
     for row in reversed(found):
         for parameter in OPERATIONS[row["op"]].parameters:
             if parameter.option == option:
-                row[parameter.name] = value_of_text(value)
+                row[parameter.name] = value_of_text(value) if parameter.metavar else True
                 return
     having = [each.name for each in OPERATIONS.values() if option in {p.option for p in each.parameters}]
     raise InvalidInput(
@@ -113,14 +113,17 @@ def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:
 def _options() -> Mapping[str, tuple[str, str]]:
     """Return placeholder and help of each option: of operations, then of their parameters with options of their own."""
     own = {f"--{each.name}": (each.metavar, each.about) for each in OPERATIONS.values()}
-    extra: dict[str, tuple[str, str]] = {}
+    extra: dict[str, tuple[str, dict[str, list[str]]]] = {}
     for each in OPERATIONS.values():
         for parameter in each.parameters:
             if parameter.option:
-                _, before = extra.get(parameter.option, ("", ""))
-                about = f"{before} After --{each.name}: {parameter.about}".strip()
-                extra[parameter.option] = (parameter.metavar, about)
-    return own | extra
+                _, texts = extra.setdefault(parameter.option, (parameter.metavar, {}))
+                texts.setdefault(parameter.about, []).append(f"--{each.name}")
+    helps = {
+        option: (metavar, " ".join(f"After {' or '.join(names)}: {about}" for about, names in texts.items()))
+        for option, (metavar, texts) in extra.items()
+    }
+    return own | helps
 
 
 def _given(args: Sequence[str]) -> Iterator[tuple[str, str]]:

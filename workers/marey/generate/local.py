@@ -116,6 +116,29 @@ class LocalModel:
         for _, clip, _ in self._studio.make(wanted):
             yield clip
 
+    def edit(
+        self, clip: MotionClip, ops: Sequence[Mapping[str, Any]], *, settings: Mapping[str, float] | None = None
+    ) -> tuple[MotionClip, ...]:
+        """Apply operations to a clip, as `marey.motion.edit` does, and generate the frames of those that need a model.
+
+        Args:
+            clip: metres, Y up, with the joints of the model.
+            ops: as in JSON, such as `[{"op": "extend", "seconds": 2, "prompt": "a person sits down"}]`.
+            settings: of sampling.
+
+        Returns:
+            One motion, or two for each `split`. Kept frames are those of the clip.
+
+        Raises:
+            InvalidInput: as `marey.motion.edit`; or the model cannot generate frames around others, or its tokens
+                cannot show those of the clip.
+        """
+        from marey.bundles.limits import check_settings
+        from marey.motion.edits.editing import edit
+
+        own = check_settings(self._bundle, settings or {})
+        return edit(clip, ops, model=self._studio.editor(own))
+
     def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
         """Yield the problems of a row that concern this model: lengths out of its range, unknown settings."""
         from marey.bundles.limits import check_seconds, check_settings, variety_settings

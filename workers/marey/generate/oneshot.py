@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.core.settings import Settings
     from marey.generation.port import Generator
+    from marey.generation.shots.editor import EditModel
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
+    from marey.text.features import TextFeatures
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,20 @@ class OneShot:
     def _scope(self, prompt: str) -> dict[str, Any] | None:
         lists = self.bundle.manifest.actions
         return None if lists is None else self.match_scope(prompt, lists).as_json()
+
+    def editor(self, settings: Mapping[str, Any]) -> EditModel:
+        """Return the model for operations that generate frames.
+
+        Raises:
+            InvalidInput: the model cannot generate frames around others, or an unknown setting.
+        """
+        from marey.generation.shots.editor import EditModel
+
+        def read(prompt: str) -> TextFeatures:
+            (features,) = self._text.features([prompt])
+            return features
+
+        return EditModel.of(self._generator, settings, read)
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
         """Yield each motion with its seconds of computation, in the order given.

@@ -26,6 +26,15 @@ def write_kept(tokens: Tensor, request: Request, tokenizer: MotionTokenizer) -> 
         tokens[first : first + len(made)] = made
 
 
+@torch.no_grad()
+def as_tokens(features: NDArray[np.float32], tokenizer: MotionTokenizer) -> NDArray[np.float32]:
+    """Return features (t, D) as a model's tokens show them."""
+    rate = tokenizer.frames_per_token
+    whole = torch.from_numpy(whole_tokens(features, rate)).to(tokenizer.mean.device)[None]
+    frames = torch.tensor([whole.shape[1]], device=whole.device)
+    return tokenizer.decode(tokenizer.encode(whole, frames), frames // rate)[0, : len(features)].cpu().numpy()
+
+
 def whole_tokens(features: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
     """Return features (t, D) with the last frame repeated up to a multiple of `rate` frames."""
     return np.pad(features.astype(np.float32), ((0, -len(features) % rate), (0, 0)), mode="edge")

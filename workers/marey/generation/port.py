@@ -15,6 +15,7 @@ from marey.core.errors import InvalidInput
 from marey.items.item import MAX_SEED
 from marey.motion.features import FeatureLayout
 from marey.nn.devices import choose_device, fast_bf16
+from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.text.features import TextFeatures
 
 if TYPE_CHECKING:
@@ -243,3 +244,9 @@ class Generator(Protocol[S]):
             InvalidInput: as `Limits.check`.
         """
         ...
+
+
+class KeepingGenerator(Generator[S], Protocol[S]):
+    """A generator that keeps frames of a motion: its limits have `keeps`."""
+
+    tokenizer: MotionTokenizer

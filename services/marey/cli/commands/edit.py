@@ -29,18 +29,23 @@ def edit(
     ],
     ops: Ops = None,
     file_format: Annotated[str, typer.Option("--format", help="Format of files in a folder.")] = "npz",
+    model: options.Model = None,
+    bundle: options.BundleOrFolder = None,
+    sampling: options.Sampling = None,
     export: ExportOptions = PLAIN,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
     **operations: Any,
 ) -> None:
-    """Edit motions: cut, join, loop, mirror, retime or smooth them. Operations apply in the order in which they are
-    given."""
-    from marey.cli.roles.editing import edit_files
+    """Edit motions: cut, join, loop, mirror, retime or smooth them, or let a model generate frames of them. Operations
+    apply in the order in which they are given."""
+    from marey.cli.roles.editing import edit_files, model_for
 
     del operations  # `given_operations` has them in their order
     steps = given_operations(context, ops)
-    for line in edit_files(sources, output, steps, file_format=file_format, export=export, overwrite=overwrite):
+    editor = model_for(steps, bundle or model, options.settings_of(sampling or ()))
+    made = edit_files(sources, output, steps, model=editor, file_format=file_format, export=export, overwrite=overwrite)
+    for line in made:
         _report(line)
         if as_json:
             console.result_json(line)

@@ -14,7 +14,7 @@ from marey.motion.export_options import ExportOptions
 if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
-    from marey.motion.edits.editing import EditSource
+    from marey.motion.edits.editing import EditSource, Model
 
 
 def edit_files(
@@ -22,6 +22,7 @@ def edit_files(
     output: Path,
     ops: Sequence[Mapping[str, Any]],
     *,
+    model: Model | None = None,
     file_format: str,
     export: ExportOptions,
     overwrite: bool,
@@ -32,6 +33,7 @@ def edit_files(
         sources: files that `marey convert` reads.
         output: a motion file, or a folder.
         ops: as of `marey.motion.edit`; files in `with` are read like the sources.
+        model: see `model_for`.
         file_format: of files in a folder.
         export: options of the files.
         overwrite: replace existing files.
@@ -55,7 +57,7 @@ def edit_files(
     check_options([writer], export)
     made: list[tuple[Path, Path, MotionClip]] = []
     for source in sources:
-        clips = edit(_read(source), ops, load=lambda name: _read(Path(name)))
+        clips = edit(_read(source), ops, load=lambda name: _read(Path(name)), model=model)
         target = output if is_file else output / f"{source.stem}.{writer.extension}"
         made += [(source, path, judged(clip)) for path, clip in zip(_numbered(target, len(clips)), clips, strict=True)]
     _check_targets([path for _, path, _ in made], overwrite=overwrite)
@@ -63,6 +65,34 @@ def edit_files(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, writer.write(clip, Coordinates.of(export)))
         yield _line(source, path, clip)
+
+
+def model_for(ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Mapping[str, float]) -> Model | None:
+    """Load the model of operations; None if they need none.
+
+    Args:
+        ops: as of `marey.motion.edit`.
+        bundle: model, bundle or folder; None = the default model.
+        settings: of sampling.
+
+    Raises:
+        InvalidInput: an unknown operation or setting, or a model that cannot generate frames around others.
+        NotFound, InvalidBundle: of the bundle.
+    """
+    from marey.motion.edits.steps import read_steps
+
+    if not any(step.operation.needs_model for step in read_steps(ops)):
+        return None
+    try:
+        from marey.bundles import choose_bundle
+        from marey.bundles.limits import check_settings
+        from marey.core.settings import settings as settings_of_process
+        from marey.generate.oneshot import OneShot
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    config = settings_of_process()
+    chosen = choose_bundle(bundle or config.default_model, config=config)
+    return OneShot(chosen, config).editor(check_settings(chosen, settings))
 
 
 def loop(clip: MotionClip, where: str) -> MotionClip:

@@ -17,12 +17,20 @@ def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     Raises:
         InvalidInput: a moment is outside the motion, or the second is before the first.
     """
-    last = clip.frames - 1
-    first = _frame(values["from"], clip)
-    end = last if values["to"] is None else _frame(values["to"], clip)
-    if end < first:
-        raise InvalidInput(f"the end, frame {end}, is before the beginning, frame {first}")
-    return part(clip, first, end)
+    return part(clip, *frames_of(clip, values["from"], values["to"]))
+
+
+def frames_of(clip: MotionClip, start: float | str, end: float | str | None) -> tuple[int, int]:
+    """Return the frames of two moments, the last frame where the second is None.
+
+    Raises:
+        InvalidInput: a moment is outside the motion, or the second is before the first.
+    """
+    first = _frame(start, clip)
+    last = clip.frames - 1 if end is None else _frame(end, clip)
+    if last < first:
+        raise InvalidInput(f"the end, frame {last}, is before the beginning, frame {first}")
+    return first, last
 
 
 def part(clip: MotionClip, first: int, last: int) -> MotionClip:

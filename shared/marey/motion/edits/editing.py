@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Protocol
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip, load_npz
@@ -49,8 +49,25 @@ class EditSource:
 Load = Callable[[str], "MotionClip | EditSource"]
 
 
+class Model(Protocol):
+    """A model that generates frames for operations (`marey.generation.shots.editor.EditModel`)."""
+
+    @property
+    def licence(self) -> str:
+        """Terms of its weights."""
+        ...
+
+    def record(self) -> Mapping[str, Any]:
+        """Return what decided the frames of the last operation, for the manifest."""
+        ...
+
+
 def edit(
-    clip: MotionClip | EditSource, ops: Sequence[Mapping[str, Any]], *, load: Load = load_npz
+    clip: MotionClip | EditSource,
+    ops: Sequence[Mapping[str, Any]],
+    *,
+    load: Load = load_npz,
+    model: Model | None = None,
 ) -> tuple[MotionClip, ...]:
     """Apply operations in their order; the clip itself does not change.
 
@@ -62,14 +79,16 @@ def edit(
         clip: metres, Y up.
         ops: operations as in JSON, such as `[{"op": "trim", "from": 0.5}, {"op": "loop"}]`; see
             `docs/reference/edits.md`.
-        load: reads the motion that `with` of `concat` names, an npz file by default; a clip may stand there too.
+        load: reads the motion that `with` of an operation names, an npz file by default; a clip may stand there too.
+        model: generates the frames of `extend`, `in-between`, `repaint` and `body-part`; see
+            `marey.generate.LocalModel.edit`.
 
     Returns:
         One motion, or two for each `split`.
 
     Raises:
         InvalidInput: an unknown operation or parameter, a moment outside the motion, skeletons that differ, a motion
-            that cannot become a loop, or licences that exclude each other.
+            that cannot become a loop, licences that exclude each other, or an operation that needs a model.
         NotFound, InvalidFile: from reading another motion.
     """
     source = clip if isinstance(clip, EditSource) else EditSource(clip)
@@ -81,7 +100,7 @@ def edit(
             loaded[key] = _loaded(step.values["with"], load)
         return loaded[key]
 
-    return tuple(_apply(source, steps, other) for steps in pieces_of(read_steps(ops)))
+    return tuple(_apply(source, steps, other, model) for steps in pieces_of(read_steps(ops)))
 
 
 def _loaded(named: Any, load: Load) -> EditSource:
@@ -91,7 +110,9 @@ def _loaded(named: Any, load: Load) -> EditSource:
     return EditSource(found, name=named if isinstance(named, str) else "")
 
 
-def _apply(source: EditSource, steps: Sequence[Step], other: Callable[[Step], EditSource]) -> MotionClip:
+def _apply(
+    source: EditSource, steps: Sequence[Step], other: Callable[[Step], EditSource], model: Model | None
+) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
     clip = at_origin(replace(source.clip, manifest=manifest))
@@ -103,19 +124,26 @@ def _apply(source: EditSource, steps: Sequence[Step], other: Callable[[Step], Ed
             values["with"] = joined.clip
             record["with"] = joined.record["sha256"]
             sources.append(joined)
-        clip = _run(step, clip, values)
-        done.append(record)
-    clip = replace(clip, manifest={**clip.manifest, **_provenance(sources, done)})
+        clip = _run(step, clip, values, model)
+        done.append({**record, "model": dict(model.record())} if step.operation.needs_model and model else record)
+    terms = [model.licence] if model is not None and any(step.operation.needs_model for step in steps) else []
+    clip = replace(clip, manifest={**clip.manifest, **_provenance(sources, done, terms)})
     return MotionClip.of(
         clip.skeleton, clip.rotations, clip.root, clip.contacts, clip.fps, manifest=clip.manifest
     )  # without features
 
 
-def _run(step: Step, clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
+def _run(step: Step, clip: MotionClip, values: Mapping[str, Any], model: Model | None) -> MotionClip:
+    if step.operation.needs_model and model is None:
+        raise InvalidInput(
+            f"{step.operation.name} generates frames, and no model is given", where=step.where, argument="model"
+        )
     if not step.operation.keeps_cycle:
         clip = replace(clip, manifest={name: value for name, value in clip.manifest.items() if name != CYCLE})
     try:
-        result = at_origin(step.operation.function()(clip, values))
+        given = (clip, values, model) if step.operation.needs_model else (clip, values)
+        made = step.operation.function()(*given)
+        result = made if step.operation.keeps_place else at_origin(made)
     except InvalidInput as error:
         where = f"{step.where} ({step.operation.name})"
         raise type(error)(error.message, where=where, hint=error.hint) from None
@@ -124,8 +152,10 @@ def _run(step: Step, clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     return result
 
 
-def _provenance(sources: Sequence[EditSource], done: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    licence = strictest(each.clip.manifest.get("licence") for each in sources)
+def _provenance(
+    sources: Sequence[EditSource], done: Sequence[Mapping[str, Any]], terms: Sequence[str]
+) -> dict[str, Any]:
+    licence = strictest([*(each.clip.manifest.get("licence") for each in sources), *terms])
     unique = {each.record["sha256"]: each.record for each in sources}
     record = {"sources": [*unique.values()], "ops": [*done], "software": {"marey": version("marey")}}
     return {EDITED_FROM: record, **({} if licence is None else {"licence": licence})}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.clip import MotionClip
-from marey.motion.edits.concat import fade
+from marey.motion.edits.joining import fade
 from marey.motion.edits.loop_search import Cycle
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import foot_chain, two_bone_knee

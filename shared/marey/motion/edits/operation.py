@@ -13,6 +13,8 @@ _FRAME = re.compile(r"f(\d{1,9})")
 REQUIRED: Any = object()
 """Default of a parameter that has to be given."""
 
+LONGEST_SENTENCE = 2000
+
 Reader = Callable[[Any], Any]
 """Checks a value of JSON and returns it; raises ValueError with what is allowed."""
 
@@ -52,6 +54,32 @@ def choice(*allowed: str) -> Reader:
     return read
 
 
+def whole(low: int, high: int) -> Reader:
+    """Return a reader of whole numbers between two bounds, both allowed."""
+
+    def read(value: Any) -> int:
+        fits = not isinstance(value, bool) and isinstance(value, int | float) and value == int(value)
+        if not fits or not low <= value <= high:
+            raise ValueError(f"a whole number from {low} to {high}")
+        return int(value)
+
+    return read
+
+
+def sentence(value: Any) -> str:
+    """Read a prompt; what a model can read of it is checked where it is parsed."""
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_SENTENCE or not value.isprintable():
+        raise ValueError(f"a sentence of 1 to {LONGEST_SENTENCE} printable characters")
+    return " ".join(value.split())
+
+
+def switch(value: Any) -> bool:
+    """Read true or false."""
+    if not isinstance(value, bool):
+        raise ValueError("true or false")
+    return value
+
+
 def reference(value: Any) -> Any:
     """Read the name of another motion; in Python it may be the clip itself."""
     if value is None or value == "" or isinstance(value, bool | int | float | list | dict):
@@ -70,7 +98,7 @@ class Parameter:
         default: the value if none is given; `REQUIRED` = one has to be given.
         option: its option of the command line, such as `--blend`, which acts on the operation before it; empty = it is
             part of the value of the operation's own option.
-        metavar: placeholder of the option's value.
+        metavar: placeholder of the option's value; empty = a flag.
     """
 
     name: str
@@ -91,9 +119,11 @@ class Operation:
         run: `module:function` that computes it from a clip, the values of the parameters, and `load`, which reads
             other motions by name.
         parameters: in the order of the option's value, which separates them by colons.
-        metavar: placeholder of the option's value; empty = a flag.
+        metavar: placeholder of the option's value; empty = a flag. Parts in brackets may be left out.
         keeps_cycle: the manifest's record of a loop still holds, or `run` has changed it.
+        keeps_place: the result stands where the motion stood, however its first pose faces.
         pieces: one motion becomes several; `marey.motion.edits.steps` writes them as other operations.
+        needs_model: a model generates frames; `run` gets it as its third argument.
     """
 
     name: str
@@ -102,7 +132,9 @@ class Operation:
     parameters: tuple[Parameter, ...] = ()
     metavar: str = ""
     keeps_cycle: bool = False
+    keeps_place: bool = False
     pieces: bool = False
+    needs_model: bool = False
 
     def function(self) -> Callable[..., Any]:
         """Import and return the function that computes the operation."""
@@ -113,11 +145,11 @@ class Operation:
         """Return the JSON values of the text after the option, such as `0.5:f60`; an empty part is not given."""
         own = [each for each in self.parameters if not each.option]
         parts = text.split(":") if len(own) > 1 else [text]
-        if len(parts) != len(own):
+        if not ("[" in self.metavar and len(parts) < len(own)) and len(parts) != len(own):
             raise ValueError(self.metavar)
         return {
             each.name: part if each.read is reference else value_of_text(part)  # names of digits are names
-            for each, part in zip(own, parts, strict=True)
+            for each, part in zip(own, parts, strict=False)
             if part
         }
 

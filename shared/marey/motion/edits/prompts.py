@@ -18,9 +18,25 @@ def prompt_of(prompt: str, steps: Sequence[Step], other: Callable[[Step], str]) 
     for step in steps:
         if step.operation.name == "mirror":
             prompt = swap_sides(prompt)
-        elif "with" in step.values:
+            continue
+        own = step.values.get("prompt")
+        if own:
+            prompt = with_own(step.operation.name, prompt, own)
+        if "with" in step.values:
             prompt = joined(prompt, other(step))
     return prompt
+
+
+def with_own(operation: str, prompt: str, own: str) -> str:
+    """Return the prompt of a motion after an operation with a prompt of its own."""
+    if not prompt:
+        return own
+    return meanwhile(prompt, own) if operation == "body-part" else joined(prompt, own)
+
+
+def meanwhile(first: str, second: str) -> str:
+    """Return the prompt of two actions at once."""
+    return f"{first} while {second}" if first != second else first
 
 
 def joined(first: str, second: str) -> str:

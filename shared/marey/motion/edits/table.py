@@ -5,11 +5,124 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from marey.motion.edits.operation import Operation, Parameter, choice, moment, number, reference
+from marey.motion.edits.operation import (
+    REQUIRED,
+    Operation,
+    Parameter,
+    choice,
+    moment,
+    number,
+    reference,
+    sentence,
+    switch,
+    whole,
+)
 
 LONGEST_BLEND = 0.3
 """Seconds; a loop differs from its source in no more than that before its end."""
+LONGEST_EXTENSION, LONGEST_BRIDGE = 60.0, 8.0
+"""Seconds that a model adds to a motion, and between two motions."""
+MOST_SEED, MOST_CANDIDATES = 2**31 - 1, 8
+PARTS = ("left-arm", "right-arm", "arms", "head", "upper-body")
 _HERE = "marey.motion.edits"
+_THERE = "marey.generation.shots.edits"
+_SEED = Parameter(
+    "seed", "seed of the new frames; default 0.", whole(0, MOST_SEED), 0, option="--seed", metavar="NUMBER"
+)
+_CANDIDATES = Parameter(
+    "candidates",
+    f"number of tries, 1 to {MOST_CANDIDATES}, of which the one that matches the prompt best is taken; default 1.",
+    whole(1, MOST_CANDIDATES),
+    1,
+    option="--candidates",
+    metavar="NUMBER",
+)
+_FORCE = Parameter(
+    "force", "edit frames that the model's tokens cannot show, too.", switch, default=False, option="--force"
+)
+
+
+def _prompt(about: str, default: str | None = None) -> Parameter:
+    return Parameter("prompt", about, sentence, default, option="--prompt", metavar="TEXT")
+
+
+_BY_MODEL = (
+    Operation(
+        "extend",
+        "Generate SECONDS more of the motion.",
+        f"{_THERE}:extend",
+        (
+            Parameter("seconds", "Length to add.", number(0.1, LONGEST_EXTENSION)),
+            _prompt("the new action; default: the motion's own prompt."),
+            _SEED,
+            _CANDIDATES,
+            _FORCE,
+        ),
+        metavar="SECONDS",
+        needs_model=True,
+    ),
+    Operation(
+        "in-between",
+        "Generate the way to another motion, which then follows.",
+        f"{_THERE}:in_between",
+        (
+            Parameter("with", "The other motion.", reference),
+            Parameter(
+                "seconds",
+                "length of the way; default 1.",
+                number(0.1, LONGEST_BRIDGE),
+                1.0,
+                option="--seconds",
+                metavar="SECONDS",
+            ),
+            _prompt("an action on the way; default: the two motions alone decide."),
+            _SEED,
+            _FORCE,
+        ),
+        metavar="MOTION",
+        needs_model=True,
+    ),
+    Operation(
+        "repaint",
+        "Generate the frames from A to B anew, both included: seconds, or frames such as f12.",
+        f"{_THERE}:repaint",
+        (
+            Parameter("from", "First moment to generate; default: the first frame.", moment, 0.0),
+            Parameter("to", "Last moment to generate; default: the last frame.", moment, None),
+            _prompt("the action; default: the frames before and after alone decide."),
+            Parameter(
+                "rest",
+                "the frames after it: follow = go on from where the new ones end; stay = keep their place; "
+                "default follow.",
+                choice("follow", "stay"),
+                "follow",
+                option="--rest",
+                metavar="follow|stay",
+            ),
+            _SEED,
+            _CANDIDATES,
+            _FORCE,
+        ),
+        metavar="A:B",
+        needs_model=True,
+    ),
+    Operation(
+        "body-part",
+        f"Move a part of the body as another prompt says, from A to B: {', '.join(PARTS)}.",
+        f"{_THERE}:body_part",
+        (
+            Parameter("part", "The part.", choice(*PARTS)),
+            Parameter("from", "First moment; default: the first frame.", moment, 0.0),
+            Parameter("to", "Last moment; default: the last frame.", moment, None),
+            _prompt("the action of the part.", REQUIRED),
+            _SEED,
+            _CANDIDATES,
+        ),
+        metavar="PART[:A:B]",
+        keeps_place=True,
+        needs_model=True,
+    ),
+)
 
 _ALL = (
     Operation(
@@ -119,6 +232,7 @@ _ALL = (
         (Parameter("mode", "lock, free or raw.", choice("lock", "free", "raw")),),
         metavar="lock|free|raw",
     ),
+    *_BY_MODEL,
 )
 OPERATIONS: Mapping[str, Operation] = MappingProxyType({each.name: each for each in _ALL})
 """By name, in the order of help texts."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Generator, KeptFrames, Limits, Request, S
 from marey.text.features import TextFeatures
+from marey.text.graph import Node, SemanticGraph
 
 Float32 = NDArray[np.float32]
 
@@ -24,6 +25,15 @@ LEAST_CONTEXT = 8
 """Frames of context on a side that a gap leaves at least, where there are as many."""
 CROSSFADE = 8
 """Frames of context in which the frames beside a gap pass into what the model made of them."""
+
+
+NOTHING = "a person moves"
+
+
+def no_text(width: int) -> TextFeatures:
+    """Return features (1, `width`) of no prompt, for requests that do not read their text."""
+    graph = SemanticGraph(NOTHING, tuple(NOTHING.split()), (Node(0, "motion", NOTHING, (0, 1, 2)),), ())
+    return TextFeatures(NOTHING, NOTHING, graph, np.zeros((1, width), np.float16))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +47,8 @@ class Gap:
         text: of the prompt.
         seed: of the new frames.
         free: the prompt is not read; the frames beside the gap alone decide.
+        context: most frames that the model reads on a side. Beside much context it goes on as before, whatever the
+            prompt says.
     """
 
     before: Float32 = field(repr=False)
@@ -45,6 +57,7 @@ class Gap:
     text: TextFeatures = field(repr=False)
     seed: int
     free: bool = False
+    context: int = CONTEXT
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +82,7 @@ class Window:
 
 def most_frames(limits: Limits, sides: int) -> int:
     """Return the longest gap of one window with context on one or two sides."""
-    return limits.max_frames - sides * _on_grid(LEAST_CONTEXT, limits.keeps, up=True)
+    return limits.max_frames - sides * _on_grid(LEAST_CONTEXT, limits.keeps or 1, up=True)
 
 
 def fill(
@@ -129,9 +142,9 @@ def _plan(gap: Gap, limits: Limits) -> tuple[Request, int]:
             f"{gap.frames / limits.fps:g} s cannot be generated at once; at most {seconds:g} s", where="seconds"
         )
     room = (limits.max_frames - gap.frames) // max(sides, 1)
-    before = _on_grid(min(len(gap.before), CONTEXT, room), grid)
+    before = _on_grid(min(len(gap.before), gap.context, room), grid)
     skipped = -(before + gap.frames) % grid if len(gap.after) else 0  # context begins at a token
-    after = gap.after[skipped : skipped + max(0, min(CONTEXT, limits.max_frames - before - gap.frames - skipped))]
+    after = gap.after[skipped : skipped + max(0, min(gap.context, limits.max_frames - before - gap.frames - skipped))]
     after = after[: _on_grid(len(after), grid)]
     end = before + gap.frames + (skipped if len(after) else 0)
     total = max(end + len(after), limits.min_frames)

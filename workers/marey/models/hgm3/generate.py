@@ -98,6 +98,7 @@ class Generator:
         self.batch_threads = batch_threads
         self.config = config
         self.networks = networks
+        self.tokenizer = networks.tokenizer
         self.base: MaskedTransformer | SeparateTransformers = networks.masked
         self.device = device
         self.dtype = dtype

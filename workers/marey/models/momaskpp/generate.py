@@ -77,6 +77,7 @@ class Generator:
         self.bundle = bundle
         self.config = config
         self.networks = networks
+        self.tokenizer = networks.tokenizer
         self.reader = reader
         self.device = device
         self.dtype = torch.float32
