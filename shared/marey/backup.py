@@ -82,6 +82,8 @@ class ItemRecord(_Record):
     replaces: UUID | None
     scope: dict[str, Any] | None = None
     edits: dict[str, Any] | None = None
+    timeline: list[dict[str, Any]] | None = None
+    constraints: list[dict[str, Any]] | None = None
     edited_from: list[UUID] = Field(default_factory=list[UUID])
     motion: MotionRecord | None
 

@@ -28,7 +28,7 @@ from marey.jobs import (
 )
 from marey.jobs.types import MAX_KEEP_DAYS
 from tests.servers.audit import audit
-from tests.servers.jobs import new_item, parse_texts, submit_items
+from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 
 
 def test_a_submitted_job_is_queued_with_its_items_in_input_order(engine: sa.Engine) -> None:
@@ -52,6 +52,18 @@ def test_a_submitted_job_is_queued_with_its_items_in_input_order(engine: sa.Engi
     assert (listed[0].name, listed[0].tags, listed[0].seconds) == ("hero", ("a", "b"), 2.5)
     assert (listed[2].prompt, listed[2].settings) == ("run 走る 🏃", {"steps": 3, "nested": {"x": [1, 2]}})
     assert [(event.seq, event.kind) for event in events] == [(1, "submitted")]
+
+
+def test_timelines_and_constraints_reach_the_list_and_the_worker(engine: sa.Engine) -> None:
+    rows = [{"start": 0.0, "end": 3.0, "prompt": "walk"}, {"start": 3.0, "end": 5.0, "prompt": "wave"}]
+    wanted = [{"type": "root_path", "times": [0, 1]}]
+    job = submit_items(engine, [new_item(0, "0-3 walk; 3-5 wave", timeline=rows, constraints=wanted), new_item(1)])
+    with transaction(engine) as conn:
+        listed = list_items(conn, "default", job).rows
+    assert [(item.timeline, item.constraints) for item in listed] == [(rows, wanted), (None, None)]
+    parse_texts(engine)
+    claimed = claim_some(engine).items
+    assert [(item.timeline, item.constraints) for item in claimed] == [(rows, wanted), (None, None)]
 
 
 def test_items_whose_text_is_known_skip_the_text_stage(engine: sa.Engine) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.items.item import Problem, outside_range
+from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.registry import ModelSpec, find_model
 
 
@@ -22,13 +23,17 @@ def check_ranges(values: Mapping[str, Any], line: int | None) -> tuple[dict[str,
     """
     seconds: float | None = values.get("seconds")
     settings: Mapping[str, float] = values.get("settings", {})
-    spec = find_model(values["model"]) if "model" in values and (seconds is not None or settings) else None
+    wanted = seconds is not None or settings or "timeline" in values
+    spec = find_model(values["model"]) if "model" in values and wanted else None
     if spec is None:
         return dict(values), []
     left, problems = dict(values), list[Problem]()
     if seconds is not None and (message := _outside(spec, seconds)):
         del left["seconds"]
         problems.append(Problem(line, "seconds", message))
+    if "timeline" in values and not spec.keeps_frames:
+        del left["timeline"]
+        problems.append(Problem(line, "timeline", f"{no_timelines(spec.name)}. {TIMELINE_HINT}"))
     wrong = _unsettable(spec, settings)
     if wrong:
         left["settings"] = {name: value for name, value in settings.items() if name not in wrong}

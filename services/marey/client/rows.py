@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Literal, cast
 
 from marey.client.ranges import check_ranges
-from marey.client.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
+from marey.client.tables import EXTRA_HINT, TEXTS, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
 from marey.client.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
 from marey.core.errors import InvalidInput
 from marey.items.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
@@ -188,6 +188,11 @@ def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_D
     return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT")
 
 
+def read_timelines(timelines: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
+    """Read timelines given as arguments; a problem names the number of the argument."""
+    return PromptReader(((i, {"timeline": t, **defaults}) for i, t in enumerate(timelines, 1)), "--timeline")
+
+
 def read_rows(raws: Iterable[object], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Read the rows of a program; a problem names the number of the row, from 1."""
     return PromptReader(((number, _completed(raw, defaults)) for number, raw in enumerate(raws, 1)), "rows")
@@ -300,6 +305,8 @@ def _completed(raw: object, defaults: Mapping[str, object]) -> object:
         return raw
     row = cast("Mapping[object, object]", raw)
     whole = {**defaults, **{name: value for name, value in row.items() if value is not None}}
+    if row.get("timeline") is not None and row.get("seconds") is None:
+        whole.pop("seconds", None)  # a timeline has a length of its own
     ours, theirs = defaults.get("settings"), row.get("settings")
     if isinstance(ours, Mapping) and isinstance(theirs, Mapping):
         whole["settings"] = {**ours, **theirs}
@@ -343,7 +350,7 @@ def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
     if first.startswith("{"):
         return "jsonl", read
     names = next(csv.reader([first], delimiter=delimiter_of(first, COLUMNS)), list[str]())
-    return ("csv" if "prompt" in [name.strip() for name in names] else "txt"), read
+    return ("csv" if TEXTS.intersection(name.strip() for name in names) else "txt"), read
 
 
 def _jsonl(lines: Lines) -> Rows:

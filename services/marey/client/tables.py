@@ -23,6 +23,8 @@ ExtraColumns = Literal["refuse", "tag", "ignore"]
 DELIMITERS = (",", ";", "\t")
 BLANK = " \t\r\n\ufeff\xa0"
 """White space trimmed from cells; control characters are not, so that the check of the field refuses them."""
+TEXTS = frozenset({"prompt", "timeline"})
+"""Columns of which a table has at least one."""
 EXTRA_HINT = "Rename or remove the columns, or choose extra_columns tag or ignore."
 
 
@@ -84,7 +86,7 @@ def csv_rows(lines: Lines, columns: Sequence[str], extra: ExtraColumns = "refuse
         if header is None:
             header, problems = _read_header([cell.strip(BLANK) for cell in cells], columns, extra)
             yield from ((line, problem) for problem in problems)
-            if all(column.field != "prompt" for column in header.columns):
+            if all(column.field not in TEXTS for column in header.columns):
                 return
         else:
             yield line, _row(header, cells)
@@ -134,7 +136,7 @@ def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) 
             problems.append(Unreadable(f"{name!r} is not a known column; {known}"))
         elif earlier == 1 and (is_tag or name in columns):
             problems.append(Unreadable("appears twice", name))
-    if "prompt" not in names:
+    if not TEXTS.intersection(names) & {"prompt", *columns}:
         problems.append(Unreadable(f"is not among the columns of the first line; {known}", "prompt"))
     if ours and "seconds" in names:
         return Header(found, restore, split_tags), problems
@@ -156,6 +158,8 @@ def _row(header: Header, cells: list[str]) -> object:
             tags = [*(tag for tag in header.tags(header.text(cell)) if tag), *tags]
         elif column.field is not None and (column.field == "prompt" or not is_blank(cell)):
             row[column.field] = _value(column.field, header.text(cell))
+    if "timeline" in row and is_blank(str(row.get("prompt", ""))):
+        row.pop("prompt", None)
     return {**row, "tags": tags} if tags else row
 
 

@@ -25,10 +25,12 @@ from marey.items.item import (
     SETTING,
 )
 from marey.items.prompts import MAX_CHARACTERS
+from marey.items.timeline import MAX_ROWS, MAX_TIMELINE_CHARACTERS
 
 MAX_MODEL = 165
 """Characters: a name of 100, `@` and 64 hexadecimal digits."""
 PROMPT: JsonDict = {"minLength": 1, "maxLength": MAX_CHARACTERS}
+TIMELINE: JsonDict = {"minLength": 1, "maxLength": 2 * MAX_TIMELINE_CHARACTERS, "maxItems": MAX_ROWS}
 _HIDDEN = LINE_PATTERN.removeprefix("^[^").removesuffix("]*$")
 """Forbidden characters of free text, as part of a character class."""
 _DEVICE = "".join(

@@ -9,7 +9,8 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, outside_range
+from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, Rows, outside_range
+from marey.items.timeline import TIMELINE_HINT, no_timelines, timeline_seconds
 from marey.registry import Setting, find_model
 from marey.vocabulary.lengths import stated_length
 
@@ -59,11 +60,24 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
         raise InvalidInput(outside_range(seconds, low, high, bundle.manifest.name))
 
 
+def check_timeline(bundle: Bundle, timeline: Rows | None) -> None:
+    """Check that a bundle can generate timelines.
+
+    Raises:
+        InvalidInput: its model cannot generate motion between other frames.
+    """
+    spec = find_model(bundle.manifest.model)
+    if timeline is not None and not (spec and spec.keeps_frames):
+        raise InvalidInput(no_timelines(bundle.manifest.model), hint=TIMELINE_HINT)
+
+
 def length_of(bundle: Bundle, item: Item) -> float | None:
     """Return the seconds of an item's motion: its own, or those that its prompt states; None = the model decides.
 
     A stated length out of the bundle's range is not used; `ScopeReport` warns of it.
     """
+    if item.timeline is not None:
+        return timeline_seconds(item.timeline)
     if item.seconds is not None:
         return item.seconds
     stated = stated_length(item.prompt)

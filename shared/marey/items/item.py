@@ -16,9 +16,13 @@ from typing import Any, TypeVar, cast
 
 from marey.core.characters import check_text, is_printable
 from marey.core.errors import InvalidInput, TooLarge
+from marey.items.constraints import read_constraints
 from marey.items.prompts import check_prompt
+from marey.items.timeline import read_timeline, timeline_seconds, timeline_text
 
 T = TypeVar("T")
+Rows = Sequence[Mapping[str, Any]]
+"""Objects of JSON."""
 
 MAX_ITEMS = 100_000
 """Items (prompts times variants) of one job."""
@@ -71,16 +75,20 @@ class ItemSpec:
     and the columns of SQL statements are made from them.
 
     Attributes:
-        prompt: the user's text.
+        prompt: the user's text; of a timeline its text form.
         name: of the motion; clients derive its file name from it.
         seconds: requested length; None = the model's estimate.
         tags: labels of the motion.
+        timeline: prompts at stated times (`marey.items.timeline`); None = the prompt alone.
+        constraints: what the motion keeps to (`marey.items.constraints`); None = nothing.
     """
 
     prompt: str
     name: str | None = None
     seconds: float | None = None
     tags: tuple[str, ...] = ()
+    timeline: Rows | None = None
+    constraints: Rows | None = None
 
     def spec(self) -> dict[str, Any]:
         """Return the fields of `ItemSpec` alone."""
@@ -88,6 +96,8 @@ class ItemSpec:
 
 
 SPEC_FIELDS = tuple(each.name for each in fields(ItemSpec))
+JSON_FIELDS = frozenset({"timeline", "constraints"})
+"""Fields of `ItemSpec` that are stored as JSON."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +117,8 @@ class Item(ItemSpec):
         """Return the item as a line of a request body, with the given fields only."""
         values = {name: getattr(self, name) for name in CHECKS}
         values["tags"] = list(self.tags)
+        if self.timeline is not None:
+            del values["prompt"]
         return {name: value for name, value in values.items() if value not in (None, [], {})}
 
 
@@ -195,10 +207,24 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
 def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], list[Problem]]:
     """Return the usable fields of an item, and all its problems; see `read_item`."""
     values, problems = read_fields(raw, CHECKS, line)
+    if "timeline" in values:
+        problems += _complete_timeline(values, line)
     seed, variants = values.get("seed"), values.get("variants", 1)
     if seed is not None and seed + variants - 1 > MAX_SEED:
         problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
     return values, problems
+
+
+def _complete_timeline(values: dict[str, Any], line: int | None) -> list[Problem]:
+    """Give an item with a timeline its text form as the prompt, and check the fields that exclude one another."""
+    problems: list[Problem] = []
+    if "prompt" in values:
+        problems.append(Problem(line, "prompt", "stands beside a timeline: give one of the two"))
+    end, seconds = timeline_seconds(values["timeline"]), values.pop("seconds", None)
+    if seconds not in (None, end):
+        problems.append(Problem(line, "seconds", f"{seconds:g} is not the end of the timeline, {end:g}: leave it out"))
+    values["prompt"] = timeline_text(values["timeline"])
+    return problems
 
 
 def names_model(values: Mapping[str, Any], problems: Iterable[Problem]) -> bool:
@@ -238,7 +264,7 @@ def read_fields(
             values[name] = check(given[name])
         except InvalidInput as error:
             problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
-    if given.get("prompt") is None:
+    if given.get("prompt") is None and (given.get("timeline") is None or "timeline" not in checks):
         problems.append(Problem(line, "prompt", "is missing: say what the person does"))
     return values, problems
 
@@ -489,7 +515,9 @@ CHECKS: dict[str, Callable[[object], object]] = {
     "tags": _tags,
     "settings": _settings,
     "variety": _variety,
+    "timeline": read_timeline,
+    "constraints": read_constraints,
 }
 """Check of each field's value, in the order of columns."""
-COLUMNS = tuple(CHECKS)
-"""Of tables of prompts."""
+COLUMNS = tuple(name for name in CHECKS if name != "constraints")
+"""Of tables of prompts; a cell holds no list of objects."""

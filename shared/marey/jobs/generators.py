@@ -13,6 +13,7 @@ from marey.bundles.find import log_broken
 from marey.bundles.limits import (
     check_seconds,
     check_settings,
+    check_timeline,
     length_of,
     sampling_of,
     seconds_of,
@@ -22,7 +23,7 @@ from marey.bundles.limits import (
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
-from marey.items.item import MAX_SEED, Item
+from marey.items.item import MAX_SEED, Item, Rows
 from marey.jobs import NewItem
 from marey.text.keys import as_served, feature_key, resolve, scope_key
 from marey.vocabulary.report import ScopeReport
@@ -50,6 +51,10 @@ class GeneratorCapabilities:
     def check_variety(self, level: str | None) -> None:
         """See `variety_settings`."""
         variety_settings(self.bundle, level)
+
+    def check_timeline(self, timeline: Rows | None) -> None:
+        """See `check_timeline`."""
+        check_timeline(self.bundle, timeline)
 
     def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
         """Return the scope of a prompt, and count it; None if the bundle lists no actions."""

@@ -18,7 +18,7 @@ from psycopg import sql
 from marey.core.errors import InvalidInput
 from marey.db.ids import new_id
 from marey.db.sql import among, check_text
-from marey.items.item import SPEC_FIELDS
+from marey.items.item import JSON_FIELDS, SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.idempotency import take_key
 from marey.jobs.journal import Lane, LaneChange, NewEvent, change_lanes, lock_job, record
@@ -48,6 +48,7 @@ COLUMNS = (
     *SPEC_FIELDS,
 )
 _spec: Callable[[NewItem], tuple[object, ...]] = attrgetter(*SPEC_FIELDS)
+_OF_JSON = tuple(name in JSON_FIELDS for name in SPEC_FIELDS)
 COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
 
 
@@ -153,7 +154,9 @@ def _chunks(items: Iterable[NewItem]) -> Iterator[list[NewItem]]:
         yield chunk
 
 
-def _as_column(value: object) -> object:
+def _as_column(value: object, of_json: bool) -> object:
+    if of_json:
+        return None if value is None else json.dumps(value)
     return list(cast("tuple[object, ...]", value)) if isinstance(value, tuple) else value
 
 
@@ -163,7 +166,7 @@ def _row(item: NewItem, job: UUID, position: int, stage: ItemStage, lane: Lane) 
         *(json.dumps(dict(item.settings)), item.text_key, item.batch_key, str(stage), *lane, item.replaces),
         None if item.scope is None else json.dumps(dict(item.scope)),
         None if item.edits is None else json.dumps(item.edits.as_json()),
-        *map(_as_column, _spec(item)),
+        *map(_as_column, _spec(item), _OF_JSON),
     )
 
 

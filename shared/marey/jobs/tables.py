@@ -112,6 +112,8 @@ item = sa.Table(
     # Replaced motion of a re-roll.
     sa.Column("replaces", Id, sa.ForeignKey("motion.id", ondelete="SET NULL", use_alter=True)),
     sa.Column("edits", JSONB),  # `marey.jobs.types.Edits`; null = not an edit
+    sa.Column("timeline", JSONB),  # `marey.items.timeline`; null = the prompt alone
+    sa.Column("constraints", JSONB),  # `marey.items.constraints`; null = none
     sa.CheckConstraint(one_of("state", list(ItemState)), name="state"),
     sa.CheckConstraint(one_of("stage", list(ItemStage)), name="stage"),
     sa.CheckConstraint("(state = 'leased') = (lease_token IS NOT NULL)", name="lease"),

@@ -120,6 +120,8 @@ class ModelSpec:
         settings: of sampling.
         best_of: True if its handler can choose among candidates, as `marey.generation.handler.GeneratorHandler` can.
         variety: what `--variety low` and `high` change; None = it has no such levels.
+        keeps_frames: True if its generator makes motion around frames that stay (`marey.generation.port.Request.kept`),
+            which timelines need.
         limits: lengths of motions; None = each bundle states its own.
         live: `() -> LiveModel` (`marey.runtime.live.port`); None = it does not stream.
         live_examples: `(reference) -> prompts` that this bundle performs well while it streams, for the page `/live`;
@@ -145,6 +147,7 @@ class ModelSpec:
     settings: tuple[Setting, ...] = ()
     best_of: bool = False
     variety: Variety | None = None
+    keeps_frames: bool = False
     limits: LengthLimits | None = None
     live: str | None = None
     training: Training | None = None

@@ -50,7 +50,7 @@ LATE = sa.text("""
 
 FORGET = (
     """
-    UPDATE item SET prompt = '', text_key = '', scope = NULL, reason = split_part(reason, ':', 1),
+    UPDATE item SET prompt = '', text_key = '', timeline = NULL, scope = NULL, reason = split_part(reason, ':', 1),
         problem = CASE WHEN problem IS NULL THEN NULL ELSE jsonb_build_object(
             'type', problem -> 'type', 'message', 'erased with the prompt', 'where', NULL, 'hint', NULL) END
     WHERE job_id = :job

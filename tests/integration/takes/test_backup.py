@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from uuid import UUID
 
@@ -57,7 +58,10 @@ def work(engine: sa.Engine, store: FolderStore, *, fail: int = 0, queue: str = M
 
 def studio(engine: sa.Engine, store: FolderStore) -> list[UUID]:
     """A job with a failed item, a verdict and a re-roll; one that was cancelled before its prompts were read."""
-    rich = submit_items(engine, [new_item(k, name=f"n{k}", tags=(f"shot={k}",)) for k in range(4)], name="rich")
+    rows = [{"start": 0.0, "end": 3.0, "prompt": "walk"}]
+    items = [new_item(k, name=f"n{k}", tags=(f"shot={k}",)) for k in range(4)]
+    items[0] = replace(items[0], timeline=rows, constraints=[{"type": "root_path"}])
+    rich = submit_items(engine, items, name="rich")
     parse_texts(engine)
     work(engine, store, fail=1)
     with transaction(engine) as conn:

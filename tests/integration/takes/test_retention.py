@@ -101,6 +101,16 @@ def objects(store: FolderStore) -> list[bytes]:
     return [store.get(key) for key in list(store.keys())]
 
 
+def test_an_erased_timeline_is_in_no_table(engine: sa.Engine) -> None:
+    rows = [{"start": 0.0, "end": 3.0, "prompt": PROMPT}]
+    job = submit_items(engine, [new_item(0, f"0-3 {PROMPT}", timeline=rows)])
+    with transaction(engine) as conn:
+        cancel(conn, "default", job)
+        assert SECRET in str(list_items(conn, "default", job).rows[0].timeline)
+        erase(conn, "default", job, by="ann")
+    assert SECRET not in dump(engine)
+
+
 def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_store: FolderStore) -> None:
     key = {"idempotency_key": "k", "body_sha256": "b"}
     job = made(engine, folder_store, PROMPT, f"{PROMPT} twice", PROMPT + " thrice", fail=1, **key)

@@ -10,10 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.jobs.estimates import EstimateView
 from marey.api.takes.schemas import MotionView
-from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
+from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS, TIMELINE
 from marey.http.problems import QuotaBody
 from marey.http.schemas import Comment, Name, View
 from marey.items.item import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from marey.items.timeline import MAX_TIMELINE_SECONDS, MIN_ROW_SECONDS
 from marey.jobs import (
     MAX_KEEP_DAYS,
     PRIORITY_LIMIT,
@@ -35,12 +36,26 @@ from marey.vocabulary.scope import ScopePolicy, Verdict
 SCOPE = "Prompts with actions that the model does not know: accepted with a warning, refused, or not examined."
 
 
+class TimelineRowBody(BaseModel):
+    """One prompt of a timeline."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    start: float = Field(ge=0, le=MAX_TIMELINE_SECONDS, description="In seconds.")
+    end: float = Field(ge=MIN_ROW_SECONDS, le=MAX_TIMELINE_SECONDS, description="In seconds, at least 1 after `start`.")
+    prompt: str = Field(description="What the person does between.", json_schema_extra=PROMPT)
+
+
 class NewItemBody(BaseModel):
     """One prompt. For the documentation: `marey.items.item.read_item` validates it, with more detailed messages."""
 
     model_config = ConfigDict(extra="forbid")
 
-    prompt: str = Field(description="What the person does, in English, at most 200 words.", json_schema_extra=PROMPT)
+    prompt: str | None = Field(
+        None,
+        description="What the person does, in English, at most 200 words; needed unless there is a `timeline`.",
+        json_schema_extra=PROMPT,
+    )
     name: str | None = Field(
         None,
         description="Name of the motion, in any script; clients derive its file name from it.",
@@ -59,6 +74,13 @@ class NewItemBody(BaseModel):
     variety: Literal["low", "normal", "high"] | None = Field(
         None, description="How much motions of the prompt differ; None = `normal`, as the bundle ships."
     )
+    timeline: list[TimelineRowBody] | str | None = Field(
+        None,
+        description="Instead of `prompt`: prompts at stated times, up to 60 s, as rows or as a text such as "
+        "`0-3 a person walks forward; 3-5 a person waves`.",
+        json_schema_extra=TIMELINE,
+    )
+    constraints: list[dict[str, Any]] | None = Field(None, description="What the motion keeps to.")
 
 
 class CommonJobFields(BaseModel):
@@ -310,17 +332,23 @@ class ItemView(View):
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
     scope: ScopeView | None = Field(description="Null: not examined, erased, or the bundle lists no actions.")
     edits: EditsView | None = Field(description="Null if the motion is generated.")
+    timeline: list[TimelineRowBody] | None = Field(
+        None, description="Prompts at stated times, of which `prompt` is the text form; null if there is one prompt."
+    )
+    constraints: list[dict[str, Any]] | None = Field(None, description="What the motion keeps to.")
     motion: MotionView | None
 
     @classmethod
     def of(cls, row: ItemRow) -> ItemView:
         """Convert a row."""
-        apart = {"settings", "tags", "error", "scope", "edits", "motion"}
+        apart = {"settings", "tags", "error", "scope", "edits", "timeline", "constraints", "motion"}
         return cls(
             scope=None if row.scope is None else ScopeView.model_validate(row.scope),
             settings=dict(row.settings),
             tags=list(row.tags),
             edits=None if row.edits is None else EditsView.of(row.edits),
+            timeline=None if row.timeline is None else [TimelineRowBody(**each) for each in row.timeline],
+            constraints=None if row.constraints is None else [dict(each) for each in row.constraints],
             error=None if row.problem is None else ErrorView.of(row.problem),
             motion=None if row.motion is None else MotionView.of(row.motion),
             **{name: getattr(row, name) for name in cls.model_fields if name not in apart},

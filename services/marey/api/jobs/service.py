@@ -163,6 +163,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             ("seconds", generator.check_seconds),
             ("settings", generator.check_settings),
             ("variety", generator.check_variety),
+            ("timeline", generator.check_timeline),
         )
         for field, hold in checks:
             try:

@@ -30,7 +30,7 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
         Conflict: this server no longer has the bundle, or the bundle no longer accepts the item's settings.
     """
     item = Item(
-        **row.spec(),
+        **{**row.spec(), "seconds": row.seconds if row.timeline is None else None},
         seed=row.seed,
         model=row.bundle,
         settings={name: value for name, value in row.settings.items() if isinstance(value, int | float)},
@@ -39,6 +39,7 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
         generator = catalogue.capabilities(row.bundle)
         generator.check_seconds(item.seconds)
         generator.check_settings(item.settings)
+        generator.check_timeline(item.timeline)
     except MareyError as error:
         if error.status >= 500:
             raise

@@ -185,6 +185,10 @@ class JobItem(Result):
     """None = not examined, erased, or the bundle lists no actions."""
     edits: Edits | None = None
     """None if the motion is generated."""
+    timeline: tuple[Mapping[str, Any], ...] | None = None
+    """Prompts at stated times, of which `prompt` is the text form; None if there is one prompt."""
+    constraints: tuple[Mapping[str, Any], ...] | None = None
+    """What the motion keeps to; None = nothing."""
     motion: Motion | None = None
 
 

@@ -29,6 +29,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("residual_top_k", 0.001, 1.0, 0.1, "As top_k, for the residual levels."),
     ),
     best_of=True,
+    keeps_frames=True,
     variety=Variety(
         low={"temperature": 0.6, "residual_temperature": 0.6, "top_k": 0.5},
         high={"temperature": 1.6, "residual_temperature": 1.3, "top_k": 2.0},

@@ -24,6 +24,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Setting("top_k", 0.001, 1.0, 0.1, "Share of the codes that may be drawn."),
     ),
     best_of=True,
+    keeps_frames=True,
     variety=Variety(low={"temperature": 0.6, "top_k": 0.5}, high={"temperature": 1.6, "top_k": 2.0}),
     limits=LengthLimits(0.8, 10.7),
     training=Training(
