@@ -65,6 +65,15 @@ PromptFile = Annotated[
         "-f", "--file", help="CSV, JSONL or text file of prompts, also as .gz; - is stdin.", show_default=False
     ),
 ]
+Timelines = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--timeline",
+        metavar="ROWS",
+        help='Prompts at stated times, in one motion of up to 60 s: "0-3 a person walks; 3-5 a person waves". May be '
+        "repeated.",
+    ),
+]
 PromptFormat = Annotated[
     InputFormat | None, typer.Option("--input-format", help="Format of -f; default: by its extension.")
 ]

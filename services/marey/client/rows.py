@@ -190,7 +190,7 @@ def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_D
 
 def read_timelines(timelines: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Read timelines given as arguments; a problem names the number of the argument."""
-    return PromptReader(((i, {"timeline": t, **defaults}) for i, t in enumerate(timelines, 1)), "--timeline")
+    return PromptReader(((i, {"timeline": t, **defaults}) for i, t in enumerate(timelines, 1)), "ROWS")
 
 
 def read_rows(raws: Iterable[object], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:

@@ -10,14 +10,16 @@ from marey.bundles.limits import seconds_of
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.items.item import UnknownAction
+from marey.items.timeline import prompts_with_rows
 from marey.jobs import TEXT_QUEUE, ClaimedItem
 from marey.jobs.leases import PromptScope
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served, scope_key
 from marey.text.meaning import MeaningJudge
 from marey.text.pipeline import TextPipeline
+from marey.text.several import SeveralTexts, several_key
 from marey.vocabulary.report import refusal, says_known, with_length
-from marey.vocabulary.scope import ScopePolicy, match_scope
+from marey.vocabulary.scope import ScopePolicy, match_scope, scope_of_rows
 
 BATCH = 64
 """Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""
@@ -60,7 +62,9 @@ class TextHandler:
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
         """Yield the features of each prompt, as soon as they are made."""
         assert self._pipeline is not None  # the loop loads before it runs
-        self._pipeline.prefetch([item.prompt for item in batch.items if item.id not in control.dropped()])
+        dropped = control.dropped()
+        items = [item for item in batch.items if item.id not in dropped]
+        self._pipeline.prefetch([prompt for item in items for _, prompt in _prompts_of(item)])
         for done, item in enumerate(batch.items, 1):
             if item.id in control.dropped():
                 continue
@@ -86,13 +90,18 @@ class ScopeStage:
             return None
         bundle = self._bundle(item.bundle)
         lists = bundle.manifest.actions
-        if lists is None or match_scope(item.prompt, lists).left is None:
+        prompts = _prompts_of(item)
+        if lists is None or all(match_scope(prompt, lists).left is None for _, prompt in prompts):
             return None
-        scope = self.judge.judge(item.prompt, lists)
-        if policy == "refuse" and (message := refusal(scope)) is not None:
-            raise UnknownAction(f"the prompt {message}", hint=says_known(bundle.manifest.name, lists.known))
-        scope = with_length(scope, item.prompt, seconds_of(bundle))
-        return PromptScope(scope_key(item.prompt, item.bundle, lists), scope.as_json())
+        scopes = [self.judge.judge(prompt, lists) for _, prompt in prompts]
+        for (row, _), scope in zip(prompts, scopes, strict=True):
+            if policy == "refuse" and (message := refusal(scope)) is not None:
+                hint = says_known(bundle.manifest.name, lists.known)
+                raise UnknownAction(f"{row or 'the prompt'} {message}", hint=hint)
+        key = scope_key(item.prompt, item.bundle, lists, in_rows=item.timeline is not None)
+        if item.timeline is not None:
+            return PromptScope(key, scope_of_rows(scopes).as_json())
+        return PromptScope(key, with_length(scopes[0], item.prompt, seconds_of(bundle)).as_json())
 
     def _bundle(self, name: str) -> Bundle:
         if name not in self.bundles:
@@ -104,16 +113,23 @@ def _outcome(pipeline: TextPipeline, scopes: ScopeStage | None, item: ClaimedIte
     """Return the features of one item under the key it was submitted with, and its scope; the key, which promises
     weights, is checked."""
     try:
-        if pipeline.key(item.prompt) != item.text_key:
+        prompts = [prompt for _, prompt in _prompts_of(item)]
+        keys = [pipeline.key(prompt) for prompt in prompts]
+        if (keys[0] if item.timeline is None else several_key(keys)) != item.text_key:
             raise InvalidBundle(
                 "the server that took this job has another text encoder or labeller than this worker",
                 hint="Install the same models on both, then retry the job's failed items.",
             )
         scope = None if scopes is None else scopes.scope_of(item, policy)
-        (features,) = pipeline.features([item.prompt])
+        features = pipeline.features(prompts)
+        several = features[0] if item.timeline is None else SeveralTexts(tuple(features))
     except MareyError as error:
         return Failed(item.id, error)
-    return TextDone(item.id, item.text_key, features.to_blob(), scope)
+    return TextDone(item.id, item.text_key, several.to_blob(), scope)
+
+
+def _prompts_of(item: ClaimedItem) -> list[tuple[str | None, str]]:
+    return prompts_with_rows(item.prompt, item.timeline)
 
 
 def create_handler() -> TextHandler:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, cast
 
@@ -145,6 +145,15 @@ def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, flo
             names = ", ".join([*known, *PLATFORM_SETTINGS])
             raise InvalidInput(f"unknown setting {name!r} of {bundle.manifest.name}; known: {names}")
     return {**{name: known[name].check(value) for name, value in own.items()}, **_platform_settings(bundle, platform)}
+
+
+FIELD_CHECKS: Mapping[str, Callable[[Bundle, Any], object]] = {
+    "seconds": check_seconds,
+    "settings": check_settings,
+    "variety": variety_settings,
+    "timeline": check_timeline,
+}
+"""Check of each field of an item that depends on its bundle; all raise `InvalidInput`."""
 
 
 def _platform_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:

@@ -21,7 +21,7 @@ def judges_meaning(text: TextSpec | None) -> bool:
 
 
 def refuse_unknown(
-    prompts: Iterable[tuple[int | None, str, Bundle]],
+    prompts: Iterable[tuple[int | None, str | None, str, Bundle]],
     *,
     where: str | None = None,
     match: Callable[[str, ActionLists], Scope] = match_scope,
@@ -31,7 +31,7 @@ def refuse_unknown(
     Prompts that the words leave undecided pass: the encoder of their bundle decides them later.
 
     Args:
-        prompts: line in the input, prompt, and the bundle that will read it.
+        prompts: line in the input, name of the row of a timeline, prompt, and the bundle that will read it.
         where: name of the input.
         match: by words, or by words and meaning.
 
@@ -42,7 +42,7 @@ def refuse_unknown(
     problems: list[Problem] = []
     known: dict[str, tuple[str, ...]] = {}
     total = 0
-    for line, prompt, bundle in prompts:
+    for line, row, prompt, bundle in prompts:
         lists, name = bundle.manifest.actions, bundle.manifest.name
         if lists is None:
             raise InvalidInput(
@@ -58,7 +58,8 @@ def refuse_unknown(
         if len(known) < MAX_BUNDLES:
             known[name] = lists.known
         if len(problems) < MAX_PROBLEMS:
-            problems.append(Problem(line, "prompt", message))
+            problem = Problem(line, "prompt", message) if row is None else Problem(line, "timeline", f"{row} {message}")
+            problems.append(problem)
     if total:
         knows = " ".join(says_known(name, actions) for name, actions in known.items())
         raise OutOfScope(problems, where=where, total=total, hint=f"{knows} The scope `warn` accepts such prompts.")

@@ -87,8 +87,8 @@ class ItemSpec:
     name: str | None = None
     seconds: float | None = None
     tags: tuple[str, ...] = ()
-    timeline: Rows | None = None
-    constraints: Rows | None = None
+    timeline: Rows | None = field(default=None, kw_only=True)
+    constraints: Rows | None = field(default=None, kw_only=True)
 
     def spec(self) -> dict[str, Any]:
         """Return the fields of `ItemSpec` alone."""

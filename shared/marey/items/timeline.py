@@ -102,6 +102,19 @@ def no_timelines(model: str) -> str:
     return f"the model {model!r} cannot generate timelines: it makes no motion between other frames"
 
 
+def prompts_with_rows(prompt: str, timeline: Sequence[Mapping[str, Any]] | None) -> list[tuple[str | None, str]]:
+    """Return each prompt of an item behind the name of its row; without a timeline its only prompt, behind None."""
+    if timeline is None:
+        return [(None, prompt)]
+    return [(f"row {number} ({row.times})", row.prompt) for number, row in enumerate(timeline_rows(timeline), 1)]
+
+
+def timeline_gaps(timeline: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
+    """Return start and end of each gap between rows, in seconds."""
+    pairs = itertools.pairwise(timeline_rows(timeline))
+    return [(before.end, after.start) for before, after in pairs if before.end < after.start]
+
+
 _Numbered = list[tuple[int, TimelineRow]]
 """Rows with their numbers in the input, from 1."""
 

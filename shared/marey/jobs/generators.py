@@ -24,8 +24,10 @@ from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
 from marey.items.item import MAX_SEED, Item, Rows
+from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
 from marey.text.keys import as_served, feature_key, resolve, scope_key
+from marey.text.several import several_key
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import Scope
 
@@ -56,17 +58,23 @@ class GeneratorCapabilities:
         """See `check_timeline`."""
         check_timeline(self.bundle, timeline)
 
-    def judge(self, prompt: str, report: ScopeReport) -> Scope | None:
-        """Return the scope of a prompt, and count it; None if the bundle lists no actions."""
-        lengths = (self.min_seconds, self.max_seconds)
-        return report.judge(prompt, self.bundle.manifest.name, self.bundle.manifest.actions, lengths=lengths)
+    def judge(self, item: Item, report: ScopeReport) -> Scope | None:
+        """Return the scope of an item's prompts, and count it; None if the bundle lists no actions."""
+        manifest, lengths = self.bundle.manifest, (self.min_seconds, self.max_seconds)
+        rows = () if item.timeline is None else prompts_with_rows(item.prompt, item.timeline)
+        return report.judge(item.prompt, manifest.name, manifest.actions, lengths=lengths, rows=rows)
 
-    def scope_key(self, prompt: str, scope: Scope | None) -> str | None:
+    def text_key(self, item: Item) -> str:
+        """Return the key of the features of an item's prompts."""
+        keys = [feature_key(prompt, self.text) for _, prompt in prompts_with_rows(item.prompt, item.timeline)]
+        return keys[0] if item.timeline is None else several_key(keys)
+
+    def scope_key(self, item: Item, scope: Scope | None) -> str | None:
         """Return the key of the encoder's verdict; None if the words decide."""
         lists = self.bundle.manifest.actions
         if lists is None or scope is None or scope.left is None or not judges_meaning(self.text):
             return None
-        return scope_key(prompt, self.bundle.reference, lists)
+        return scope_key(item.prompt, self.bundle.reference, lists, in_rows=item.timeline is not None)
 
 
 @dataclass(frozen=True)
@@ -124,8 +132,9 @@ def new_items(
         settings = json.dumps(values, sort_keys=True)
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
-        scope = None if report is None else generator.judge(item.prompt, report)
+        scope = None if report is None else generator.judge(item, report)
         spec = replace(item, seconds=length_of(generator.bundle, item)).spec()
+        text_key = generator.text_key(item)
         for variant in range(item.variants):
             yield NewItem(
                 **spec,
@@ -133,13 +142,13 @@ def new_items(
                 model=generator.bundle.manifest.model,
                 bundle=reference,
                 batch_key=batch_key,
-                text_key=feature_key(item.prompt, generator.text),
+                text_key=text_key,
                 text_batch_key=_sha256(generator.text.model_dump_json()),
                 seed=seed + variant,
                 variant=variant,
                 settings=dict(values),
                 scope=None if scope is None else scope.as_json(),
-                scope_key=generator.scope_key(item.prompt, scope),
+                scope_key=generator.scope_key(item, scope),
             )
 
 

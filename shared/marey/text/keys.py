@@ -56,16 +56,18 @@ def _rewriter_parts(spec: TextSpec) -> list[str | int]:
     return parts
 
 
-def scope_key(prompt: str, bundle: str, lists: ActionLists) -> str:
+def scope_key(prompt: str, bundle: str, lists: ActionLists, *, in_rows: bool = False) -> str:
     """Return the key under which the encoder's verdict of a prompt is stored.
 
     Args:
         prompt: as `check_prompt` returns it.
         bundle: the exact bundle, which names the encoder.
         lists: its actions.
+        in_rows: the prompt is the text form of a timeline, whose rows are judged one by one.
     """
     actions = [lists.supported, lists.single_take, lists.tried]
     parts = [VERSION, MEANING_VERSION, load_vocabulary().sha256, bundle, actions, prompt]
+    parts += ["rows"] if in_rows else []
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 

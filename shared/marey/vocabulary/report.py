@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from marey.vocabulary.lengths import stated_length
-from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope
+from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope, scope_of_rows
 
 MAX_EXAMPLES = 3
 """Of each verdict and flag."""
@@ -80,7 +80,13 @@ class ScopeReport:
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
 
     def judge(
-        self, prompt: str, bundle: str, lists: ActionLists | None, *, lengths: tuple[float, float] | None = None
+        self,
+        prompt: str,
+        bundle: str,
+        lists: ActionLists | None,
+        *,
+        lengths: tuple[float, float] | None = None,
+        rows: Sequence[tuple[str | None, str]] = (),
     ) -> Scope | None:
         """Return the scope of the next prompt, and count it.
 
@@ -89,28 +95,46 @@ class ScopeReport:
             bundle: name of the bundle that will read it.
             lists: actions of the bundle; None = it lists none, and the prompt has no scope.
             lengths: shortest and longest motion of the bundle, in seconds; None = not examined.
+            rows: of a timeline (`marey.items.timeline.prompts_with_rows`): they are judged together, as one prompt.
         """
         index, self.total = self.total, self.total + 1
         if lists is None:
             self.unlisted += 1
             return None
-        scope = self.decided.get((bundle, prompt)) or match_scope(prompt, lists)
-        if lengths is not None:
+        named = [(text if row is None else f"{row}: {text}", text) for row, text in rows or [(None, prompt)]]
+        parts = [(shown, self._scope(text, bundle, lists)) for shown, text in named]
+        scope = scope_of_rows([part for _, part in parts]) if rows else parts[0][1]
+        if lengths is not None and not rows:
             scope = with_length(scope, prompt, lengths)
+            parts = [(prompt, scope)]
+        self._count(scope, parts, index, bundle, lists)
+        return scope
+
+    def _scope(self, prompt: str, bundle: str, lists: ActionLists) -> Scope:
+        scope = self.decided.get((bundle, prompt)) or match_scope(prompt, lists)
         if scope.left is not None:
             self._leave(bundle, prompt)
+        return scope
+
+    def _count(
+        self, scope: Scope, parts: Sequence[tuple[str, Scope]], index: int, bundle: str, lists: ActionLists
+    ) -> None:
+        """Count the scope of one input.
+
+        Args:
+            parts: text and scope of its prompts.
+        """
         verdict = scope.verdict
         self.counts[verdict] += 1
         if verdict == "unknown" and len(self.known) < MAX_BUNDLES:
             self.known[bundle] = lists.known
         if verdict != "known":
-            self._add(verdict, index, prompt, scope)
+            self._add(verdict, index, *next(part for part in parts if part[1].verdict == verdict))
         for flag in scope.flags:
             self.flags[flag] += 1
             if verdict != "unknown":
                 self._noted[flag] += 1
-                self._add(flag, index, prompt, scope)
-        return scope
+                self._add(flag, index, *next(part for part in parts if flag in part[1].flags))
 
     def _leave(self, bundle: str, prompt: str) -> None:
         if sum(map(len, self.left.values())) < MAX_LEFT and prompt not in self.left.get(bundle, ()):

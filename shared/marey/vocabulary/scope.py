@@ -6,7 +6,7 @@ and says which prompts they leave undecided (`Scope.left`); `marey.text.meaning`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, get_args
@@ -89,12 +89,14 @@ class Scope:
     Attributes:
         by: `words`, or `encoder` where the words left it undecided.
         left: what the words leave undecided; None = nothing, or the encoder has decided it.
+        rows: of the prompts of a timeline, of which this is the scope together.
     """
 
     actions: tuple[NamedAction, ...]
     flags: tuple[Flag, ...] = ()
     by: Literal["words", "encoder"] = "words"
     left: Left | None = None
+    rows: tuple[Scope, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -109,13 +111,23 @@ class Scope:
             "verdict": self.verdict,
             "actions": [action.as_json() for action in self.actions],
             "flags": list(self.flags),
+            **({"rows": [row.as_json() for row in self.rows]} if self.rows else {}),
         }
 
 
 def read_scope(record: Mapping[str, Any]) -> Scope:
     """Return the scope that `Scope.as_json` wrote."""
     actions = (NamedAction(**action) for action in record["actions"])
-    return Scope(tuple(actions), tuple(record["flags"]), by=record["by"])
+    rows = tuple(map(read_scope, record.get("rows", ())))
+    return Scope(tuple(actions), tuple(record["flags"]), by=record["by"], rows=rows)
+
+
+def scope_of_rows(rows: Sequence[Scope]) -> Scope:
+    """Return the scope of the prompts of a timeline together."""
+    actions = tuple(dict.fromkeys(action for row in rows for action in row.actions))
+    flags: tuple[Flag, ...] = tuple(dict.fromkeys(flag for row in rows for flag in row.flags))
+    by = "encoder" if any(row.by == "encoder" for row in rows) else "words"
+    return Scope(actions, flags, by=by, left=next((row.left for row in rows if row.left), None), rows=tuple(rows))
 
 
 class ScopeMatcher:

@@ -58,6 +58,30 @@ def test_a_csv_has_a_column_of_settings_which_come_before_those_of_the_command(t
     ]
 
 
+def test_a_column_of_timelines_stands_for_that_of_prompts(tmp_path: Path) -> None:
+    rows = "0-3 a person walks; 3-5 a person waves"
+    path = write(tmp_path, "p.csv", f'prompt,timeline,tags\n,"{rows}",a\na person bows,,\n')
+    first, second = items_from_file(path, defaults=defaults_of(seconds=4.0))
+    assert (first.prompt, first.seconds, first.tags) == (rows, None, ("a",))
+    assert first.timeline is not None
+    assert (second.timeline, second.seconds) == (None, 4.0)
+    (alone,) = items_from_file(write(tmp_path, "q.csv", f"timeline\n{rows}\n"))
+    assert alone.timeline == first.timeline
+    assert problems(tmp_path, "r.csv", f"prompt,timeline\nbow,{rows}\n") == [
+        "line 2: prompt: stands beside a timeline: give one of the two"
+    ]
+
+
+def test_a_timeline_of_jsonl_has_rows_or_a_text(tmp_path: Path) -> None:
+    lines = '{"timeline": [{"start": 0, "end": 3, "prompt": "walk"}]}\n{"timeline": "0-3 walk", "model": "hgm3"}\n'
+    first, second = items_from_file(write(tmp_path, "p.jsonl", lines))
+    assert first.timeline == second.timeline == [{"start": 0.0, "end": 3.0, "prompt": "walk"}]
+    assert problems(tmp_path, "q.jsonl", '{"timeline": "0-3 walk", "model": "mogo"}\n') == [
+        "line 1: timeline: the model 'mogo' cannot generate timelines: it makes no motion between other frames. "
+        "Choose a bundle of hgm3 or momaskpp, or submit each row as a prompt."
+    ]
+
+
 @pytest.mark.parametrize("cell", ["hot", "guidance=", "guidance=high", "guidance=nan", "Guidance=2", "a=1;a=2", "=3"])
 def test_settings_that_are_none_are_told_with_their_line(tmp_path: Path, cell: str) -> None:
     (problem,) = problems(tmp_path, "p.csv", f"prompt,settings\na person waves,{cell}\n")
@@ -74,7 +98,7 @@ def test_an_unknown_column_is_an_error_that_lists_the_known_ones(tmp_path: Path)
     found = problems(tmp_path, "p.csv", "prompt,duration\na person waves,3\n")
     assert found == [
         "line 1: 'duration' is not a known column; known columns are prompt, name, seconds, seed, variants, model, "
-        "tags, settings, variety"
+        "tags, settings, variety, timeline"
     ]
 
 

@@ -141,9 +141,9 @@ class LocalModel:
 
     def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
         """Yield the problems of a row that concern this model: lengths out of its range, unknown settings."""
-        from marey.bundles.limits import check_seconds, check_settings, variety_settings
+        from marey.bundles.limits import FIELD_CHECKS
 
-        for field, check in (("seconds", check_seconds), ("settings", check_settings), ("variety", variety_settings)):
+        for field, check in FIELD_CHECKS.items():
             if values.get(field) is None:
                 continue
             try:
@@ -151,7 +151,7 @@ class LocalModel:
             except InvalidBundle:
                 raise
             except InvalidInput as error:
-                yield Problem(line, field, error.message)
+                yield Problem(line, field, f"{error.message}. {error.hint}" if error.hint else error.message)
 
 
 def load(
@@ -199,6 +199,8 @@ def _raw(row: Row, defaults: Mapping[str, object]) -> object:
     if not isinstance(own, Mapping):
         return own
     whole = {**defaults, **{str(name): value for name, value in own.items() if value is not None}}
+    if own.get("timeline") is not None and own.get("seconds") is None:
+        whole.pop("seconds")  # a timeline has a length of its own
     if isinstance(row, Item) and row.variants == 1:
         whole["variants"] = defaults["variants"]
     shared, its = defaults["settings"], own.get("settings")
@@ -210,4 +212,4 @@ def _raw(row: Row, defaults: Mapping[str, object]) -> object:
 def _wanted(item: Item, seconds: float | None, settings: Mapping[str, float]) -> Iterator[Wanted]:
     seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
     for variant in range(item.variants):
-        yield Wanted(item.prompt, seed + variant, seconds, settings)
+        yield Wanted(item.prompt, seed + variant, seconds, settings, item.timeline)

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
+from marey.items.timeline import prompts_with_rows, timeline_rows
 from marey.registry import get_model, resolve
-from marey.vocabulary.scope import ActionLists, Scope, match_scope
+from marey.vocabulary.scope import ActionLists, Scope, match_scope, scope_of_rows
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.core.settings import Settings
-    from marey.generation.port import Generator
+    from marey.generation.port import Generator, Request
     from marey.generation.shots.editor import EditModel
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
@@ -32,6 +33,8 @@ class Wanted:
     seed: int
     seconds: float | None
     settings: Mapping[str, float]
+    timeline: Sequence[Mapping[str, Any]] | None = None
+    """Prompts at stated times, of which `prompt` is the text form; None = the prompt alone."""
 
 
 class OneShot:
@@ -66,9 +69,29 @@ class OneShot:
         """Return the scope of a prompt: by its words, and by its meaning where they leave it undecided."""
         return match_scope(prompt, lists) if self._judge is None else self._judge.judge(prompt, lists)
 
-    def _scope(self, prompt: str) -> dict[str, Any] | None:
+    def _scope(self, wanted: Wanted) -> dict[str, Any] | None:
         lists = self.bundle.manifest.actions
-        return None if lists is None else self.match_scope(prompt, lists).as_json()
+        if lists is None:
+            return None
+        scopes = [self.match_scope(prompt, lists) for _, prompt in prompts_with_rows(wanted.prompt, wanted.timeline)]
+        return (scopes[0] if wanted.timeline is None else scope_of_rows(scopes)).as_json()
+
+    def _requests(self, wanted: Sequence[Wanted]) -> list[Request]:
+        from marey.generation.port import Request
+        from marey.generation.shots.dispatch import resolve_request, timeline_request
+
+        prompts = [[prompt for _, prompt in prompts_with_rows(each.prompt, each.timeline)] for each in wanted]
+        features = iter(self._text.features([prompt for each in prompts for prompt in each]))
+        found: list[Request] = []
+        for each, of_item in zip(wanted, prompts, strict=True):
+            texts, scope = [next(features) for _ in of_item], self._scope(each)
+            if each.timeline is None:
+                frames = self._generator.limits.frames_of(each.seconds, texts[0])
+                request = Request(texts[0], each.seed, frames, scope=scope)
+            else:
+                request = timeline_request(timeline_rows(each.timeline), texts, each.seed, scope)
+            found.append(resolve_request(self._generator, request))
+        return found
 
     def editor(self, settings: Mapping[str, Any]) -> EditModel:
         """Return the model for operations that generate frames.
@@ -91,15 +114,8 @@ class OneShot:
             InvalidInput: a length out of the bundle's range; raised before anything is generated.
         """
         from marey.generation.candidates import draw_clips, split_settings
-        from marey.generation.port import Request
 
-        features = self._text.features([w.prompt for w in wanted])
-        frames_of = self._generator.limits.frames_of
-        requests = [
-            Request(text, w.seed, frames_of(w.seconds, text), scope=self._scope(w.prompt))
-            for w, text in zip(wanted, features, strict=True)
-        ]
-        requests = [self._generator.resolve_length(request) for request in requests]
+        requests = self._requests(wanted)
         start = 0
         for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
             rows = list(group)

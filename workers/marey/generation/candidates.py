@@ -13,6 +13,7 @@ from typing import Any
 
 from marey.generation.export import finish
 from marey.generation.port import GenerationControl, Generator, NoControl, Request, S
+from marey.generation.shots.dispatch import generate_any
 from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
@@ -78,7 +79,7 @@ def best_clips(
     while open_rows and number < plan.candidates:
         part = [draws[row].request(number) for row in open_rows]
         watched = _CandidateControl(control or NoControl(), open_rows, number, plan.candidates)
-        made = generator.generate(part, settings, control=watched)
+        made = generate_any(generator, part, settings, control=watched)
         kept: list[int] = []
         for row, generated in zip(open_rows, made, strict=True):
             if generated is None:
@@ -110,7 +111,7 @@ def draw_clips(
     """
     if not plan.is_single:
         return filter(None, best_clips(generator, requests, settings, plan, body=body))  # nothing was dropped
-    made = generator.generate(requests, settings)
+    made = generate_any(generator, requests, settings)
     return (
         finish(generator, request, generated, settings, body=body, fps=plan.fps)
         for request, generated in zip(requests, made, strict=True)

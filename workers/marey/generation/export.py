@@ -8,7 +8,8 @@ from typing import Any
 
 import torch
 
-from marey.generation.port import Generated, Generator, Request, S
+from marey.generation.port import Generator, MotionFeatures, Request, S
+from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
@@ -21,19 +22,10 @@ from marey.vocabulary.scope import match_scope
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
     """Return the provenance of a motion: everything that decides it, nothing that differs between two equal runs."""
-    bundle, text, recording = generator.bundle, request.text, request.recording
-    lists = bundle.manifest.actions
+    bundle, recording = generator.bundle, request.recording
     streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
     return {
-        "prompt": text.prompt,
-        "rewritten": text.rewritten,
-        **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
-        "graph": text.graph.to_json(),
-        **(
-            {}
-            if lists is None or recording
-            else {"scope": dict(request.scope or match_scope(text.prompt, lists).as_json())}
-        ),
+        **_reading(generator, request),
         "model": bundle.manifest.model,
         "bundle": bundle.reference,
         "weights_sha256": bundle.weights_sha256,
@@ -43,6 +35,24 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
         "settings": generator.describe_settings(settings),
         "software": software_of(generator),
         **streamed,
+    }
+
+
+def _reading(generator: Generator[S], request: Request) -> dict[str, Any]:
+    """Return the part of the provenance that says what the prompts are and how they were read."""
+    text, lists = request.text, generator.bundle.manifest.actions
+    if request.timeline is not None:
+        return describe_timeline(request, request.timeline, generator.limits, lists)
+    return {
+        "prompt": text.prompt,
+        "rewritten": text.rewritten,
+        **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
+        "graph": text.graph.to_json(),
+        **(
+            {}
+            if lists is None or request.recording
+            else {"scope": dict(request.scope or match_scope(text.prompt, lists).as_json())}
+        ),
     }
 
 
@@ -60,7 +70,7 @@ def software_of(generator: Generator[Any]) -> dict[str, Any]:
 def finish(
     generator: Generator[S],
     request: Request,
-    generated: Generated,
+    generated: MotionFeatures,
     settings: S,
     *,
     body: NamedBody | None = None,
@@ -77,19 +87,29 @@ def finish(
     body = body or standard_body(generator.layout.skeleton)
     manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
-    prompts = (
-        [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
-    )
-    quality = quality_of(clip, expected_by_prompts(prompts))
+    if request.timeline is not None:
+        clip = with_rows(clip, request.timeline)
+    quality = quality_of(clip, expected_by_prompts(_prompts(request)))
     if quality is None:
         return clip
     quality = quality.with_match(_match(clip, request))
-    return replace(clip, manifest={**manifest, KEY: quality.model_dump(mode="json")})
+    return replace(clip, manifest={**clip.manifest, KEY: quality.model_dump(mode="json")})
+
+
+def _prompts(request: Request) -> list[str]:
+    if request.timeline is not None:
+        return [row.text.prompt for row in request.timeline]
+    return [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
 
 
 def _match(clip: MotionClip, request: Request) -> PromptMatch:
-    """Match a clip with its prompt, by its words or else by its meaning; recordings of streams, which hold several
-    prompts, have no match."""
+    """Match a clip with its prompt, by its words or else by its meaning.
+
+    The match of a timeline is that of the row that shows its prompt least; recordings of streams, which hold several
+    prompts, have none.
+    """
+    if request.timeline is not None:
+        return least_match(clip)
     if request.recording is not None:
         return PromptMatch()
     return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)

@@ -14,13 +14,16 @@ from marey.core.settings import Settings
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
 from marey.generation.export import finish
-from marey.generation.port import Generated, GenerationControl, Generator, Request, S
+from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
+from marey.generation.shots.dispatch import bucket_of, generate_any, resolve_request, timeline_request
+from marey.items.timeline import timeline_rows
 from marey.jobs import ClaimedItem
 from marey.runtime.exporting import export_clip
 from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome
 from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures
+from marey.text.several import SeveralTexts
 
 
 class GeneratorHandler(Generic[S]):
@@ -69,9 +72,9 @@ class GeneratorHandler(Generic[S]):
         buckets: dict[int, list[ClaimedItem]] = defaultdict(list)
         for item in batch.items:
             try:
-                request = self.generator.resolve_length(self._request(item, batch.features[item.text_key]))
+                request = resolve_request(self.generator, self._request(item, batch.features[item.text_key]))
                 self._requests[item.id] = request
-                buckets[self.generator.bucket(request)].append(item)
+                buckets[bucket_of(self.generator, request)].append(item)
             except MareyError as error:
                 self._requests[item.id] = error
                 buckets[0].append(item)
@@ -104,7 +107,7 @@ class GeneratorHandler(Generic[S]):
         values, plan = split_settings(items[0].settings)  # the same for the whole batch
         settings = self.generator.settings(values)
         if plan.is_single:
-            made = self.generator.generate(requests, settings, control=control)
+            made = generate_any(self.generator, requests, settings, control=control)
             return [
                 None if generated is None else partial(_export, self.generator, request, generated, settings, plan.fps)
                 for request, generated in zip(requests, made, strict=True)
@@ -114,6 +117,8 @@ class GeneratorHandler(Generic[S]):
         return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
+        if item.timeline is not None:
+            return timeline_request(timeline_rows(item.timeline), SeveralTexts.of_blob(blob), item.seed, item.scope)
         recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
         frames = self.generator.limits.frames_of(item.seconds, text)
@@ -136,5 +141,7 @@ class _Rows:
         return {self._rows[item] for item in self._control.dropped() if item in self._rows}
 
 
-def _export(generator: Generator[S], request: Request, generated: Generated, settings: S, fps: float | None) -> Export:
+def _export(
+    generator: Generator[S], request: Request, generated: MotionFeatures, settings: S, fps: float | None
+) -> Export:
     return export_clip(finish(generator, request, generated, settings, fps=fps), generator.bundle.manifest.licence)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidInput
+from marey.generation.timed import TimedText
 from marey.items.item import MAX_SEED
 from marey.motion.features import FeatureLayout
 from marey.nn.devices import choose_device, fast_bf16
@@ -51,6 +52,7 @@ class Request:
     scope: Mapping[str, Any] | None = None  # of the prompt, for the manifest; None = by its words
     kept: tuple[KeptFrames, ...] = ()  # in the order of time; needs `frames`
     free: bool = False  # the text is not read: kept frames alone decide
+    timeline: tuple[TimedText, ...] | None = None  # prompts at stated times; `text` is that of the first
 
 
 @dataclass(frozen=True)
@@ -165,17 +167,21 @@ class NoControl:
         return set()
 
 
-class Generated(Protocol):
-    """One motion as the network generated it, before decoding to joints and clean-up."""
-
-    @property
-    def tokens(self) -> NDArray[np.int16]:
-        """(V, n): levels and tokens."""
-        ...
+class MotionFeatures(Protocol):
+    """One motion before decoding to joints and clean-up."""
 
     @property
     def features(self) -> NDArray[np.float32]:
         """(T, D), in the layout's own units."""
+        ...
+
+
+class Generated(MotionFeatures, Protocol):
+    """One motion as the network generated it."""
+
+    @property
+    def tokens(self) -> NDArray[np.int16]:
+        """(V, n): levels and tokens."""
         ...
 
 

@@ -16,27 +16,36 @@ from marey.selector.matching import Step, match, wanted_by_meaning, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 
 FILE = Path(__file__).with_name("real_values.toml")
+EVERY = slice(None)
 PERCENT = 5
 """Percent between two quantiles of the table."""
 
 
-def match_of(clip: MotionClip, sentences: Iterable[str], scope: Mapping[str, Any] | None = None) -> PromptMatch:
+def match_of(
+    clip: MotionClip,
+    sentences: Iterable[str],
+    scope: Mapping[str, Any] | None = None,
+    *,
+    frames: slice = EVERY,
+) -> PromptMatch:
     """Match a clip with its prompt, by its words or else by its meaning.
 
     Args:
         clip: the motion.
         sentences: as of `wanted_of`.
         scope: as of `wanted_by_meaning`.
+        frames: those that show the prompt.
     """
-    return match_steps(clip, wanted_of(sentences) or wanted_by_meaning(scope))
+    return match_steps(clip, wanted_of(sentences) or wanted_by_meaning(scope), frames=frames)
 
 
-def match_steps(clip: MotionClip, steps: Sequence[Step] | None) -> PromptMatch:
+def match_steps(clip: MotionClip, steps: Sequence[Step] | None, *, frames: slice = EVERY) -> PromptMatch:
     """Match a clip with actions in their order; the value is null without rules for them, on other skeletons than that
     of 22 joints, and under 8 frames."""
-    if not steps or clip.skeleton.name != HUMANML3D.name or clip.frames < SHORTEST:
+    joints = clip.joints[frames]
+    if not steps or clip.skeleton.name != HUMANML3D.name or len(joints) < SHORTEST:
         return PromptMatch()
-    value = match(Motion(clip.joints, clip.fps), steps)
+    value = match(Motion(joints, clip.fps), steps)
     single = steps[0][0].action if len(steps) == 1 and len(steps[0]) == 1 else None
     return PromptMatch(value=value, percentile=None if single is None else percentile(single, value))
 

@@ -17,6 +17,7 @@ from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
 from marey.items.item import InvalidItems, Item, Problem, read_item, read_items, read_json
+from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items
 from marey.vocabulary.report import ScopeReport
@@ -68,15 +69,17 @@ class Submission:
         if report is not None:
             report.decided = decided or {}
             for item, generator in self._items():
-                generator.judge(item.prompt, report)
+                generator.judge(item, report)
         return report
 
-    def prompts(self) -> Iterator[tuple[int | None, str, Bundle]]:
-        """Yield the prompts with their lines and bundles; the body is read again."""
+    def prompts(self) -> Iterator[tuple[int | None, str | None, str, Bundle]]:
+        """Yield the prompts with their lines, rows of timelines and bundles; the body is read again."""
         for line, raw in self._raws():
             item, _ = read_item(raw, line)
             if item is not None:
-                yield line, item.prompt, self._generators[item.model].bundle
+                bundle = self._generators[item.model].bundle
+                for row, prompt in prompts_with_rows(item.prompt, item.timeline):
+                    yield line, row, prompt, bundle
 
     def _items(self) -> Iterator[tuple[Item, GeneratorCapabilities]]:
         return ((item, self._generators[item.model]) for item in read_items(self._raws()))

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console, options
-from marey.cli.commands.submit import read_prompts, row_defaults
+from marey.cli.commands.submit import read_prompts, report_gaps, row_defaults
 from marey.cli.exporting import with_export
 from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.core.extras import needs_extra
 from marey.items.item import MAX_SEED, Item, Problem
+from marey.items.timeline import prompts_with_rows
 from marey.motion.export_options import PLAIN, ExportOptions
 
 OFF_PROMPT = "off-prompt"
@@ -45,6 +46,7 @@ class Planned:
 @with_export()
 def generate(
     prompts: options.Prompts = None,
+    timelines: options.Timelines = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
     extra_columns: options.Extra = options.ExtraColumns.REFUSE,
@@ -88,8 +90,8 @@ def generate(
         variety=None if variety is None else variety.value,
         tags=tags,
     )
-    reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
-    items = list(reader)
+    reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
+    items = list(report_gaps(reader))
     chosen, config = _bundle_for(reader, items, bundle)
     shaped = _body_of(chosen, body)
     if scope is options.ScopeOption.REFUSE:
@@ -177,7 +179,7 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
     """
-    from marey.bundles.limits import check_seconds, check_settings, variety_settings
+    from marey.bundles.limits import FIELD_CHECKS
     from marey.registry import find_model, model_names
 
     if find_model(bundle.manifest.model) is None:
@@ -188,13 +190,14 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
         )
     problems: list[Problem] = []
     for number, item in enumerate(items, 1):
-        for field, check in (("seconds", check_seconds), ("settings", check_settings), ("variety", variety_settings)):
+        for field, check in FIELD_CHECKS.items():
             try:
                 check(bundle, getattr(item, field))
             except InvalidBundle:
                 raise
             except InvalidInput as error:
-                problems.append(Problem(number, field, error.message))
+                message = f"{error.message}. {error.hint}" if error.hint else error.message
+                problems.append(Problem(number, field, message))
     return reader.located(problems)
 
 
@@ -208,7 +211,11 @@ def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, st
     from marey.bundles.scope import refuse_unknown
     from marey.vocabulary.scope import match_scope
 
-    lines = ((line, item.prompt, bundle) for line, item in zip(reader.lines, items, strict=True))
+    lines = (
+        (line, row, prompt, bundle)
+        for line, item in zip(reader.lines, items, strict=True)
+        for row, prompt in prompts_with_rows(item.prompt, item.timeline)
+    )
     refuse_unknown(lines, where=reader.where, match=match_scope if studio is None else studio.match_scope)
 
 
@@ -224,10 +231,12 @@ def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, poli
         _refuse(reader, items, studio.bundle, studio)
     report, lengths = ScopeReport(), seconds_of(studio.bundle)
     if manifest.actions is not None:
-        scopes = {item.prompt: studio.match_scope(item.prompt, manifest.actions) for item in items}
+        prompts = {prompt for item in items for _, prompt in prompts_with_rows(item.prompt, item.timeline)}
+        scopes = {prompt: studio.match_scope(prompt, manifest.actions) for prompt in prompts}
         report.decided = {(manifest.name, prompt): scope for prompt, scope in scopes.items()}
     for item in items:
-        report.judge(item.prompt, manifest.name, manifest.actions, lengths=lengths)
+        rows_of_item = () if item.timeline is None else prompts_with_rows(item.prompt, item.timeline)
+        report.judge(item.prompt, manifest.name, manifest.actions, lengths=lengths, rows=rows_of_item)
     console.warn_all(report.warnings())
 
 
@@ -286,7 +295,7 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         settings, seconds = sampling_of(bundle, item), length_of(bundle, item)
         for variant in range(item.variants):
-            wanted = Wanted(item.prompt, seed + variant, seconds, settings)
+            wanted = Wanted(item.prompt, seed + variant, seconds, settings, item.timeline)
             name = item.name or slug(item.prompt)
             naming = Naming(
                 index,

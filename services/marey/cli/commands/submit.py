@@ -12,18 +12,24 @@ from marey.client import rows
 from marey.client.names import check_template
 from marey.core.errors import InvalidInput, MareyError
 from marey.items.item import InvalidItems
+from marey.items.timeline import timeline_gaps
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from typing import Unpack
 
     from marey.client import CheckedJob, Client
     from marey.client.jobs import Defaults, JobOptions
     from marey.client.lines import Lines
+    from marey.items.item import Item
+
+MAX_GAP_NOTES = 3
+"""Timelines with gaps that are named one by one."""
 
 
 def submit(
     prompts: options.Prompts = None,
+    timelines: options.Timelines = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
     extra_columns: options.Extra = options.ExtraColumns.REFUSE,
@@ -83,8 +89,8 @@ def submit(
         variety=None if variety is None else variety.value,
         tags=tags,
     )
-    reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
-    with Lines(item.as_json() for item in reader) as lines:
+    reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
+    with Lines(item.as_json() for item in report_gaps(reader)) as lines:
         if reader.total:
             raise _all_problems(reader, lines)
         with Client() as client:
@@ -156,6 +162,19 @@ def _show_scope(checked: CheckedJob) -> None:
     console.warn_all(checked.warnings)
 
 
+def report_gaps(items: Iterable[Item]) -> Iterator[Item]:
+    """Yield items, and say of the first timelines with gaps between rows that the model fills them."""
+    found = 0
+    for item in items:
+        gaps = () if item.timeline is None else timeline_gaps(item.timeline)
+        if gaps and (found := found + 1) <= MAX_GAP_NOTES:
+            times = ", ".join(f"{start:g}-{end:g}" for start, end in gaps)
+            console.say(f"{item.prompt[:60]!r} has no prompt at {times} s: the model fills it without one.")
+        yield item
+    if found > MAX_GAP_NOTES:
+        console.say(f"{found - MAX_GAP_NOTES} more timelines have such gaps.")
+
+
 def row_defaults(sampling: list[str] | None, **given: Unpack[Defaults]) -> Mapping[str, object]:
     """Return the fields of rows that do not set them, from the options of a command.
 
@@ -175,8 +194,9 @@ def read_prompts(
     input_format: options.InputFormat | None,
     defaults: Mapping[str, object] = rows.NO_DEFAULTS,
     extra_columns: options.ExtraColumns = options.ExtraColumns.REFUSE,
+    timelines: list[str] | None = None,
 ) -> rows.PromptReader:
-    """The items of PROMPT… or of -f.
+    """The items of PROMPT…, of --timeline or of -f.
 
     Args:
         defaults: `row_defaults` of the options of the command.
@@ -185,8 +205,11 @@ def read_prompts(
     Raises:
         InvalidInput: none or both are given, or what is there cannot be used.
     """
-    if prompts and file:
-        raise InvalidInput("both PROMPT and -f are given", hint="Give either PROMPT or -f.")
+    given = [name for name, value in (("PROMPT", prompts), ("--timeline", timelines), ("-f", file)) if value]
+    if len(given) > 1:
+        raise InvalidInput(f"both {' and '.join(given[:2])} are given", hint=f"Give either {' or '.join(given)}.")
+    if timelines:
+        return rows.read_timelines(timelines, defaults)
     if file:
         file_format = None if input_format is None else input_format.value
         return rows.read_file(file, file_format, defaults, extra_columns.value)

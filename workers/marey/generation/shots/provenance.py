@@ -1,0 +1,75 @@
+"""What the manifest of a timeline says of its rows and transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from marey.generation.port import Limits, Request
+from marey.generation.shots.timelines import gaps_of, plan_timeline
+from marey.generation.timed import TimedText
+from marey.items.timeline import TimelineRow, text_of
+from marey.motion.clip import MotionClip
+from marey.quality.record import PromptMatch
+from marey.selector.records import match_of
+from marey.vocabulary.scope import ActionLists, match_scope, scope_of_rows
+
+KEY = "timeline"
+
+
+def describe_timeline(
+    request: Request, timeline: Sequence[TimedText], limits: Limits, lists: ActionLists | None
+) -> dict[str, Any]:
+    """Return the part of the provenance that says what the prompts of a timeline are and how they were read.
+
+    Times are in seconds; those of transitions and gaps are of the frames that they have.
+    """
+    plan = plan_timeline(timeline, request.seed, limits)
+    rows = [_describe_row(row, part.seed) for row, part in zip(timeline, plan.rows, strict=True)]
+    transitions = [
+        {"start": part.start / limits.fps, "end": part.end / limits.fps, "seed": part.seed} for part in plan.transitions
+    ]
+    gaps = [{"start": start / limits.fps, "end": end / limits.fps} for start, end in gaps_of(plan)]
+    return {
+        "prompt": text_of([TimelineRow(row.start, row.end, row.text.prompt) for row in timeline]),
+        "rewritten": text_of([TimelineRow(row.start, row.end, row.text.rewritten) for row in timeline]),
+        **({} if lists is None else {"scope": dict(request.scope or _scope(timeline, lists))}),
+        KEY: {"rows": rows, "transitions": transitions, "gaps": gaps},
+    }
+
+
+def _describe_row(row: TimedText, seed: int) -> dict[str, Any]:
+    text = row.text
+    return {
+        "start": row.start,
+        "end": row.end,
+        "prompt": text.prompt,
+        "rewritten": text.rewritten,
+        **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
+        "graph": text.graph.to_json(),
+        "seed": seed,
+    }
+
+
+def _scope(timeline: Sequence[TimedText], lists: ActionLists) -> Mapping[str, Any]:
+    return scope_of_rows([match_scope(row.text.prompt, lists) for row in timeline]).as_json()
+
+
+def with_rows(clip: MotionClip, timeline: Sequence[TimedText]) -> MotionClip:
+    """Return the clip of a timeline with the first frame of each prompt, and the match of each row, in its manifest."""
+    record: Mapping[str, Any] = clip.manifest[KEY]
+    prompts = [[round(row.start * clip.fps), row.text.prompt] for row in timeline]
+    rows = [{**row, "match": _match(clip, timed).value} for row, timed in zip(record["rows"], timeline, strict=True)]
+    return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: {**record, "rows": rows}})
+
+
+def _match(clip: MotionClip, row: TimedText) -> PromptMatch:
+    frames = slice(round(row.start * clip.fps), round(row.end * clip.fps))
+    return match_of(clip, row.text.actions or (row.text.rewritten,), row.scope, frames=frames)
+
+
+def least_match(clip: MotionClip) -> PromptMatch:
+    """Return the match of the row of a timeline that shows its prompt least; null where no row has one."""
+    values = [row["match"] for row in clip.manifest[KEY]["rows"] if row["match"] is not None]
+    return PromptMatch(value=min(values, default=None))

@@ -1,0 +1,315 @@
+"""Timelines: one motion of several prompts at stated times.
+
+Every row is generated alone, so that its action follows its prompt as a motion of its own does. Then the beginning of
+each row but the first is generated again, without a prompt, between the frames that stay on both sides; so is a gap
+between two rows. A row longer than the model's longest motion is continued behind kept frames. Windows of
+all timelines of a batch are generated together, and each depends on its own row or boundary alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from marey.core.errors import InvalidInput
+from marey.generation.passes import PassControl
+from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
+from marey.generation.shots.windows import CONTEXT, Float32, Gap, Window, crossfaded, fill, most_frames
+from marey.generation.timed import TimedText, part_seed
+from marey.items.timeline import TIMELINE_HINT, no_timelines
+from marey.text.features import TextFeatures
+
+CUT = 16
+"""Most frames of a row that the transition to it replaces. All are at its beginning: an action shows at its end that it
+was done (a seat is reached, stairs are climbed), and replacing frames there costs adherence."""
+CUT_SHARE = 4
+"""At most one in so many frames of a row is replaced."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimelineMotion:
+    """The features of a timeline, (T, D), in the layout's own units."""
+
+    features: Float32 = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Frames of a timeline with one origin: a row, or the transition between two rows.
+
+    Attributes:
+        start: first frame.
+        end: frame after the last.
+        seed: of its first window; windows after it have seeds of their own.
+    """
+
+    start: int
+    end: int
+    seed: int
+
+    @property
+    def frames(self) -> int:
+        """Return the number of frames."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class TimelinePlan:
+    """Frames of the rows and transitions of a timeline."""
+
+    rows: tuple[Part, ...]
+    transitions: tuple[Part, ...]
+
+    @property
+    def frames(self) -> int:
+        """Return the frames of the whole."""
+        return self.rows[-1].end
+
+
+def plan_timeline(timeline: Sequence[TimedText], seed: int, limits: Limits) -> TimelinePlan:
+    """Return the frames of the rows and transitions of a timeline."""
+    times = [(round(row.start * limits.fps), round(row.end * limits.fps)) for row in timeline]
+    rows = tuple(Part(*time, part_seed(seed, "row", number)) for number, time in enumerate(times))
+    transitions = tuple(
+        _transition(before, after, part_seed(seed, "transition", number), limits.keeps)
+        for number, (before, after) in enumerate(pairwise(rows))
+    )
+    return TimelinePlan(rows, transitions)
+
+
+def check_timelines(generator: Generator[Any]) -> None:
+    """Check that a model can generate timelines.
+
+    Raises:
+        InvalidInput: it cannot generate frames around others.
+    """
+    if not generator.limits.keeps:
+        raise InvalidInput(no_timelines(generator.bundle.manifest.model), where="timeline", hint=TIMELINE_HINT)
+
+
+def _transition(before: Part, after: Part, seed: int, grid: int) -> Part:
+    """Return the frames that are generated without a prompt between two rows: a gap, and the beginning of the row after
+    it, if the gap is shorter than that."""
+    return Part(before.end, max(after.start, before.end + cut_of(after.frames, grid)), seed)
+
+
+def cut_of(frames: int, grid: int) -> int:
+    """Return how many frames at its beginning a row loses to a transition."""
+    return max(grid, min(CUT, frames // CUT_SHARE // grid * grid))
+
+
+def generate_timelines(
+    generator: Generator[S],
+    requests: Sequence[Request],
+    settings: S | None = None,
+    *,
+    control: GenerationControl | None = None,
+) -> list[TimelineMotion | None]:
+    """Generate the motion of each timeline; None where `control` dropped it.
+
+    Raises:
+        InvalidInput: the model cannot generate frames around others, or features of another encoder.
+    """
+    check_timelines(generator)
+    timelines = [_Timeline(request, generator.limits) for request in requests]
+    windows = _Windows(generator, settings, control or NoControl(), timelines)
+    windows.make([strand for timeline in timelines for strand in timeline.rows])
+    windows.make([strand for timeline in timelines for strand in timeline.open_transitions()])
+    return [timeline.motion() for timeline in timelines]
+
+
+class _Strand:
+    """A part of a timeline while it grows, window by window.
+
+    Attributes:
+        timeline: that it belongs to.
+        lengths: frames of each window.
+        windows: those that are made.
+    """
+
+    def __init__(self, timeline: _Timeline, part: Part, text: TextFeatures, most: tuple[int, int]) -> None:
+        """`most`: frames of a part that is one window, and of each window of a longer one."""
+        self.timeline = timeline
+        self.part = part
+        self.text = text
+        self.windows: list[Window] = []
+        self.lengths = even_parts(part.frames, *most)
+
+    @property
+    def seed(self) -> int:
+        """Return the seed of the next window."""
+        number = len(self.windows)
+        return self.part.seed if number == 0 else part_seed(self.part.seed, "window", number)
+
+    @property
+    def is_last(self) -> bool:
+        """Return True if the next window is the last."""
+        return len(self.windows) == len(self.lengths) - 1
+
+    @property
+    def start(self) -> int:
+        """Return the first frame of the next window, in the timeline."""
+        return self.part.start + sum(self.lengths[: len(self.windows)])
+
+
+class _Row(_Strand):
+    """A row: its first window is a motion of the prompt, those after it continue it."""
+
+    def __init__(self, timeline: _Timeline, part: Part, text: TextFeatures, limits: Limits) -> None:
+        super().__init__(timeline, part, text, (limits.max_frames, limits.max_frames - CONTEXT))
+        self.features: Float32 | None = None
+
+    def request(self) -> Request:
+        """Return the request of the first window."""
+        return Request(self.text, self.seed, self.lengths[0])
+
+    def gap(self) -> Gap:
+        """Return the gap of a window after the first."""
+        assert self.features is not None
+        return Gap(self.features, self.lengths[len(self.windows)], self.features[:0], self.text, self.seed)
+
+    def add(self, window: Window) -> None:
+        """Append a window."""
+        if self.features is None:
+            self.features = window.features
+        else:
+            grown = np.concatenate([self.features, window.new])
+            self.features = crossfaded(grown, window, len(self.features) - window.first)
+        self.windows.append(window)
+
+
+class _Transition(_Strand):
+    """A transition: windows without a prompt; the last one has the frames of the next row behind it."""
+
+    def __init__(self, timeline: _Timeline, number: int, limits: Limits) -> None:
+        part = timeline.plan.transitions[number]
+        before, after = timeline.rows[number : number + 2]
+        super().__init__(timeline, part, after.text, (most_frames(limits, 2), limits.max_frames - CONTEXT))
+        assert before.features is not None
+        assert after.features is not None
+        self._before = before.features[: part.start - before.part.start]
+        self._after = after.features[part.end - after.part.start :]
+
+    def gap(self) -> Gap:
+        """Return the gap of the next window."""
+        made = [window.new for window in self.windows]
+        before = np.concatenate([self._before[-CONTEXT:], *made]) if made else self._before
+        after = self._after if self.is_last else self._after[:0]
+        return Gap(before, self.lengths[len(self.windows)], after, self.text, self.seed, free=True)
+
+    def add(self, window: Window) -> None:
+        """Append a window."""
+        self.windows.append(window)
+
+    def write(self, frames: Float32) -> Float32:
+        """Return the frames of the timeline with this transition in them."""
+        start = self.part.start
+        for window, length in zip(self.windows, self.lengths, strict=True):
+            frames = crossfaded(frames, window, start - window.first)
+            start += length
+        return frames
+
+
+class _Timeline:
+    """A timeline while it is generated."""
+
+    def __init__(self, request: Request, limits: Limits) -> None:
+        assert request.timeline is not None
+        self.limits = limits
+        self.dropped = False
+        self.plan = plan_timeline(request.timeline, request.seed, limits)
+        self.rows = [
+            _Row(self, part, row.text, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)
+        ]
+        self.transitions: list[_Transition] = []
+
+    @property
+    def windows(self) -> int:
+        """Return the number of windows of the whole."""
+        most = (most_frames(self.limits, 2), self.limits.max_frames - CONTEXT)
+        between = sum(len(even_parts(part.frames, *most)) for part in self.plan.transitions)
+        return sum(len(row.lengths) for row in self.rows) + between
+
+    def open_transitions(self) -> list[_Transition]:
+        """Return the transitions, once the rows are made; none of a dropped timeline."""
+        if not self.dropped:
+            self.transitions = [_Transition(self, number, self.limits) for number in range(len(self.plan.transitions))]
+        return self.transitions
+
+    def motion(self) -> TimelineMotion | None:
+        """Put rows and transitions together; None if the timeline was dropped."""
+        if self.dropped:
+            return None
+        first = self.rows[0].features
+        assert first is not None
+        frames = np.zeros((self.plan.frames, first.shape[1]), np.float32)
+        for row in self.rows:
+            assert row.features is not None
+            frames[row.part.start : row.part.end] = row.features
+        for transition in self.transitions:
+            frames = transition.write(frames)
+        return TimelineMotion(frames.astype(np.float32))
+
+
+class _Windows:
+    """Generates the windows of several timelines, as many together as there are, one after another of each part."""
+
+    def __init__(
+        self,
+        generator: Generator[S],
+        settings: S | None,
+        control: GenerationControl,
+        timelines: Sequence[_Timeline],
+    ) -> None:
+        self._control = control
+        self._generate: Callable[..., Sequence[object]]
+        self._timelines = timelines
+        self._total = sum(timeline.windows for timeline in timelines)
+        self._done = 0
+
+        def first(rows: Sequence[_Row], watched: GenerationControl) -> list[Window | None]:
+            made = generator.generate([row.request() for row in rows], settings, control=watched)
+            return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
+
+        def following(strands: Sequence[_Row | _Transition], watched: GenerationControl) -> list[Window | None]:
+            return fill(generator, [strand.gap() for strand in strands], settings, control=watched)
+
+        self._first, self._following = first, following
+
+    def make(self, strands: Sequence[_Row] | Sequence[_Transition]) -> None:
+        """Generate all windows of parts that do not depend on each other."""
+        while left := [each for each in strands if not each.timeline.dropped and len(each.windows) < len(each.lengths)]:
+            watched = PassControl(self._control, self._owners(left), self._done, self._total)
+            new = [each for each in left if isinstance(each, _Row) and not each.windows]  # all rows, or none
+            made = self._first(new, watched) if new else self._following(left, watched)
+            for strand, window in zip(left, made, strict=True):
+                if window is None:
+                    strand.timeline.dropped = True
+                else:
+                    strand.add(window)
+            self._done += len(made)
+
+    def _owners(self, strands: Sequence[_Strand]) -> list[int]:
+        place = {id(timeline): number for number, timeline in enumerate(self._timelines)}
+        return [place[id(strand.timeline)] for strand in strands]
+
+
+def even_parts(frames: int, single: int, most: int) -> list[int]:
+    """Return the lengths of windows that make up so many frames, as equal as can be.
+
+    Args:
+        frames: of all windows.
+        single: most frames of one window that stands alone.
+        most: most frames of each of several windows.
+    """
+    count = 1 if frames <= single else -(-frames // most)
+    return [frames * (number + 1) // count - frames * number // count for number in range(count)]
+
+
+def gaps_of(plan: TimelinePlan) -> Iterator[tuple[int, int]]:
+    """Yield the first frame, and the frame after the last, of each gap between rows."""
+    return ((before.end, after.start) for before, after in pairwise(plan.rows) if before.end < after.start)

@@ -1,0 +1,34 @@
+"""Prompts at stated times, as a request of a generator holds them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from marey.items.item import MAX_SEED
+from marey.text.features import TextFeatures
+
+
+@dataclass(frozen=True)
+class TimedText:
+    """One prompt of a timeline.
+
+    Attributes:
+        start: in seconds.
+        end: in seconds.
+        text: of the prompt.
+        scope: of the prompt; None = by its words.
+    """
+
+    start: float
+    end: float
+    text: TextFeatures = field(repr=False)
+    scope: Mapping[str, Any] | None = None
+
+
+def part_seed(seed: int, part: str, number: int) -> int:
+    """Return the seed of a part of a motion, from the seed of the whole."""
+    digest = hashlib.sha256(f"marey {part} {seed} {number}".encode()).digest()
+    return int.from_bytes(digest[:8], "little") % (MAX_SEED + 1)
