@@ -79,6 +79,8 @@ class Client:
         motion: Motion | str,
         ops: Sequence[Mapping[str, Any]],
         *,
+        model: str | None = None,
+        settings: Mapping[str, float] | None = None,
         name: str | None = None,
         comment: str | None = None,
         priority: int = 0,
@@ -89,8 +91,11 @@ class Client:
 
         Args:
             motion: to edit; it does not change.
-            ops: operations such as `[{"op": "trim", "from": 0.5}, {"op": "loop"}]`, applied in their order; `with` of
-                `concat` is another stored motion or its id. Each `split` makes two motions of one.
+            ops: operations such as `[{"op": "trim", "from": 0.5}, {"op": "loop"}]`, applied in their order; `with` is
+                another stored motion or its id. Each `split` makes two motions of one.
+            model: model, bundle or exact bundle that generates frames, for operations that need one; None = the
+                server's default.
+            settings: of sampling, for the model.
             name, comment: of the job.
             priority: -1000 to 1000; higher runs first.
             keep_days: delete the job with its motions this many days after its end; None = the server's default.
@@ -102,7 +107,14 @@ class Client:
             TooLarge: too many pieces, or motions that are too long.
             QuotaUsedUp, Conflict, Refused, Unreachable: as the server says.
         """
-        given = {"name": name, "comment": comment, "priority": priority or None, "keep_days": keep_days}
+        given = {
+            "model": model,
+            "settings": settings,
+            "name": name,
+            "comment": comment,
+            "priority": priority or None,
+            "keep_days": keep_days,
+        }
         body = {"ops": [_named(op) for op in ops], **{key: each for key, each in given.items() if each is not None}}
         path = f"/v1/motions/{identifier(motion)}/edits"
         return Job.of(self._transport.post_new(path, body, idempotency_key=idempotency_key))

@@ -13,6 +13,7 @@ from marey.items.item import UnknownAction
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import TEXT_QUEUE, ClaimedItem
 from marey.jobs.leases import PromptScope
+from marey.jobs.types import prompts_of_ops
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served, scope_key
 from marey.text.meaning import MeaningJudge
@@ -115,20 +116,26 @@ def _outcome(pipeline: TextPipeline, scopes: ScopeStage | None, item: ClaimedIte
     try:
         prompts = [prompt for _, prompt in _prompts_of(item)]
         keys = [pipeline.key(prompt) for prompt in prompts]
-        if (keys[0] if item.timeline is None else several_key(keys)) != item.text_key:
+        if (keys[0] if _is_single(item) else several_key(keys)) != item.text_key:
             raise InvalidBundle(
                 "the server that took this job has another text encoder or labeller than this worker",
                 hint="Install the same models on both, then retry the job's failed items.",
             )
         scope = None if scopes is None else scopes.scope_of(item, policy)
         features = pipeline.features(prompts)
-        several = features[0] if item.timeline is None else SeveralTexts(tuple(features))
+        made = features[0] if _is_single(item) else SeveralTexts(tuple(features))
     except MareyError as error:
         return Failed(item.id, error)
-    return TextDone(item.id, item.text_key, several.to_blob(), scope)
+    return TextDone(item.id, item.text_key, made.to_blob(), scope)
+
+
+def _is_single(item: ClaimedItem) -> bool:
+    return item.timeline is None and item.edits is None
 
 
 def _prompts_of(item: ClaimedItem) -> list[tuple[str | None, str]]:
+    if item.edits is not None:
+        return [(None, prompt) for prompt in prompts_of_ops(item.edits.ops)]
     return prompts_with_rows(item.prompt, item.timeline)
 
 

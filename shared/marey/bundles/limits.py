@@ -147,6 +147,24 @@ def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, flo
     return {**{name: known[name].check(value) for name, value in own.items()}, **_platform_settings(bundle, platform)}
 
 
+def edit_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the settings of a model that generates frames of an edit, as it takes them.
+
+    Raises:
+        InvalidInput: the model has no such setting, the value is out of range, or it is of whole motions.
+    """
+    if platform := [name for name in values if name in PLATFORM_SETTINGS]:
+        raise InvalidInput(
+            f"{platform[0]} is a setting of whole motions",
+            where="settings",
+            hint="Operations have `candidates`; `fps` is an operation.",
+        )
+    try:
+        return check_settings(bundle, values)
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where="settings", hint=error.hint) from error
+
+
 FIELD_CHECKS: Mapping[str, Callable[[Bundle, Any], object]] = {
     "seconds": check_seconds,
     "settings": check_settings,

@@ -71,6 +71,16 @@ class Edits:
         return {"ops": [dict(op) for op in self.ops], "sources": [str(source) for source in self.sources]}
 
 
+UNREAD = "a person moves"
+"""Prompt that the text stage reads for operations of a model without any, so that all items have text features."""
+
+
+def prompts_of_ops(ops: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return the prompts of operations, each once, in their order."""
+    found = tuple(dict.fromkeys(str(op["prompt"]) for op in ops if op.get("prompt")))
+    return found or (UNREAD,)
+
+
 # --- submit ---
 
 

@@ -6,7 +6,7 @@ renews the lease, stores files, commits, releases and retries. A handler may rel
 - `run` is called on one thread, one batch at a time; every item of a batch has the same bundle and settings.
 - `run` yields one outcome per item, in any order, as soon as it is known; items in `control.dropped()` need none.
 - The items of an evaluator's queue come one by one, and their batch has `scoring`: the motions to measure.
-- The batch of the queue `edit` has `editing`: the motions to edit.
+- A batch of edits has `editing`: the motions to edit. On the queue of a model its items have text features, too.
 - `Done.export` is called once, later, on the store thread, while the next batch runs: decoding, clean-up and file
   formats belong there, not into `run`.
 - An exception from `run` concerns every item of the batch without an outcome: a `MareyError` fails them with its

@@ -202,9 +202,11 @@ class Drain:
         taken = lease.claim
         if taken.stage is ItemStage.TEXT:
             return Batch(taken, taken.items, {})
+        editing = None
+        if any(item.edits is not None for item in taken.items):
+            editing = self._patiently(partial(edit_input, self._engine, self._store, taken))
         if taken.queue == EDIT_QUEUE:
-            edit = partial(edit_input, self._engine, self._store, taken)
-            return Batch(taken, taken.items, {}, editing=self._patiently(edit))
+            return Batch(taken, taken.items, {}, editing=editing)
         if taken.items[0].text_key == NO_TEXT:
             score = partial(score_input, self._engine, self._store, taken.job)
             return Batch(taken, taken.items, {}, scoring=self._patiently(score))
@@ -218,7 +220,8 @@ class Drain:
         missing = [item for item in taken.items if item.text_key not in features]
         if missing:
             self._fail_all(lease, missing, HandlerError("the text features of this item are gone"), retryable=True)
-        return Batch(taken, tuple(item for item in taken.items if item.text_key in features), features)
+        items = tuple(item for item in taken.items if item.text_key in features)
+        return Batch(taken, items, features, editing=editing)
 
     def _patiently(self, read: Callable[[], T]) -> T:
         """Read the input of a claim; retry while the database is away."""

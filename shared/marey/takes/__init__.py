@@ -15,6 +15,7 @@ from marey.takes.made import (
     remove_expired_makings,
     renew_makings,
 )
+from marey.takes.model_edits import EditGenerator, needs_model
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
 from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
@@ -24,6 +25,7 @@ from marey.takes.types import AddedRig, Erasure, GarbageReport, MotionFilter, Ne
 __all__ = [
     "MAX_REVIEWED",
     "AddedRig",
+    "EditGenerator",
     "Erasure",
     "GarbageReport",
     "MadeFile",
@@ -47,6 +49,7 @@ __all__ = [
     "keep_made",
     "list_motions",
     "list_rigs",
+    "needs_model",
     "release_makings",
     "remove_assets",
     "remove_expired_makings",

@@ -30,6 +30,7 @@ from marey.motion.edits.editing import MOST_FRAMES
 from marey.motion.edits.licences import strictest
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import Step, pieces_of, read_steps
+from marey.takes.model_edits import EditGenerator, check_generator, with_prompts
 from marey.takes.reviews import review
 from marey.tenants import DEFAULT_TENANT
 
@@ -37,7 +38,14 @@ MOST_CHARACTERS = 20_000
 """Characters of the prompt of joined motions."""
 REVERTED = "reverted to its source"
 """Comment on the review of an edit."""
-BATCH_KEY = hashlib.sha256(EDIT_QUEUE.encode()).hexdigest()
+KINEMATIC: Mapping[str, Any] = {
+    "model": EDIT_QUEUE,
+    "bundle": EDIT_QUEUE,
+    "batch_key": hashlib.sha256(EDIT_QUEUE.encode()).hexdigest(),
+    "text_key": NO_TEXT,
+    "text_batch_key": NO_TEXT,
+}
+"""Fields of an item whose operations need no model."""
 
 HOLD_JOBS = sa.text("""
     SELECT job.id FROM job JOIN motion ON motion.job_id = job.id
@@ -66,11 +74,13 @@ class NewEdit:
     Attributes:
         motion: to edit.
         ops: operations as in JSON; `with` is the id of another motion.
+        generator: generates frames, for operations that need a model.
         name, comment, priority, keep_days, idempotency_key, body_sha256, traceparent: of the job; see `NewJob`.
     """
 
     motion: UUID
     ops: Sequence[Mapping[str, Any]]
+    generator: EditGenerator | None = None
     tenant: str = DEFAULT_TENANT
     name: str | None = None
     comment: str | None = None
@@ -86,24 +96,26 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
 
     Raises:
         NotFound: the tenant lacks one of the motions.
-        InvalidInput: an operation that is unknown or has another value, or licences that exclude each other.
+        InvalidInput: an operation that is unknown or has another value, licences that exclude each other, or a model
+            that is missing, not used, or cannot generate frames around others.
         TooLarge: too many pieces, frames or characters.
         Conflict: a motion has no npz: its prompt is being erased.
         QuotaUsedUp, IdempotencyMismatch: as `marey.jobs.submit`.
     """
     steps = _read_steps(edit.ops)
-    pieces = pieces_of(steps)
+    check_generator(steps, edit.generator)
     others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
     # An erasure of a source waits, and then finds the edit.
     conn.execute(HOLD_JOBS, {"motions": _sources(edit.motion, steps), "tenant": edit.tenant})
     rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
     for where, motion in others.items():
         rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")
-    _check_sources(rows[edit.motion], [rows[motion] for motion in (edit.motion, *others.values())])
+    _check_sources(rows[edit.motion], [rows[motion] for motion in (edit.motion, *others.values())], edit.generator)
+    pieces = pieces_of(with_prompts(steps, rows[edit.motion]))
     submitted = submit(
         conn,
         NewJob(
-            items=[_item(number, piece, rows, edit.motion) for number, piece in enumerate(pieces)],
+            items=[_item(number, piece, rows, edit) for number, piece in enumerate(pieces)],
             tenant=edit.tenant,
             name=edit.name,
             comment=edit.comment,
@@ -196,8 +208,8 @@ def _other(conn: sa.Connection, tenant: str, motion: UUID, where: str) -> Motion
         raise NotFound(error.message, where=where, hint=error.hint) from None
 
 
-def _check_sources(first: MotionRow, joined: Sequence[MotionRow]) -> None:
-    """Validate the motions of an edit, in the order of the operations.
+def _check_sources(first: MotionRow, joined: Sequence[MotionRow], generator: EditGenerator | None) -> None:
+    """Validate the motions of an edit, in the order of the operations, and the terms of all.
 
     Raises:
         Conflict, TooLarge, InvalidInput: as `submit_edit`.
@@ -213,12 +225,13 @@ def _check_sources(first: MotionRow, joined: Sequence[MotionRow]) -> None:
     if frames > MOST_FRAMES:
         hint = "Trim the motions first."
         raise TooLarge(f"the motions have {frames} frames; the most is {MOST_FRAMES}", where="ops", hint=hint)
-    strictest((row.licence for row in joined), where=f"licence of motion {first.id}")
+    terms = [] if generator is None else [generator.licence]
+    strictest([*(row.licence for row in joined), *terms], where=f"licence of motion {first.id}")
 
 
-def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], motion: UUID) -> NewItem:
+def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], edit: NewEdit) -> NewItem:
     """Return the item of one resulting motion; it has the name, the tags and the seed of the edited one."""
-    source = rows[motion]
+    source = rows[edit.motion]
     prompt = prompt_of(source.prompt, steps, lambda step: rows[UUID(step.values["with"])].prompt)
     if len(prompt) > MOST_CHARACTERS:
         raise TooLarge(
@@ -231,13 +244,9 @@ def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], mo
         name=source.name,
         tags=source.tags,
         index=number,
-        model=EDIT_QUEUE,
-        bundle=EDIT_QUEUE,
-        batch_key=BATCH_KEY,
-        text_key=NO_TEXT,
-        text_batch_key=NO_TEXT,
         seed=source.seed,
-        edits=Edits(tuple(step.as_json() for step in steps), tuple(_sources(motion, steps))),
+        edits=Edits(tuple(step.as_json() for step in steps), tuple(_sources(edit.motion, steps))),
+        **(KINEMATIC if edit.generator is None else edit.generator.columns(steps)),
     )
 
 

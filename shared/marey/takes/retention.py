@@ -31,6 +31,8 @@ from marey.takes.gc import ObjectStore, remove_unused_assets
 from marey.takes.types import Erasure
 
 DIGEST = re.compile(r"[0-9a-f]{64}")
+WORDY = ("sha256", "prompt")
+"""Keys of a record of an edit that hold words, or the digest of a file that held some."""
 ROUND = 200
 """Jobs or files per round."""
 KEPT = (
@@ -54,6 +56,12 @@ FORGET = (
         problem = CASE WHEN problem IS NULL THEN NULL ELSE jsonb_build_object(
             'type', problem -> 'type', 'message', 'erased with the prompt', 'where', NULL, 'hint', NULL) END
     WHERE job_id = :job
+    """,
+    """
+    UPDATE item SET edits = jsonb_set(edits, '{ops}', (
+        SELECT jsonb_agg(op - 'prompt' ORDER BY number)
+        FROM jsonb_array_elements(edits -> 'ops') WITH ORDINALITY AS each(op, number)))
+    WHERE job_id = :job AND edits IS NOT NULL
     """,
     """
     UPDATE motion SET metadata = coalesce(
@@ -243,7 +251,7 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     values = {"job": job.id, "kept": list(KEPT), "without_prompt": without_prompt}
     for statement in FORGET:
         conn.execute(sa.text(statement), {name: value for name, value in values.items() if f":{name}" in statement})
-    _forget_digests(conn, job.id)
+    _forget_records(conn, job.id)
     # A concurrent submit may have seen these features and rely on them: wait for it, then check.
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
     conn.execute(FORGET_TEXTS, {"keys": list(keys)})
@@ -251,25 +259,26 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     record(conn, job, [NewEvent("erased", f"prompts erased by {by}")])
 
 
-def _forget_digests(conn: sa.Connection, job: UUID) -> None:
-    """Remove the digests of sources from the records of edits; each source's file held the prompt."""
+def _forget_records(conn: sa.Connection, job: UUID) -> None:
+    """Remove prompts from the records of edits, and the digests of sources: each source's file held the prompt."""
     motion = job_tables.motion
     for row in conn.execute(EDITED, {"job": job, "key": EDITED_FROM}).all():
-        metadata = sa.func.jsonb_set(motion.c.metadata, [EDITED_FROM], sa.cast(_undigested(row.record), JSONB))
+        metadata = sa.func.jsonb_set(motion.c.metadata, [EDITED_FROM], sa.cast(_without_words(row.record), JSONB))
         conn.execute(sa.update(motion).where(motion.c.id == row.id).values(metadata=metadata))
 
 
-def _undigested(record: Any) -> Any:
-    """Return a record of an edit without SHA-256: the prompt could be guessed from the digest of its file."""
+def _without_words(record: Any) -> Any:
+    """Return a record of an edit without prompts, and without SHA-256: a prompt could be guessed from the digest of its
+    file."""
     if isinstance(record, Mapping):
         values = cast("Mapping[str, Any]", record)
         return {
-            name: _undigested(value)
+            name: _without_words(value)
             for name, value in values.items()
-            if name != "sha256" and not (name == "with" and isinstance(value, str) and DIGEST.fullmatch(value))
+            if name not in WORDY and not (name == "with" and isinstance(value, str) and DIGEST.fullmatch(value))
         }
     if isinstance(record, Sequence) and not isinstance(record, str):
-        return [_undigested(value) for value in cast("Sequence[Any]", record)]
+        return [_without_words(value) for value in cast("Sequence[Any]", record)]
     return record
 
 
@@ -316,7 +325,7 @@ def _without_prompt(exporter: Exporter[Any], data: bytes, where: str) -> bytes:
     clip = exporter.decode(data, where, Coordinates())
     manifest = {name: value for name, value in clip.manifest.items() if name in KEPT}
     if EDITED_FROM in manifest:
-        manifest[EDITED_FROM] = _undigested(manifest[EDITED_FROM])
+        manifest[EDITED_FROM] = _without_words(manifest[EDITED_FROM])
     return exporter.encode(replace(clip, manifest={**manifest, "erased": True}), Coordinates())
 
 

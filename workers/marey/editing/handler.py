@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from uuid import UUID
 
 from marey.editing.judge import judged
 from marey.jobs import EDIT_QUEUE, ClaimedItem, Edits
-from marey.motion.clip import MotionClip, parse_npz
-from marey.motion.edits.editing import EditSource, edit
+from marey.motion.clip import parse_npz
+from marey.motion.edits.editing import EditSource, Model, edit
 from marey.motion.edits.licences import strictest
 from marey.runtime.editing import EditInput
 from marey.runtime.exporting import export_clip
+from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Handler, Outcome
 
 
@@ -43,19 +44,29 @@ class EditHandler:
         assert item.edits is not None  # items of this queue have operations
         assert batch.editing is not None
         began = time.perf_counter()
-        clip = edited(item.edits, batch.editing)
-        licence = strictest(batch.editing.source(source).licence for source in item.edits.sources)
-        yield Done(item.id, partial(export_clip, clip, licence or ""), time.perf_counter() - began)
+        export = edited(item.edits, batch.editing)
+        yield Done(item.id, export, time.perf_counter() - began)
 
 
-def edited(edits: Edits, given: EditInput) -> MotionClip:
-    """Return the result of operations that make one motion, with its quality record."""
+def edited(edits: Edits, given: EditInput, model: Model | None = None) -> Callable[[], Export]:
+    """Apply operations that make one motion, and return the export of the result with its quality record.
+
+    Args:
+        edits: of an item.
+        given: the stored motions.
+        model: generates frames, for operations that need one.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, Unreachable: see `EditHandler.run`.
+    """
 
     def load(name: str) -> EditSource:
         return _read(UUID(name), given)
 
-    (clip,) = edit(_read(edits.sources[0], given), edits.ops, load=load)
-    return judged(clip)
+    (clip,) = edit(_read(edits.sources[0], given), edits.ops, load=load, model=model)
+    terms = [] if model is None else [model.licence]
+    licence = strictest([*(given.source(source).licence for source in edits.sources), *terms])
+    return partial(export_clip, judged(clip), licence or "")
 
 
 def _read(motion: UUID, given: EditInput) -> EditSource:

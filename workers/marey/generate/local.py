@@ -133,10 +133,10 @@ class LocalModel:
             InvalidInput: as `marey.motion.edit`; or the model cannot generate frames around others, or its tokens
                 cannot show those of the clip.
         """
-        from marey.bundles.limits import check_settings
+        from marey.bundles.limits import edit_settings
         from marey.motion.edits.editing import edit
 
-        own = check_settings(self._bundle, settings or {})
+        own = edit_settings(self._bundle, settings or {})
         return edit(clip, ops, model=self._studio.editor(own))
 
     def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:

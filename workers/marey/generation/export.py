@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.metadata import version
 from typing import Any
-
-import torch
 
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
+from marey.generation.software import software_of
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
@@ -53,17 +51,6 @@ def _reading(generator: Generator[S], request: Request) -> dict[str, Any]:
             if lists is None or request.recording
             else {"scope": dict(request.scope or match_scope(text.prompt, lists).as_json())}
         ),
-    }
-
-
-def software_of(generator: Generator[Any]) -> dict[str, Any]:
-    """Return the inputs of equal tokens beside the request: device kind, number type, threads, versions."""
-    return {
-        "marey": version("marey"),
-        "torch": torch.__version__,
-        "device": generator.device.type,
-        "dtype": str(generator.dtype).removeprefix("torch."),
-        "threads": torch.get_num_threads(),
     }
 
 

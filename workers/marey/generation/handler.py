@@ -11,13 +11,16 @@ from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.core.settings import Settings
+from marey.editing.handler import edited
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
 from marey.generation.export import finish
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
 from marey.generation.shots.dispatch import bucket_of, generate_any, resolve_request, timeline_request
+from marey.generation.shots.editor import EditModel
 from marey.items.timeline import timeline_rows
 from marey.jobs import ClaimedItem
+from marey.runtime.editing import EditInput
 from marey.runtime.exporting import export_clip
 from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome
@@ -68,6 +71,8 @@ class GeneratorHandler(Generic[S]):
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
         """Group items by padded length, shortest first: a forward pass holds one bucket."""
+        if batch.editing is not None:
+            return [[item] for item in batch.items]
         self._requests = {}
         buckets: dict[int, list[ClaimedItem]] = defaultdict(list)
         for item in batch.items:
@@ -82,6 +87,9 @@ class GeneratorHandler(Generic[S]):
 
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
         """Generate one bucket; decoding to joints, clean-up and files are left to the exports."""
+        if batch.editing is not None:
+            yield from self._edited(batch, batch.editing, control)
+            return
         started = time.monotonic()
         items: list[ClaimedItem] = []
         requests: list[Request] = []
@@ -99,6 +107,21 @@ class GeneratorHandler(Generic[S]):
         for item, export in zip(items, exports, strict=True):
             if export is not None:
                 yield Done(item.id, export, elapsed)
+
+    def _edited(self, batch: Batch, given: EditInput, control: BatchControl) -> Iterator[Outcome]:
+        """Edit a stored motion with frames of the model."""
+        (item,) = batch.items
+        assert item.edits is not None  # all items of a claim are edits, or none is
+        started = time.monotonic()
+        texts = {text.prompt: text for text in SeveralTexts.of_blob(batch.features[item.text_key])}
+        model = EditModel.of(self.generator, item.settings, texts.__getitem__, control=_Rows([item], control))
+        try:
+            export = edited(item.edits, given, model)
+        except MareyError as error:
+            if item.id not in control.dropped():
+                yield Failed(item.id, error)
+            return
+        yield Done(item.id, export, time.monotonic() - started)
 
     def _exports(
         self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl

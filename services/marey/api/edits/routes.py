@@ -10,13 +10,15 @@ from fastapi import APIRouter, Response
 from marey import db, jobs, takes
 from marey.api.audit import note
 from marey.api.auth import Submitter
-from marey.api.context import Connection, deadline
+from marey.api.context import Connection, Context, Shared, deadline
 from marey.api.edits.schemas import NewEditBody
 from marey.api.jobs.schemas import JobView
 from marey.api.takes.schemas import MotionView
 from marey.core import tracing
+from marey.core.errors import InvalidInput, NotFound
 from marey.http.problems import RESPONSES
 from marey.http.schemas import IdempotencyKey
+from marey.motion.edits.steps import read_steps
 from marey.runtime.logs import logger
 
 log = logger(__name__)
@@ -32,19 +34,23 @@ def edit_motion(
     conn: Connection,
     response: Response,
     key: Submitter,
+    shared: Shared,
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
-    """Edit a motion: cut, join, loop, mirror, retime or smooth it. The motion itself does not change.
+    """Edit a motion: cut, join, loop, mirror, retime or smooth it, or let a model generate frames of it. The motion
+    itself does not change.
 
     The job has an item for each resulting motion, with the name, the tags and the seed of the edited one.
     """
     new = takes.NewEdit(
         motion,
+        body.ops,
+        generator=_generator(body, shared),
         tenant=key.tenant,
         idempotency_key=idempotency_key,
         body_sha256=_sha256(motion, body) if idempotency_key else None,
         traceparent=tracing.current(),
-        **body.model_dump(),
+        **body.model_dump(exclude={"ops", "model", "settings"}),
     )
     submitted = takes.submit_edit(conn, new)
     row = jobs.get_job(conn, key.tenant, submitted.id)
@@ -66,6 +72,16 @@ def revert_motion(motion: UUID, conn: Connection, key: Submitter) -> MotionView:
     source = takes.revert(conn, key.tenant, motion, by=key.name)
     note(conn, key, "motion.revert", motion, source=str(source.id))
     return MotionView.of(source)
+
+
+def _generator(body: NewEditBody, shared: Context) -> takes.EditGenerator | None:
+    """Return the bundle that generates frames; None if no operation needs one and none is named."""
+    if body.model is None and not takes.needs_model(read_steps(body.ops)):
+        return None
+    try:
+        return takes.EditGenerator(shared.catalogue.capabilities(body.model), body.settings)
+    except NotFound as error:
+        raise InvalidInput(error.message, where="model", hint=error.hint) from error
 
 
 def _sha256(motion: UUID, body: NewEditBody) -> str:

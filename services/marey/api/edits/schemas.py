@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, WithJsonSchema
 
 from marey.api.jobs.schemas import CommonJobFields
+from marey.http.fields import ITEM_MODEL, SAMPLING
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
 
@@ -30,9 +31,18 @@ EditOperation = Annotated[dict[str, Any], WithJsonSchema(dict(_schema()))]
 class NewEditBody(CommonJobFields):
     """Operations on a motion, as a job."""
 
+    model: str | None = Field(
+        None,
+        json_schema_extra=ITEM_MODEL,
+        description="Model, bundle or exact bundle that generates frames, for operations that need one; default: the "
+        "server's.",
+    )
+    settings: dict[str, float] = Field(
+        default_factory=dict[str, float], description="Of sampling, for the model.", json_schema_extra=SAMPLING
+    )
     ops: list[EditOperation] = Field(
         min_length=1,
         max_length=MOST,
-        description="Operations, applied in their order; `with` of `concat` is the id of another motion. Each `split` "
-        "makes two motions of one.",
+        description="Operations, applied in their order; `with` is the id of another motion. Each `split` makes "
+        "two motions of one.",
     )

@@ -118,6 +118,9 @@ def edit(
     context: typer.Context,
     motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
     ops: Ops = None,
+    model: options.Model = None,
+    bundle: options.Bundle = None,
+    sampling: options.Sampling = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
     priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
     keep_days: Annotated[
@@ -133,7 +136,8 @@ def edit(
     as_json: console.Json = False,
     **operations: Any,
 ) -> None:
-    """Edit a motion on the server: cut, join, loop, mirror, retime or smooth it; prints the ids of the new motions.
+    """Edit a motion on the server: cut, join, loop, mirror, retime or smooth it, or let a model generate frames of it;
+    prints the ids of the new motions.
 
     The motion itself does not change. Operations apply in the order in which they are given; others to join are motions
     of the server.
@@ -146,7 +150,10 @@ def edit(
     with Client() as client:
         steps = [_with_id(client, step.as_json()) for step in given]
         found = find(client, "motion", motion).id
-        job = client.edit(found, steps, name=name, priority=priority, keep_days=keep_days)
+        settings = options.settings_of(sampling or ()) or None
+        job = client.edit(
+            found, steps, model=bundle or model, settings=settings, name=name, priority=priority, keep_days=keep_days
+        )
         if not wait:
             _show(job.raw, as_json)
             return

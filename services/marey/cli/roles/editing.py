@@ -85,14 +85,14 @@ def model_for(ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Ma
         return None
     try:
         from marey.bundles import choose_bundle
-        from marey.bundles.limits import check_settings
+        from marey.bundles.limits import edit_settings
         from marey.core.settings import settings as settings_of_process
         from marey.generate.oneshot import OneShot
     except ImportError as error:
         raise needs_extra("worker", error) from error
     config = settings_of_process()
     chosen = choose_bundle(bundle or config.default_model, config=config)
-    return OneShot(chosen, config).editor(check_settings(chosen, settings))
+    return OneShot(chosen, config).editor(edit_settings(chosen, settings))
 
 
 def loop(clip: MotionClip, where: str) -> MotionClip:

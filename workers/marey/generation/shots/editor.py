@@ -10,10 +10,10 @@ from typing import Any, cast
 import numpy as np
 
 from marey.core.errors import InvalidInput
-from marey.generation.export import software_of
 from marey.generation.port import GenerationControl, Generator, KeepingGenerator, Request
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, Gap, Window, crossfaded, fill, most_frames, no_text
+from marey.generation.software import software_of
 from marey.items.item import MAX_SEED
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
@@ -24,6 +24,9 @@ from marey.text.features import TextFeatures
 PROMPTED_CONTEXT = 4
 """Frames that the model reads on a side where it also reads a prompt; with more it follows the prompt less
 (docs/decisions/0037-edits-by-a-model.md)."""
+
+
+CANCELLED = "the edit was cancelled"
 
 
 @dataclass
@@ -46,7 +49,12 @@ class EditModel:
 
     @classmethod
     def of(
-        cls, generator: Generator[Any], settings: Mapping[str, Any], read: Callable[[str], TextFeatures]
+        cls,
+        generator: Generator[Any],
+        settings: Mapping[str, Any],
+        read: Callable[[str], TextFeatures],
+        *,
+        control: GenerationControl | None = None,
     ) -> EditModel:
         """Use a loaded generator for edits.
 
@@ -59,7 +67,7 @@ class EditModel:
                 where="model",
                 hint="Use a bundle of hgm3 or momaskpp.",
             )
-        return cls(cast("KeepingGenerator[Any]", generator), generator.settings(settings), read)
+        return cls(cast("KeepingGenerator[Any]", generator), generator.settings(settings), read, control)
 
     @property
     def licence(self) -> str:
@@ -87,8 +95,10 @@ class EditModel:
         """
         limits = self.generator.limits
         count = max(limits.min_frames, math.ceil((frames - 1) / fps * limits.fps) + 2)
-        (made,) = self.generator.generate([Request(self.read(prompt), seed, count)], self.settings)
-        assert made is not None  # without control nothing is dropped
+        request = Request(self.read(prompt), seed, count)
+        (made,) = self.generator.generate([request], self.settings, control=self.control)
+        if made is None:
+            raise InvalidInput(CANCELLED)
         return part(self._clip(made.features, fps, body), 0, frames - 1)
 
     def between(
@@ -173,7 +183,7 @@ class EditModel:
     def _window(self, gap: Gap) -> Window:
         (window,) = fill(self.generator, [gap], self.settings, control=self.control)
         if window is None:
-            raise InvalidInput("the edit was cancelled")
+            raise InvalidInput(CANCELLED)
         return window
 
     def _clip(self, features: Float32, fps: float, body: MotionClip) -> MotionClip:
