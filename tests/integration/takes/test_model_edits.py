@@ -183,4 +183,4 @@ def test_the_command_names_the_bundle_and_the_prompt(marey: Command, api: LiveAp
         (item,) = client.pages(f"/v1/jobs/{ran.out.strip()}/items")
     assert item["settings"] == {"temperature": 0.7}
     assert item["edits"]["ops"][0]["seed"] == 3
-    assert item["motion"]["frames"] == source["frames"]
+    assert item["motion"]["frames"] == clip_of(api, source["id"]).frames

@@ -168,6 +168,13 @@ def test_a_part_of_the_body_moves_and_the_others_stay(model: EditModel, clip: Mo
     assert np.abs(arm.joints[50:70][:, left] - clip.joints[50:70][:, left]).max() > 0.01
 
 
+def test_a_part_moves_in_a_motion_longer_than_a_window(model: EditModel, clip: MotionClip) -> None:
+    long = one(model, clip, {"op": "extend", "seconds": 10})
+    changed = one(model, long, {"op": "body-part", "part": "arms", "prompt": "a person waves"})
+    assert changed.frames == 320
+    assert np.abs(changed.joints[-40:] - long.joints[-40:]).max() > 0.001
+
+
 def test_parts_are_found_by_the_tree() -> None:
     names = {
         part: [HUMANML3D.joint_names[joint] for joint in edits.joints_of(HUMANML3D, part)]

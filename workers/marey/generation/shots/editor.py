@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from marey.core.errors import InvalidInput
-from marey.generation.port import GenerationControl, Generator, KeepingGenerator, Request
+from marey.generation.port import GenerationControl, Generator, KeepingGenerator
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, Gap, Window, crossfaded, fill, most_frames, no_text
 from marey.generation.software import software_of
@@ -88,18 +88,11 @@ class EditModel:
         }
 
     def generate(self, prompt: str, seed: int, frames: int, fps: float, body: MotionClip) -> MotionClip:
-        """Generate a motion of a prompt alone, on the body of a clip: `frames` frames at `fps`.
-
-        Raises:
-            InvalidInput: a length out of the bundle's range.
-        """
-        limits = self.generator.limits
-        count = max(limits.min_frames, math.ceil((frames - 1) / fps * limits.fps) + 2)
-        request = Request(self.read(prompt), seed, count)
-        (made,) = self.generator.generate([request], self.settings, control=self.control)
-        if made is None:
-            raise InvalidInput(CANCELLED)
-        return part(self._clip(made.features, fps, body), 0, frames - 1)
+        """Generate a motion of a prompt alone, on the body of a clip: `frames` frames at `fps`."""
+        rate = self.generator.layout.fps
+        count = math.ceil((frames - 1) / fps * rate) + 1
+        nothing = np.zeros((count, self.generator.layout.dim), np.float32)
+        return part(self._clip(self._continued(nothing, 0, count, prompt, seed), fps, body), 0, frames - 1)
 
     def between(
         self,
