@@ -10,7 +10,7 @@ from uuid import UUID
 from marey.editing.judge import judged
 from marey.jobs import EDIT_QUEUE, ClaimedItem, Edits
 from marey.motion.clip import parse_npz
-from marey.motion.edits.editing import EditSource, Model, edit
+from marey.motion.edits.editing import EditSource, FrameModel, edit
 from marey.motion.edits.licences import strictest
 from marey.runtime.editing import EditInput
 from marey.runtime.exporting import export_clip
@@ -48,7 +48,7 @@ class EditHandler:
         yield Done(item.id, export, time.perf_counter() - began)
 
 
-def edited(edits: Edits, given: EditInput, model: Model | None = None) -> Callable[[], Export]:
+def edited(edits: Edits, given: EditInput, model: FrameModel | None = None) -> Callable[[], Export]:
     """Apply operations that make one motion, and return the export of the result with its quality record.
 
     Args:

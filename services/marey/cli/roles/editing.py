@@ -14,7 +14,7 @@ from marey.motion.export_options import ExportOptions
 if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
-    from marey.motion.edits.editing import EditSource, Model
+    from marey.motion.edits.editing import EditSource, FrameModel
 
 
 def edit_files(
@@ -22,7 +22,7 @@ def edit_files(
     output: Path,
     ops: Sequence[Mapping[str, Any]],
     *,
-    model: Model | None = None,
+    model: FrameModel | None = None,
     file_format: str,
     export: ExportOptions,
     overwrite: bool,
@@ -67,7 +67,7 @@ def edit_files(
         yield _line(source, path, clip)
 
 
-def model_for(ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Mapping[str, float]) -> Model | None:
+def model_for(ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Mapping[str, float]) -> FrameModel | None:
     """Load the model of operations; None if they need none.
 
     Args:

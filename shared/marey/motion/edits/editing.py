@@ -49,7 +49,7 @@ class EditSource:
 Load = Callable[[str], "MotionClip | EditSource"]
 
 
-class Model(Protocol):
+class FrameModel(Protocol):
     """A model that generates frames for operations (`marey.generation.shots.editor.EditModel`)."""
 
     @property
@@ -67,7 +67,7 @@ def edit(
     ops: Sequence[Mapping[str, Any]],
     *,
     load: Load = load_npz,
-    model: Model | None = None,
+    model: FrameModel | None = None,
 ) -> tuple[MotionClip, ...]:
     """Apply operations in their order; the clip itself does not change.
 
@@ -111,7 +111,7 @@ def _loaded(named: Any, load: Load) -> EditSource:
 
 
 def _apply(
-    source: EditSource, steps: Sequence[Step], other: Callable[[Step], EditSource], model: Model | None
+    source: EditSource, steps: Sequence[Step], other: Callable[[Step], EditSource], model: FrameModel | None
 ) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
@@ -133,7 +133,7 @@ def _apply(
     )  # without features
 
 
-def _run(step: Step, clip: MotionClip, values: Mapping[str, Any], model: Model | None) -> MotionClip:
+def _run(step: Step, clip: MotionClip, values: Mapping[str, Any], model: FrameModel | None) -> MotionClip:
     if step.operation.needs_model and model is None:
         raise InvalidInput(
             f"{step.operation.name} generates frames, and no model is given", where=step.where, argument="model"
