@@ -15,6 +15,7 @@ from typing import Any
 from marey.client.csv_cells import join_tags, restore, write_csv
 from marey.core.errors import Conflict, InvalidInput
 from marey.exporters import extension_of
+from marey.items.timeline import timeline_text
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"
@@ -29,13 +30,15 @@ RAW_COLUMNS = (
 COLUMNS = (*RAW_COLUMNS, "seconds", "quality")
 """Of the file, whose cells are those of `csv_cells`. `npz` and `bvh` are paths of files from its folder; `comment` is
 the review's; `seconds` is the length that was asked for; `quality` is `ok` or what is wrong with the motion. Other
-formats have columns behind these: `OTHER`."""
+formats have columns behind these: `OTHER`; then comes `TIMELINE`."""
 NUMBERS = frozenset({"index", "seed", "variant", "frames", "fps", "seconds"})
 Row = dict[str, str]
 FORMATS = ("npz", "bvh")
 """Formats that always have a column."""
 OTHER = re.compile(r"file:([a-z0-9]{1,16})")
 """The column of another format, where there is such a file."""
+TIMELINE = "timeline"
+"""The column of timelines, where there is one."""
 
 
 def check_manifest(folder: Path, *, overwrite: bool) -> None:
@@ -68,7 +71,9 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         "item": item["id"],
         "job": item["job"],
     }
-    return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(paths))}
+    if item.get("timeline"):
+        values[TIMELINE] = timeline_text(item["timeline"])
+    return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(values))}
 
 
 def _quality(motion: Mapping[str, Any]) -> str | None:
@@ -144,19 +149,20 @@ def _known(path: Path, *, overwrite: bool) -> list[Row]:
 
 def _files(row: Row) -> list[str]:
     """Return the names of a line's files; names that are not plain are skipped, because the line may be forged."""
-    columns = (*FORMATS, *_others(row))
+    columns = (*FORMATS, *(name for name in _others(row) if name != TIMELINE))
     names = ((row[column], f".{extension_of(column.removeprefix('file:'))}") for column in columns)
     return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
 
 
 def is_column(name: str) -> bool:
     """Return True if a manifest may have this column."""
-    return name in COLUMNS or OTHER.fullmatch(name) is not None
+    return name in (*COLUMNS, TIMELINE) or OTHER.fullmatch(name) is not None
 
 
 def _others(names: Iterable[str]) -> list[str]:
-    """Columns among these of formats other than `FORMATS`, in alphabetical order."""
-    return sorted(name for name in set(names) if OTHER.fullmatch(name))
+    """Columns among these of formats other than `FORMATS`, in alphabetical order, and that of timelines."""
+    found = set(names)
+    return [*sorted(name for name in found if OTHER.fullmatch(name)), *sorted(found & {TIMELINE})]
 
 
 def _is_file(folder: Path, name: str) -> bool:

@@ -158,8 +158,8 @@ def _row(header: Header, cells: list[str]) -> object:
             tags = [*(tag for tag in header.tags(header.text(cell)) if tag), *tags]
         elif column.field is not None and (column.field == "prompt" or not is_blank(cell)):
             row[column.field] = _value(column.field, header.text(cell))
-    if "timeline" in row and is_blank(str(row.get("prompt", ""))):
-        row.pop("prompt", None)
+    if "timeline" in row and (is_blank(str(row.get("prompt", ""))) or row.get("prompt") == row["timeline"]):
+        row.pop("prompt", None)  # a manifest of fetched motions has the text form as the prompt, too
     return {**row, "tags": tags} if tags else row
 
 

@@ -12,10 +12,12 @@ import pytest
 
 from marey.bundles import BundleWriter, TextSpec
 from marey.core.errors import InvalidBundle
+from marey.items.timeline import read_timeline, timeline_text
 from marey.jobs import Claim, ClaimedItem, ItemStage
 from marey.runtime.handler import Batch, Failed, Outcome, TextDone
 from marey.text.features import TextFeatures
 from marey.text.keys import feature_key, resolve, scope_key
+from marey.text.several import SeveralTexts, several_key
 from marey.text_service.handler import TextHandler, create_handler
 from marey.vocabulary.scope import ActionLists, ScopePolicy
 
@@ -108,6 +110,32 @@ def test_items_dropped_on_the_way_are_left_out(handler: TextHandler) -> None:
     assert [o.item for o in running] == [claimed[2].id]  # type: ignore[attr-defined]
 
 
+def timeline(*prompts: str, **changes: object) -> tuple[ClaimedItem, ...]:
+    """An item of these prompts, two seconds each."""
+    rows = read_timeline([{"start": 2 * n, "end": 2 * n + 2, "prompt": text} for n, text in enumerate(prompts)])
+    (item,) = items(timeline_text(rows), key=several_key(feature_key(text, resolve(TextSpec())) for text in prompts))
+    return (replace(item, timeline=rows, **changes),)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_rows_of_a_timeline_are_read_one_by_one(handler: TextHandler) -> None:
+    claimed = (*timeline("a person walks", "a person bows"), *items("someone kicks"))
+    first, second = handler.run(batch(claimed), FakeControl())
+    assert isinstance(first, TextDone)
+    assert isinstance(second, TextDone)
+    assert first.key == claimed[0].text_key
+    texts = SeveralTexts.of_blob(first.blob)
+    assert [text.prompt for text in texts] == ["a person walks", "a person bows"]
+    (alone,) = handler.run(batch(items("a person bows")), FakeControl())
+    assert isinstance(alone, TextDone)
+    assert texts[1].to_blob() == alone.blob
+    assert SeveralTexts.from_blob(second.blob) is None
+
+
+def test_a_timeline_taken_with_other_weights_is_refused(handler: TextHandler) -> None:
+    (failed,) = handler.run(batch(timeline("a person walks", text_key="0" * 64)), FakeControl())
+    assert isinstance(failed, Failed)
+
+
 def test_a_claim_is_one_bucket(handler: TextHandler) -> None:
     claimed = items("a person walks", "someone bows")
     assert handler.buckets(batch(claimed)) == [claimed]
@@ -136,9 +164,13 @@ def listed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def judge(bundle: str, policy: ScopePolicy, *prompts: str) -> list[Outcome]:
+    return judge_items(bundle, policy, items(*prompts))
+
+
+def judge_items(bundle: str, policy: ScopePolicy, asked: tuple[ClaimedItem, ...]) -> list[Outcome]:
     made = create_handler()
     made.load(bundle)
-    claimed = tuple(replace(item, bundle=bundle) for item in items(*prompts))
+    claimed = tuple(replace(item, bundle=bundle) for item in asked)
     claim = Claim(
         uuid4(), "default", uuid4(), "text", ItemStage.TEXT, "key", bundle, solo=False, items=claimed, scope=policy
     )
@@ -176,6 +208,24 @@ def test_refuse_fails_what_the_encoder_finds_unknown_for_good(listed: str) -> No
     assert failed.problem.message == f"the prompt {named}"
     assert failed.problem.hint == "listed knows: walk, bow, wave."
     assert isinstance(done, TextDone)
+
+
+def test_the_rows_of_a_timeline_are_judged_one_by_one(listed: str) -> None:
+    rows = ("a person walks", "a wave of nausea")
+    (done,) = judge_items(listed, "warn", timeline(*rows))
+    assert isinstance(done, TextDone)
+    assert done.scope is not None
+    assert (done.scope.scope["verdict"], done.scope.scope["by"]) == ("unknown", "encoder")
+    assert [row["verdict"] for row in done.scope.scope["rows"]] == ["known", "unknown"]
+    text = "0-2 a person walks; 2-4 a wave of nausea"
+    assert done.scope.key == scope_key(text, listed, LISTS, in_rows=True) != scope_key(text, listed, LISTS)
+    (failed,) = judge_items(listed, "refuse", timeline(*rows))
+    assert isinstance(failed, Failed)
+    named = "names an action that the model does not know: 'a wave of nausea' (no-action)"
+    assert failed.problem.message == f"row 2 (2-4) {named}"
+    (clear,) = judge_items(listed, "warn", timeline("a person walks", "a person walks"))
+    assert isinstance(clear, TextDone)
+    assert clear.scope is None
 
 
 def test_prompts_that_are_not_examined_and_bundles_without_lists_get_no_verdict(listed: str, bundle: str) -> None:

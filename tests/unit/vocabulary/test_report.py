@@ -1,7 +1,9 @@
 """Report on the scope of many prompts."""
 
+from dataclasses import replace
+
 from marey.vocabulary.report import MAX_EXAMPLES, MAX_NAMED, MAX_SHOWN, ScopeReport, refusal, says_known, warn_of
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import ActionLists, match_scope, read_scope
 
 LISTS = ActionLists(supported=("walk", "run", "walk-backward"), tried=("kick",))
 
@@ -77,3 +79,18 @@ def test_a_refusal_quotes_what_is_unknown() -> None:
         "names an action that the model does not know: 'the dog barks' (objects, other-subject)"
     )
     assert refusal(match_scope("he kicks, then sprints", LISTS)) is None
+
+
+def test_a_timeline_is_counted_once_and_the_row_is_named() -> None:
+    report = ScopeReport()
+    rows = [("row 1 (0-3)", "a person walks"), ("row 2 (3-5)", "he juggles"), ("row 3 (5-9)", "kicks twice")]
+    scope = report.judge("0-3 a person walks; …", "tiny", LISTS, lengths=(1.0, 9.8), rows=rows)
+    assert scope is not None
+    assert (scope.verdict, [row.verdict for row in scope.rows]) == ("unknown", ["known", "unknown", "tried"])
+    assert read_scope(scope.as_json()).rows == tuple(replace(row, left=None) for row in scope.rows)
+    report.judge("he kicks", "tiny", LISTS)
+    counts = report.as_json()
+    assert (counts["unknown"], counts["tried"], counts["known"]) == (1, 1, 0)
+    first, *_ = report.warnings()
+    assert first.startswith("1 of 2 prompts, first number 1, 'row 2 (3-5): he juggles'")
+    assert [(each["index"], each["kind"]) for each in counts["examples"]] == [(0, "unknown"), (1, "tried")]

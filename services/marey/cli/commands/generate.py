@@ -22,6 +22,8 @@ from marey.motion.export_options import PLAIN, ExportOptions
 
 OFF_PROMPT = "off-prompt"
 """The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
+SHOWN = 0.5
+"""The match from which on a row of a timeline shows its prompt."""
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -111,7 +113,7 @@ def generate(
             line = _write(plan, result, elapsed, chosen, export, overwrite=overwrite)
             bar.advance(task)
             _report_rewrite(clip)
-            _report_quality(line)
+            _report_quality(line, clip)
             if as_json:
                 console.result_json(line)
             else:
@@ -135,7 +137,7 @@ def _report_rewrite(clip: MotionClip) -> None:
         console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
 
 
-def _report_quality(line: dict[str, Any]) -> None:
+def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
     quality = line["quality"]
     if quality is None:
         return
@@ -143,7 +145,13 @@ def _report_quality(line: dict[str, Any]) -> None:
     if faults := [flag for flag in quality["flags"] if flag != OFF_PROMPT]:
         console.say(f"{about}: the motion is {', '.join(faults)}.")
     if OFF_PROMPT in quality["flags"]:
-        console.say(f"{about}: the motion does not show the prompt (match {quality['match']['value']:g}).")
+        rows: list[dict[str, Any]] = clip.manifest.get("timeline", {}).get("rows", [])
+        missed = [row for row in rows if row["match"] is not None and row["match"] < SHOWN]
+        for row in missed:
+            times = f"{row['start']:g}-{row['end']:g}"
+            console.say(f"{about}: {times} s does not show {row['prompt']!r} (match {row['match']:g}).")
+        if not missed:
+            console.say(f"{about}: the motion does not show the prompt (match {quality['match']['value']:g}).")
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:

@@ -16,7 +16,7 @@ from marey.motion.resample import resample
 
 SAME_BONES = 1e-4
 """Metres."""
-READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope")
+READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope", "timeline")
 """Keys of a manifest that say how its prompt was read."""
 
 
