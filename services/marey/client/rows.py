@@ -133,7 +133,7 @@ def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Pr
 
 def _stand_in(values: Mapping[str, Any]) -> Item:
     """An item with the fields that depend on its model."""
-    own = {name: values[name] for name in ("model", "seconds", "settings", "variety") if name in values}
+    own = {name: values[name] for name in ("model", "seconds", "settings", "variety", "timeline") if name in values}
     return Item(prompt=values.get("prompt", STAND_IN), **own)
 
 

@@ -57,7 +57,7 @@ class SeveralTexts:
             return None
         try:
             if arrays[ENTRY].dtype != np.uint8 or arrays[ENTRY].ndim != 1:
-                raise ValueError("it is no list of bytes")
+                raise ValueError("it holds other than bytes")
             texts = tuple(TextFeatures.from_blob(part) for part in _parts(arrays[ENTRY].tobytes()))
             if not texts:
                 raise ValueError("it holds no prompt")

@@ -59,7 +59,7 @@ def asked_of(generator: Any, text: str, seed: int = 0) -> Request:
     return resolve_request(generator, asked(text, seed, generator.limits.text_width))
 
 
-class Control:
+class FakeControl:
     """Keeps the reported progress, and drops requests once so much is done."""
 
     def __init__(self, *dropped: int, after: float = 0.0) -> None:
@@ -164,7 +164,7 @@ def test_the_seed_decides(generator: Any) -> None:
 
 
 def test_progress_grows_to_the_end(generator: Any) -> None:
-    control = Control()
+    control = FakeControl()
     generate_any(generator, [asked_of(generator, WALK), asked_of(generator, "0-25 walk; 25-28 wave")], control=control)
     assert control.shares == sorted(control.shares)
     assert control.shares[-1] == 1.0
@@ -173,7 +173,7 @@ def test_progress_grows_to_the_end(generator: Any) -> None:
 @pytest.mark.parametrize("after", [0.0, 0.5, 0.9])
 def test_a_dropped_timeline_is_left_out_and_others_stay(generator: Any, after: float) -> None:
     ask = [asked_of(generator, WALK, seed) for seed in range(3)]
-    made = generate_timelines(generator, ask, control=Control(1, after=after))
+    made = generate_timelines(generator, ask, control=FakeControl(1, after=after))
     assert [each is None for each in made] == [False, True, False]
     (alone,) = generate_timelines(generator, ask[2:])
     assert alone is not None

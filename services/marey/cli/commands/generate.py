@@ -168,6 +168,8 @@ def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None
         if reader.total:
             raise reader.error() from None
         raise needs_extra("worker", error) from error
+    if not items:
+        raise reader.error()
     config = settings()
     try:
         chosen = choose_bundle(bundle or _one_model(items, config.default_model), config=config)

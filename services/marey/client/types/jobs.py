@@ -188,7 +188,7 @@ class JobItem(Result):
     timeline: tuple[Mapping[str, Any], ...] | None = None
     """Prompts at stated times, of which `prompt` is the text form; None if there is one prompt."""
     constraints: tuple[Mapping[str, Any], ...] | None = None
-    """What the motion keeps to; None = nothing."""
+    """Demands on the motion; None = none."""
     motion: Motion | None = None
 
 

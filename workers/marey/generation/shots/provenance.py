@@ -1,4 +1,4 @@
-"""What the manifest of a timeline says of its rows and transitions."""
+"""Provenance of timelines: the part of the manifest about rows and transitions."""
 
 from __future__ import annotations
 

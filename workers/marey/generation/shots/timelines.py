@@ -23,7 +23,7 @@ from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.text.features import TextFeatures
 
-CUT = 16
+CUT = 8
 """Most frames of a row that the transition to it replaces. All are at its beginning: an action shows at its end that it
 was done (a seat is reached, stairs are climbed), and replacing frames there costs adherence."""
 CUT_SHARE = 4
@@ -38,7 +38,7 @@ class TimelineMotion:
 
 
 @dataclass(frozen=True)
-class Part:
+class TimelinePart:
     """Frames of a timeline with one origin: a row, or the transition between two rows.
 
     Attributes:
@@ -61,8 +61,8 @@ class Part:
 class TimelinePlan:
     """Frames of the rows and transitions of a timeline."""
 
-    rows: tuple[Part, ...]
-    transitions: tuple[Part, ...]
+    rows: tuple[TimelinePart, ...]
+    transitions: tuple[TimelinePart, ...]
 
     @property
     def frames(self) -> int:
@@ -73,7 +73,7 @@ class TimelinePlan:
 def plan_timeline(timeline: Sequence[TimedText], seed: int, limits: Limits) -> TimelinePlan:
     """Return the frames of the rows and transitions of a timeline."""
     times = [(round(row.start * limits.fps), round(row.end * limits.fps)) for row in timeline]
-    rows = tuple(Part(*time, part_seed(seed, "row", number)) for number, time in enumerate(times))
+    rows = tuple(TimelinePart(*time, part_seed(seed, "row", number)) for number, time in enumerate(times))
     transitions = tuple(
         _transition(before, after, part_seed(seed, "transition", number), limits.keeps)
         for number, (before, after) in enumerate(pairwise(rows))
@@ -91,10 +91,10 @@ def check_timelines(generator: Generator[Any]) -> None:
         raise InvalidInput(no_timelines(generator.bundle.manifest.model), where="timeline", hint=TIMELINE_HINT)
 
 
-def _transition(before: Part, after: Part, seed: int, grid: int) -> Part:
+def _transition(before: TimelinePart, after: TimelinePart, seed: int, grid: int) -> TimelinePart:
     """Return the frames that are generated without a prompt between two rows: a gap, and the beginning of the row after
     it, if the gap is shorter than that."""
-    return Part(before.end, max(after.start, before.end + cut_of(after.frames, grid)), seed)
+    return TimelinePart(before.end, max(after.start, before.end + cut_of(after.frames, grid)), seed)
 
 
 def cut_of(frames: int, grid: int) -> int:
@@ -131,7 +131,7 @@ class _Strand:
         windows: those that are made.
     """
 
-    def __init__(self, timeline: _Timeline, part: Part, text: TextFeatures, most: tuple[int, int]) -> None:
+    def __init__(self, timeline: _Timeline, part: TimelinePart, text: TextFeatures, most: tuple[int, int]) -> None:
         """`most`: frames of a part that is one window, and of each window of a longer one."""
         self.timeline = timeline
         self.part = part
@@ -159,7 +159,7 @@ class _Strand:
 class _Row(_Strand):
     """A row: its first window is a motion of the prompt, those after it continue it."""
 
-    def __init__(self, timeline: _Timeline, part: Part, text: TextFeatures, limits: Limits) -> None:
+    def __init__(self, timeline: _Timeline, part: TimelinePart, text: TextFeatures, limits: Limits) -> None:
         super().__init__(timeline, part, text, (limits.max_frames, limits.max_frames - CONTEXT))
         self.features: Float32 | None = None
 
