@@ -154,6 +154,25 @@ def test_a_timeline_does_not_depend_on_its_batch(generator: Any) -> None:
         np.testing.assert_array_equal(there.features, alone.features)
 
 
+def test_transitions_read_no_prompt_and_long_rows_go_on_with_theirs(
+    generator: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    passes: list[Sequence[Request]] = []
+    generate = generator.generate
+
+    def watched(requests: Sequence[Request], *given: Any, **named: Any) -> Any:
+        passes.append(requests)
+        return generate(requests, *given, **named)
+
+    monkeypatch.setattr(generator, "generate", watched)
+    generate_timelines(generator, [asked_of(generator, "0-11 run; 11-14 kick")])
+    alone, following, between = passes
+    assert [(each.text.prompt, each.kept, each.free) for each in alone] == [("run", (), False), ("kick", (), False)]
+    assert [(each.text.prompt, len(each.kept), each.free) for each in following] == [("run", 1, False)]
+    assert [(len(each.kept), each.free) for each in between] == [(2, True)]
+    assert between[0].kept[1].start - between[0].kept[0].end == 8
+
+
 def test_the_seed_decides(generator: Any) -> None:
     first, again, other = (generate_timelines(generator, [asked_of(generator, WALK, seed)])[0] for seed in (1, 1, 2))
     assert first is not None
