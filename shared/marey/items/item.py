@@ -263,7 +263,8 @@ def read_fields(
         try:
             values[name] = check(given[name])
         except InvalidInput as error:
-            problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
+            where = error.where if error.where and error.where.startswith(f"{name}.") else name
+            problems.append(Problem(line, where, f"{error.message}. {error.hint}" if error.hint else error.message))
     if given.get("prompt") is None and (given.get("timeline") is None or "timeline" not in checks):
         problems.append(Problem(line, "prompt", "is missing: say what the person does"))
     return values, problems

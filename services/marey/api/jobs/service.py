@@ -16,6 +16,7 @@ from marey.api.jobs.schemas import JobFields
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
+from marey.items.constraints import check_poses
 from marey.items.item import InvalidItems, Item, Problem, read_item, read_items, read_json
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
@@ -167,6 +168,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             ("settings", generator.check_settings),
             ("variety", generator.check_variety),
             ("timeline", generator.check_timeline),
+            ("constraints", check_poses),
         )
         for field, hold in checks:
             try:
@@ -188,7 +190,8 @@ def _problem(error: MareyError, line: int | None, field: str) -> Problem:
     """Describe the problem with a field of a line; faults of this server are raised."""
     if error.status >= 500:
         raise error
-    return Problem(line, field, f"{error.message}. {error.hint}" if error.hint else error.message)
+    place = error.where if error.where and error.where.startswith(f"{field}.") else field
+    return Problem(line, place, f"{error.message}. {error.hint}" if error.hint else error.message)
 
 
 def job_fields(values: Mapping[str, Any]) -> JobFields:
