@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from marey.quality.constraints import ConstraintError
 from marey.vocabulary.entries import Support
 
 VERSION = 1
@@ -29,6 +30,7 @@ class Flag(StrEnum):
     JOINT_RANGE = "joint-range"
     SELF_CONTACT = "self-contact"
     OFF_PROMPT = "off-prompt"
+    CONSTRAINT_MISSED = "constraint-missed"
 
 
 class PromptMatch(BaseModel):
@@ -63,9 +65,15 @@ class MotionQuality(BaseModel):
     pops: int = Field(description="Number of jumps of a joint within a twentieth of a second.")
     range_deg: float = Field(description="Farthest that a joint bends beyond the human range, degrees.")
     self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
-    flags: list[Flag] = Field(description="Measures beyond their limits; `off-prompt`: a match under 0.5.")
+    flags: list[Flag] = Field(
+        description="Measures beyond their limits; `off-prompt`: a match under 0.5; `constraint-missed`: a constraint "
+        "beyond its bar."
+    )
     ok: bool = Field(description="True without flags.")
     match: PromptMatch | None = Field(default=None, description="Null for motions of earlier releases.")
+    constraints: list[ConstraintError] | None = Field(
+        default=None, description="Errors of the constraints that the motion was generated with, in their order."
+    )
 
     def with_match(self, match: PromptMatch) -> MotionQuality:
         """Return the record with the match, and the flag of one that is too low."""
@@ -73,6 +81,13 @@ class MotionQuality(BaseModel):
         if match.value is not None and match.value < SHOWN:
             flags.append(Flag.OFF_PROMPT)
         return self.model_copy(update={"match": match, "flags": flags, "ok": not flags})
+
+    def with_constraints(self, errors: Sequence[ConstraintError]) -> MotionQuality:
+        """Return the record with the errors of constraints, and the flag of one that is missed."""
+        flags = [flag for flag in self.flags if flag is not Flag.CONSTRAINT_MISSED]
+        if any(error.missed for error in errors):
+            flags.append(Flag.CONSTRAINT_MISSED)
+        return self.model_copy(update={"constraints": list(errors), "flags": flags, "ok": not flags})
 
 
 def read_quality(manifest: Mapping[str, Any]) -> MotionQuality | None:
