@@ -28,7 +28,15 @@ def foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
     return chain
 
 
-def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleton: Skeleton, fps: float) -> None:
+def follow_feet(
+    before: Array,
+    joints: Array,
+    stands: NDArray[np.bool_],
+    skeleton: Skeleton,
+    fps: float,
+    *,
+    most_drop: Array | float = MAX_DROP,
+) -> None:
     """Adjust hips and knees to moved feet, in place.
 
     Args:
@@ -37,6 +45,7 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
         stands: (T, 2) bool: left and right toe stand and must stay in place.
         skeleton: must have hips and feet.
         fps: frames a second.
+        most_drop: metres that the hips come down at most, for all frames or for each (T,).
     """
     r_hip, l_hip = skeleton.facing[:2]
     chains = [foot_chain(skeleton, toe) for toe in skeleton.feet[1::2]]
@@ -46,7 +55,7 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
         hold * needed_drop(before[:, leg], joints[:, leg[0]], joints[:, chain])
         for leg, chain, hold in zip(legs, chains, held, strict=True)
     ]
-    drop = smooth_above(np.max(needed, axis=0), 0.1 * fps)
+    drop = np.minimum(smooth_above(np.max(needed, axis=0), 0.1 * fps), most_drop)
     body = [j for j in range(len(skeleton)) if j not in chains[0] + chains[1]]
     joints[:, body, 1] -= drop[:, None]
     ahead = smooth(facing(before, skeleton), 0.2 * fps)

@@ -74,6 +74,11 @@ def finish(
     body = body or standard_body(generator.layout.skeleton)
     manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
+    return judged(clip, request)
+
+
+def judged(clip: MotionClip, request: Request) -> MotionClip:
+    """Return a clip with the record of its quality, for the prompts of its request, in its manifest."""
     if request.timeline is not None:
         clip = with_rows(clip, request.timeline)
     quality = quality_of(clip, expected_by_prompts(_prompts(request)))

@@ -15,7 +15,9 @@ from marey.editing.handler import edited
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
 from marey.generation.export import finish
+from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
+from marey.generation.shots.constraints.draw import constrained_clips, constrained_request
 from marey.generation.shots.dispatch import bucket_of, generate_any, resolve_request, timeline_request
 from marey.generation.shots.editor import EditModel
 from marey.items.timeline import timeline_rows
@@ -77,7 +79,11 @@ class GeneratorHandler(Generic[S]):
         buckets: dict[int, list[ClaimedItem]] = defaultdict(list)
         for item in batch.items:
             try:
-                request = resolve_request(self.generator, self._request(item, batch.features[item.text_key]))
+                request = self._request(item, batch.features[item.text_key])
+                if item.constraints:
+                    fps = split_settings(item.settings)[1].fps
+                    request = constrained_request(self.generator, request, item.constraints, item.seconds, fps)
+                request = resolve_request(self.generator, request)
                 self._requests[item.id] = request
                 buckets[bucket_of(self.generator, request)].append(item)
             except MareyError as error:
@@ -127,6 +133,31 @@ class GeneratorHandler(Generic[S]):
         self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl
     ) -> Sequence[Callable[[], Export] | None]:
         """Generate, and return how each motion is exported later; None for dropped ones."""
+        made: list[Callable[[], Export] | None] = [None] * len(items)
+        free = [row for row, item in enumerate(items) if not item.constraints]
+        bound = [row for row, item in enumerate(items) if item.constraints]
+        for rows, before, generate in ((free, 0, self._free_exports), (bound, len(free), self._constrained_exports)):
+            if rows:
+                watched = PassControl(control, rows, before, len(items))
+                part = generate([items[row] for row in rows], [requests[row] for row in rows], watched)
+                for row, export in zip(rows, part, strict=True):
+                    made[row] = export
+        return made
+
+    def _constrained_exports(
+        self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl
+    ) -> Sequence[Callable[[], Export] | None]:
+        """Generate motions with constraints."""
+        values, plan = split_settings(items[0].settings)
+        settings, licence = self.generator.settings(values), self.generator.bundle.manifest.licence
+        asked = [item.constraints or () for item in items]
+        clips = constrained_clips(self.generator, requests, asked, settings, plan, control=control)
+        return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
+
+    def _free_exports(
+        self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl
+    ) -> Sequence[Callable[[], Export] | None]:
+        """Generate motions without constraints."""
         values, plan = split_settings(items[0].settings)  # the same for the whole batch
         settings = self.generator.settings(values)
         if plan.is_single:

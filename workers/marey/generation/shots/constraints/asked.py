@@ -1,0 +1,183 @@
+"""Constraints of one clip as arrays: in its own frames, on its own skeleton."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from marey.core.errors import InvalidInput
+from marey.items.constraints import (
+    EFFECTOR_TARGET,
+    POSE_KEYFRAME,
+    ROOT_PATH,
+    frames_of,
+)
+from marey.motion.hands import arms
+from marey.motion.rotations import Array, normalize
+from marey.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Places of the root.
+
+    Attributes:
+        number: of the constraint.
+        frames: (n,) rising, whole or between two.
+        places: (n, 2) X and Z, metres.
+        headings: (n,) radians from +Z, or None.
+    """
+
+    number: int
+    frames: Array = field(repr=False)
+    places: Array = field(repr=False)
+    headings: Array | None = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """A pose at a frame.
+
+    Attributes:
+        number: of the constraint.
+        frame: of the clip.
+        rotations: (J, 4) local quaternions.
+        root: (3,) metres, or None: the pose takes the place and heading that the clip has there.
+        height: of the root without a place, metres; None = the pose stands on the floor.
+    """
+
+    number: int
+    frame: int
+    rotations: Array = field(repr=False)
+    root: Array | None = field(repr=False)
+    height: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Places of a joint at frames.
+
+    Attributes:
+        number: of the constraint.
+        name: of the effector.
+        joint: its index.
+        frames: (n,) whole numbers.
+        places: (n, 3) metres.
+        rotations: (n, 4) world quaternions, or None.
+    """
+
+    number: int
+    name: str
+    joint: int
+    frames: tuple[int, ...] = field(repr=False)
+    places: Array = field(repr=False)
+    rotations: Array | None = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """All constraints of one clip.
+
+    Attributes:
+        fps: of the clip.
+        frames: its length.
+        retimed: its speed may be changed, and parts left out or repeated.
+    """
+
+    fps: float
+    frames: int
+    paths: tuple[Path, ...]
+    keyframes: tuple[Keyframe, ...]
+    targets: tuple[Target, ...]
+    retimed: bool = True
+
+    def at_rate(self, fps: float, frames: int) -> Asked:
+        """Return the paths at another rate, without other constraints."""
+        paths = tuple(replace(path, frames=path.frames * (fps / self.fps)) for path in self.paths)
+        return Asked(fps, frames, paths, (), (), self.retimed)
+
+
+def asked_of(constraints: Sequence[Mapping[str, Any]], skeleton: Skeleton, frames: int, fps: float) -> Asked:
+    """Return checked constraints as arrays.
+
+    Raises:
+        InvalidInput: a pose of another skeleton, or one that still names a motion; with the field in `where`.
+    """
+    numbered = list(enumerate(constraints))
+    return Asked(
+        fps,
+        frames,
+        tuple(_path(number, each, fps) for number, each in numbered if each["type"] == ROOT_PATH),
+        tuple(_keyframe(number, each, skeleton) for number, each in numbered if each["type"] == POSE_KEYFRAME),
+        tuple(_target(number, each, skeleton) for number, each in numbered if each["type"] == EFFECTOR_TARGET),
+    )
+
+
+def effector(skeleton: Skeleton, name: str) -> int:
+    """Return the joint of an effector by its role: wrists end the arms, feet are known, the head is named so."""
+    (*_, right), (*_, left) = arms(skeleton)
+    roles = dict(zip(("left_ankle", "left_foot", "right_ankle", "right_foot"), skeleton.feet, strict=True))
+    roles |= {"left_wrist": left, "right_wrist": right, "pelvis": 0}
+    if name in roles:
+        return roles[name]
+    found = [j for j, joint in enumerate(skeleton.joint_names) if name in joint.lower()]
+    if not found:
+        raise InvalidInput(f"the skeleton {skeleton.name} has no {name}", where="constraints")
+    return found[0]
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a joint as skeletons write it: `left_wrist` is `L_wrist`."""
+    for long, short in (("left_", "L_"), ("right_", "R_")):
+        if name.startswith(long):
+            return short + name.removeprefix(long)
+    return name
+
+
+def _path(number: int, each: Mapping[str, Any], fps: float) -> Path:
+    headings = each.get("heading_radians")
+    return Path(
+        number,
+        np.array(frames_of(each, fps), np.float64),
+        np.array(each["positions_xz"], np.float64),
+        None if headings is None else np.unwrap(np.array(headings, np.float64)),
+    )
+
+
+def _keyframe(number: int, each: Mapping[str, Any], skeleton: Skeleton) -> Keyframe:
+    where = f"constraints.{number}.joint_rotations"
+    if "joint_rotations" not in each:
+        raise InvalidInput("the motion was not read", where=f"constraints.{number}.motion")
+    given = each["joint_rotations"]
+    if isinstance(given, Mapping):
+        named = {plain_name(name): (name, turn) for name, turn in given.items()}
+        unknown = [name for plain, (name, _) in named.items() if plain not in skeleton.joint_names]
+        missing = [name for name in skeleton.joint_names if name not in named]
+        if unknown or missing:
+            said = f"unknown joint {unknown[0][:40]!r}" if unknown else f"the rotation of {missing[0]!r} is missing"
+            raise InvalidInput(
+                f"{said}: the pose is of another skeleton than the model's",
+                where=where,
+                hint=f"Its joints: {', '.join(skeleton.joint_names)}.",
+            )
+        given = [named[name][1] for name in skeleton.joint_names]
+    if len(given) != len(skeleton):
+        raise InvalidInput(f"{len(given)} rotations; the model's skeleton has {len(skeleton)} joints", where=where)
+    root = each.get("root_position")
+    place = None if root is None else np.array(root, np.float64)
+    return Keyframe(number, each["frame"], normalize(np.array(given, np.float64)), place, each.get("root_height"))
+
+
+def _target(number: int, each: Mapping[str, Any], skeleton: Skeleton) -> Target:
+    turns = each.get("rotations")
+    return Target(
+        number,
+        each["joint"],
+        effector(skeleton, each["joint"]),
+        tuple(each["frames"]),
+        np.array(each["positions"], np.float64),
+        None if turns is None else normalize(np.array(turns, np.float64)),
+    )

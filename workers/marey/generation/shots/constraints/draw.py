@@ -1,0 +1,197 @@
+"""Draw motions for constraints: candidates of several lengths are ranked by how little they have to be changed, the
+best few are fitted, and one is chosen. It depends on its own request and seed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from marey.core.errors import InvalidInput
+from marey.generation.candidates import DrawPlan, candidate_seed
+from marey.generation.export import finish
+from marey.generation.passes import PassControl
+from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
+from marey.generation.shots.constraints.asked import Asked, asked_of
+from marey.generation.shots.constraints.choose import candidate_of, fit_candidate
+from marey.generation.shots.constraints.fit import misfit
+from marey.generation.shots.constraints.timing import shortest
+from marey.generation.shots.dispatch import generate_any, resolve_request
+from marey.generation.shots.timelines import plan_timeline
+from marey.items.constraints import ROOT_PATH, check_clip, last_frame
+from marey.motion.body import NamedBody, standard_body, travel_scale
+from marey.motion.clip import MotionClip
+from marey.motion.resample import frame_times
+from marey.quality.selection import KEY, Selection
+
+CANDIDATES = 8
+"""Candidates of a motion, unless its `best_of` asks for more."""
+FITTED = 3
+"""Candidates that are fitted, the best by `misfit`."""
+LENGTHS = (1.0, 1.25, 1.5, 1.0, 2.0, 0.9, 1.25, 1.5)
+"""Lengths of candidates for a path, as shares of the clip's: of a longer one the part with the best speeds is shown, or
+it is played faster."""
+CONSTRAINTS = "constraints"
+"""Key of the constraints in a motion's manifest."""
+Constraints = Sequence[Mapping[str, Any]]
+
+
+@dataclass(eq=False)
+class _Drawn:
+    """Candidates of one request that are kept so far, the best first: misfit, number, request, what was generated."""
+
+    request: Request
+    constraints: Constraints
+    asked: Asked
+    kept: list[tuple[float, int, Request, MotionFeatures]] = field(
+        default_factory=list[tuple[float, int, Request, Any]]
+    )
+    dropped: bool = False
+
+
+def constrained_request(
+    generator: Generator[Any], request: Request, constraints: Constraints, seconds: float | None, fps: float | None
+) -> Request:
+    """Return a request with the length of a clip that its constraints fit: the one asked for, or else that of the path.
+
+    Args:
+        seconds: asked for; None = the path, or else the model decides.
+        fps: of the clip; None = the model's.
+
+    Raises:
+        InvalidInput: constraints beyond the clip, of another skeleton, or that contradict one another; with the field
+            in `where`.
+    """
+    rate, limits = fps or generator.layout.fps, generator.limits
+    last = last_frame(constraints, rate, kind=ROOT_PATH)
+    if last is not None and seconds is None and request.timeline is None:
+        frames = max(int(np.ceil(last / rate * limits.fps - 1e-6)) + 1, limits.min_frames)
+        if frames > limits.max_frames:
+            raise InvalidInput(
+                f"the path takes {frames / limits.fps:g} s; this bundle generates {limits.max_frames / limits.fps:g} s",
+                where="constraints",
+            )
+        request = replace(request, frames=frames)
+    known = resolve_request(generator, request)
+    frames = _frames(known, limits)
+    if frames is not None:
+        asked_of(constraints, generator.layout.skeleton, *_checked(constraints, frames, limits.fps, rate))
+    return known
+
+
+def _frames(request: Request, limits: Limits) -> int | None:
+    """Return the length of a request in frames of the model; None = it decides."""
+    if request.timeline is not None:
+        return plan_timeline(request.timeline, request.seed, limits).frames
+    return request.frames
+
+
+def _checked(constraints: Constraints, frames: int, model_rate: float, rate: float) -> tuple[int, float]:
+    """Check constraints against a clip, and return its frames and their rate."""
+    count = len(frame_times(frames, model_rate, rate))
+    check_clip(constraints, count, rate)
+    return count, rate
+
+
+def constrained_clips(
+    generator: Generator[S],
+    requests: Sequence[Request],
+    constraints: Sequence[Constraints],
+    settings: S,
+    plan: DrawPlan,
+    *,
+    body: NamedBody | None = None,
+    control: GenerationControl | None = None,
+) -> list[MotionClip | None]:
+    """Return a clip of each request that meets its constraints; None where `control` dropped the request.
+
+    Each faces +Z at the origin in frame 0; its `placement` leads to the space of the constraints. Its quality record
+    has the errors.
+
+    Raises:
+        InvalidInput: constraints beyond a clip, of another skeleton, or that contradict each other; or as
+            `Generator.generate`.
+    """
+    skeleton = (body or standard_body(generator.layout.skeleton)).skeleton
+    rate, model_rate = plan.fps or generator.layout.fps, generator.layout.fps
+    rows: list[_Drawn] = []
+    for request, each in zip(requests, constraints, strict=True):
+        known = resolve_request(generator, request)
+        count, _ = _checked(each, _frames(known, generator.limits) or generator.limits.max_frames, model_rate, rate)
+        asked = asked_of(each, skeleton, count, rate)
+        rows.append(_Drawn(known, each, asked if request.timeline is None else replace(asked, retimed=False)))
+    candidates = max(CANDIDATES, plan.candidates)
+    scale = travel_scale(generator.layout.skeleton, skeleton)
+    for number in range(candidates):
+        _draw(generator, rows, settings, number, candidates, scale, control or NoControl())
+    return [None if row.dropped else _best(generator, row, settings, plan, body) for row in rows]
+
+
+def _draw(
+    generator: Generator[S],
+    rows: Sequence[_Drawn],
+    settings: S,
+    number: int,
+    candidates: int,
+    scale: float,
+    control: GenerationControl,
+) -> None:
+    """Draw one candidate of each row, and keep it if it is among the best."""
+    open_rows = [row for row in rows if not row.dropped]
+    part = [_candidate(row, number, generator.limits) for row in open_rows]
+    owners = [number_of for number_of, row in enumerate(rows) if not row.dropped]
+    watched = PassControl(control, owners, number * len(rows), candidates * len(rows))
+    made = generate_any(generator, part, settings, control=watched) if part else []
+    for row, request, generated in zip(open_rows, part, made, strict=True):
+        if generated is None:
+            row.dropped = True
+            continue
+        cost = _cost(generator, row.asked, generated, scale)
+        row.kept = sorted([*row.kept, (cost, number, request, generated)], key=lambda each: each[:2])[:FITTED]
+
+
+def _candidate(row: _Drawn, number: int, limits: Limits) -> Request:
+    if row.request.timeline is not None:
+        return replace(row.request, seed=candidate_seed(row.request.seed, number))
+    frames = row.request.frames or limits.max_frames
+    if row.asked.paths:
+        length = round(frames * LENGTHS[number % len(LENGTHS)])
+        frames = min(max(length, limits.min_frames, shortest(frames)), limits.max_frames)
+    return replace(row.request, seed=candidate_seed(row.request.seed, number), frames=frames)
+
+
+def _cost(generator: Generator[Any], asked: Asked, generated: MotionFeatures, scale: float) -> float:
+    """Return how much a candidate has to be changed for the path, from its joints as decoded."""
+    if not asked.paths:
+        return 0.0
+    layout = generator.layout
+    joints = np.asarray(layout.decode(generated.features), np.float64) * scale
+    frames = len(frame_times(asked.frames, asked.fps, layout.fps))
+    return misfit(joints, asked.at_rate(layout.fps, frames), layout.skeleton)
+
+
+def _best(generator: Generator[S], row: _Drawn, settings: S, plan: DrawPlan, body: NamedBody | None) -> MotionClip:
+    """Finish and fit the kept candidates, and return the best with the record of the choice."""
+    fitted = [
+        fit_candidate(
+            finish(generator, request, generated, settings, body=body, fps=plan.fps), request, row.asked, cost
+        )
+        for cost, _, request, generated in row.kept
+    ]
+    chosen = max(range(len(fitted)), key=lambda k: fitted[k].rank)
+    seen = [candidate_of(number, one) for (_, number, _, _), one in zip(row.kept, fitted, strict=True)]
+    selection = Selection(
+        best_of=max(CANDIDATES, plan.best_of),
+        redraws=0,
+        chosen=row.kept[chosen][1],
+        candidates=sorted(seen, key=lambda each: each.index),
+    )
+    about = {
+        "seed": row.request.seed,
+        CONSTRAINTS: [dict(each) for each in row.constraints],
+        KEY: selection.model_dump(mode="json"),
+    }
+    clip = fitted[chosen].clip
+    return replace(clip, manifest={**clip.manifest, **about})
