@@ -151,4 +151,12 @@ Loop = Annotated[
     bool,
     typer.Option("--loop", help="Cut a cycle out of each motion that can be played on, as `marey edit --loop`."),
 ]
+Constraints = Annotated[
+    Path | None,
+    typer.Option(
+        "--constraints",
+        metavar="FILE.json",
+        help="Paths of the root, poses and targets of hands, feet and head that every motion meets.",
+    ),
+]
 TEMPLATE = DEFAULT_TEMPLATE

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidBundle, InvalidInput
@@ -53,6 +54,7 @@ class LocalModel:
         redraws: int | None = None,
         variety: str | None = None,
         settings: Mapping[str, float] | None = None,
+        constraints: Sequence[Mapping[str, object]] | None = None,
     ) -> Sequence[MotionClip]:
         """Generate motions; equal prompts, seeds and settings give the same clips as a server.
 
@@ -66,17 +68,19 @@ class LocalModel:
             redraws: further rounds of candidates while none is good, 0 to 2; None = 0.
             variety: how much motions of a prompt differ: low, normal or high; None = normal.
             settings: of sampling, as `{"guidance": 4.5}`.
+            constraints: paths of the root, poses and targets of hands, feet and head, for every prompt; see
+                `docs/how-to/constraints.md`. A motion file that they name is read from the working directory.
 
         Returns:
             One clip per variant of each prompt, in that order: metres, Y up, facing +Z in frame 0.
 
         Raises:
             InvalidItems: with every problem of every prompt; nothing is generated then.
-            InvalidInput: no prompts.
+            InvalidInput: no prompts, or constraints that cannot be met; with the field in `where`.
         """
         made = self.stream(
             prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, best_of=best_of, redraws=redraws,
-            variety=variety, settings=settings,
+            variety=variety, settings=settings, constraints=constraints,
         )  # fmt: skip
         return [*made]
 
@@ -92,6 +96,7 @@ class LocalModel:
         redraws: int | None = None,
         variety: str | None = None,
         settings: Mapping[str, float] | None = None,
+        constraints: Sequence[Mapping[str, object]] | None = None,
     ) -> Iterator[MotionClip]:
         """Generate motions as `generate` does, and yield each when it is ready."""
         platform = {OUTPUT_FPS: fps, BEST_OF: best_of, REDRAWS: redraws}
@@ -107,11 +112,12 @@ class LocalModel:
         }
         rows = [prompts] if isinstance(prompts, str) else prompts
         raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))
+        asked = _constraints(constraints)
         items = [*read_items(raws, where="prompts", check=self._check)]
         wanted = [
             each
             for item in items
-            for each in _wanted(item, length_of(self._bundle, item), sampling_of(self._bundle, item))
+            for each in _wanted(item, length_of(self._bundle, item), sampling_of(self._bundle, item), asked)
         ]
         for _, clip, _ in self._studio.make(wanted):
             yield clip
@@ -209,7 +215,19 @@ def _raw(row: Row, defaults: Mapping[str, object]) -> object:
     return whole
 
 
-def _wanted(item: Item, seconds: float | None, settings: Mapping[str, float]) -> Iterator[Wanted]:
+def _constraints(given: Sequence[Mapping[str, object]] | None) -> Sequence[Mapping[str, Any]]:
+    """Check constraints, and read the poses that they name."""
+    if given is None:
+        return ()
+    from marey.generate.poses import with_poses
+    from marey.items.constraints import read_constraints
+
+    return with_poses(read_constraints(given), Path())
+
+
+def _wanted(
+    item: Item, seconds: float | None, settings: Mapping[str, float], constraints: Sequence[Mapping[str, Any]]
+) -> Iterator[Wanted]:
     seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
     for variant in range(item.variants):
-        yield Wanted(item.prompt, seed + variant, seconds, settings, item.timeline)
+        yield Wanted(item.prompt, seed + variant, seconds, settings, item.timeline, item.constraints or constraints)

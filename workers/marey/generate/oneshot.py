@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from marey.vocabulary.scope import ActionLists, Scope, match_scope, scope_of_row
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.core.settings import Settings
+    from marey.generation.candidates import DrawPlan
     from marey.generation.port import Generator, Request
     from marey.generation.shots.editor import EditModel
     from marey.motion.body import NamedBody
@@ -35,6 +36,8 @@ class Wanted:
     settings: Mapping[str, float]
     timeline: Sequence[Mapping[str, Any]] | None = None
     """Prompts at stated times, of which `prompt` is the text form; None = the prompt alone."""
+    constraints: Sequence[Mapping[str, Any]] = ()
+    """As `marey.items.constraints.read_constraints` returns them."""
 
 
 class OneShot:
@@ -77,7 +80,9 @@ class OneShot:
         return (scopes[0] if wanted.timeline is None else scope_of_rows(scopes)).as_json()
 
     def _requests(self, wanted: Sequence[Wanted]) -> list[Request]:
+        from marey.generation.candidates import split_settings
         from marey.generation.port import Request
+        from marey.generation.shots.constraints.draw import constrained_request
         from marey.generation.shots.dispatch import resolve_request, timeline_request
 
         prompts = [[prompt for _, prompt in prompts_with_rows(each.prompt, each.timeline)] for each in wanted]
@@ -90,6 +95,9 @@ class OneShot:
                 request = Request(texts[0], each.seed, frames, scope=scope)
             else:
                 request = timeline_request(timeline_rows(each.timeline), texts, each.seed, scope)
+            if each.constraints:
+                fps = split_settings(each.settings)[1].fps
+                request = constrained_request(self._generator, request, each.constraints, each.seconds, fps)
             found.append(resolve_request(self._generator, request))
         return found
 
@@ -113,19 +121,33 @@ class OneShot:
         Raises:
             InvalidInput: a length out of the bundle's range; raised before anything is generated.
         """
-        from marey.generation.candidates import draw_clips, split_settings
+        from marey.generation.candidates import split_settings
 
         requests = self._requests(wanted)
         start = 0
-        for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
+        for (_, constrained), group in groupby(wanted, key=lambda w: (sorted(w.settings.items()), bool(w.constraints))):
             rows = list(group)
             values, plan = split_settings(rows[0].settings)
             settings, size = self._generator.settings(values), self._generator.batch
             for low in range(0, len(rows), size):
-                batch = requests[start + low : start + min(low + size, len(rows))]
+                batch, part = requests[start + low : start + min(low + size, len(rows))], rows[low : low + size]
                 began = time.monotonic()
-                clips = draw_clips(self._generator, batch, settings, plan, body=self._body)
+                clips = self._draw(batch, part if constrained else [], settings, plan)
                 elapsed = (time.monotonic() - began) / len(batch)
-                for row, clip in zip(rows[low:], clips, strict=False):
+                for row, clip in zip(part, clips, strict=False):
                     yield row, clip, elapsed
             start += len(rows)
+
+    def _draw(
+        self, requests: Sequence[Request], constrained: Sequence[Wanted], settings: object, plan: DrawPlan
+    ) -> Iterable[MotionClip]:
+        """Draw the motions of requests, each with the constraints of its row if there are rows."""
+        from marey.generation.candidates import draw_clips
+
+        if not constrained:
+            return draw_clips(self._generator, requests, settings, plan, body=self._body)
+        from marey.generation.shots.constraints.draw import constrained_clips
+
+        asked = [row.constraints for row in constrained]
+        made = constrained_clips(self._generator, requests, asked, settings, plan, body=self._body)
+        return [clip for clip in made if clip is not None]  # nothing was dropped

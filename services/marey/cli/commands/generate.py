@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ OFF_PROMPT = "off-prompt"
 """The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
 SHOWN = 0.5
 """The match from which on a row of a timeline shows its prompt."""
+CONSTRAINT_MISSED = "constraint-missed"
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -66,6 +67,7 @@ def generate(
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
     loop: options.Loop = False,
+    constraints: options.Constraints = None,
     formats: options.Formats = None,
     export: ExportOptions = PLAIN,
     output: options.Folder = Path(),
@@ -98,7 +100,7 @@ def generate(
     shaped = _body_of(chosen, body)
     if scope is options.ScopeOption.REFUSE:
         _refuse(reader, items, chosen)
-    planned = _plan(items, chosen, output, name_template, kinds)
+    planned = _plan(items, chosen, output, name_template, kinds, _constraints(constraints))
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
     studio = OneShot(chosen, config, body=shaped)
@@ -119,6 +121,22 @@ def generate(
             else:
                 for path in line["files"].values():
                     console.result(console.home_relative(path))
+
+
+def _constraints(file: Path | None) -> Sequence[Mapping[str, Any]]:
+    """Return the constraints of a JSON file; motion files that they name are found from its folder.
+
+    Raises:
+        NotFound, TooLarge: the file cannot be read.
+        InvalidInput: constraints that cannot be used, with the field.
+    """
+    if file is None:
+        return ()
+    from marey.generate.poses import with_poses
+    from marey.items.constraints import MAX_FILE, parse_constraints
+    from marey.motion.files import read_limited
+
+    return with_poses(parse_constraints(read_limited(file, MAX_FILE)), file.parent)
 
 
 def _body_of(bundle: Bundle, given: str) -> NamedBody | None:
@@ -142,7 +160,7 @@ def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
     if quality is None:
         return
     about = f"{line['prompt']!r}, seed {line['seed']}"
-    if faults := [flag for flag in quality["flags"] if flag != OFF_PROMPT]:
+    if faults := [flag for flag in quality["flags"] if flag not in (OFF_PROMPT, CONSTRAINT_MISSED)]:
         console.say(f"{about}: the motion is {', '.join(faults)}.")
     if OFF_PROMPT in quality["flags"]:
         rows: list[dict[str, Any]] = clip.manifest.get("timeline", {}).get("rows", [])
@@ -152,6 +170,11 @@ def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
             console.say(f"{about}: {times} s does not show {row['prompt']!r} (match {row['match']:g}).")
         if not missed:
             console.say(f"{about}: the motion does not show the prompt (match {quality['match']['value']:g}).")
+    for error in quality.get("constraints") or ():
+        if error["missed"]:
+            turn = "" if error["mean_deg"] is None else f", {error['mean_deg']:.0f} degrees"
+            far = f"{100 * error['mean_m']:.1f} cm on average, {100 * error['max_m']:.1f} cm at most{turn}"
+            console.say(f"{about}: constraints.{error['index']} ({error['type']}) is missed by {far}.")
 
 
 def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:
@@ -290,7 +313,14 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
     return kinds
 
 
-def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[Exporter[Any]]) -> list[Planned]:
+def _plan(
+    items: list[Item],
+    bundle: Bundle,
+    folder: Path,
+    template: str,
+    kinds: list[Exporter[Any]],
+    constraints: Sequence[Mapping[str, Any]],
+) -> list[Planned]:
     """Plan the motions and their files.
 
     Raises:
@@ -305,7 +335,8 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         settings, seconds = sampling_of(bundle, item), length_of(bundle, item)
         for variant in range(item.variants):
-            wanted = Wanted(item.prompt, seed + variant, seconds, settings, item.timeline)
+            asked = item.constraints or constraints
+            wanted = Wanted(item.prompt, seed + variant, seconds, settings, item.timeline, asked)
             name = item.name or slug(item.prompt)
             naming = Naming(
                 index,
