@@ -1,0 +1,1 @@
+"""How well constrained motions meet their constraints, and what that costs: `marey eval constraints`."""
