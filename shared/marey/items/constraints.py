@@ -17,16 +17,8 @@ from marey.core.errors import InvalidInput
 Constraint = dict[str, Any]
 
 ROOT_PATH, POSE_KEYFRAME, EFFECTOR_TARGET = "root_path", "pose_keyframe", "effector_target"
-EFFECTORS = (
-    "left_wrist",
-    "right_wrist",
-    "left_ankle",
-    "right_ankle",
-    "left_foot",
-    "right_foot",
-    "head",
-    "pelvis",
-)
+SIDED = ("wrist", "ankle", "foot")
+EFFECTORS = (*(f"{side}_{joint}" for joint in SIDED for side in ("left", "right")), "head", "pelvis")
 """Joints that can have a target; `foot` is the joint at the toes."""
 MAX_CONSTRAINTS, MAX_POINTS = 64, 2000
 MAX_FRAME = 60 * 240
@@ -78,7 +70,7 @@ def parse_constraints(text: str | bytes) -> list[Constraint]:
         raise InvalidInput(f"is not JSON: {error}", where="constraints") from None
     if isinstance(value, Mapping):
         given = cast("Mapping[str, object]", value)
-        return read_constraints(given["constraints"] if set(given) == {"constraints"} else value)
+        return read_constraints(given["constraints"] if set(given) == {"constraints"} else given)
     return read_constraints(value)
 
 

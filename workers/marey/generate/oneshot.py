@@ -81,8 +81,8 @@ class OneShot:
 
     def _requests(self, wanted: Sequence[Wanted]) -> list[Request]:
         from marey.generation.candidates import split_settings
+        from marey.generation.constraints.draw import constrained_request
         from marey.generation.port import Request
-        from marey.generation.shots.constraints.draw import constrained_request
         from marey.generation.shots.dispatch import resolve_request, timeline_request
 
         prompts = [[prompt for _, prompt in prompts_with_rows(each.prompt, each.timeline)] for each in wanted]
@@ -146,7 +146,7 @@ class OneShot:
 
         if not constrained:
             return draw_clips(self._generator, requests, settings, plan, body=self._body)
-        from marey.generation.shots.constraints.draw import constrained_clips
+        from marey.generation.constraints.draw import constrained_clips
 
         asked = [row.constraints for row in constrained]
         made = constrained_clips(self._generator, requests, asked, settings, plan, body=self._body)

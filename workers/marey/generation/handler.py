@@ -14,10 +14,10 @@ from marey.core.settings import Settings
 from marey.editing.handler import edited
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
+from marey.generation.constraints.draw import constrained_clips, constrained_request
 from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
-from marey.generation.shots.constraints.draw import constrained_clips, constrained_request
 from marey.generation.shots.dispatch import bucket_of, generate_any, resolve_request, timeline_request
 from marey.generation.shots.editor import EditModel
 from marey.items.timeline import timeline_rows

@@ -132,7 +132,7 @@ def _constraints(file: Path | None) -> Sequence[Mapping[str, Any]]:
     """
     if file is None:
         return ()
-    from marey.generate.poses import with_poses
+    from marey.cli.roles.generating import with_poses
     from marey.items.constraints import MAX_FILE, parse_constraints
     from marey.motion.files import read_limited
 

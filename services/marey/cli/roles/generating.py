@@ -6,9 +6,10 @@ from pathlib import Path
 
 from marey.core.errors import InvalidInput
 from marey.generate.oneshot import OneShot, Wanted
+from marey.generate.poses import with_poses
 from marey.registry import get_model, resolve
 
-__all__ = ["OneShot", "Wanted", "make_random_bundle"]
+__all__ = ["OneShot", "Wanted", "make_random_bundle", "with_poses"]
 
 
 def make_random_bundle(model: str, path: Path) -> None:

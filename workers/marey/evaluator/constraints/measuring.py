@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from marey.evaluator.constraints.cases import Case
-from marey.generation.shots.constraints.paths import carried, natural_course
+from marey.generation.constraints.paths import carried, natural_course
 from marey.motion.clip import MotionClip
 from marey.motion.feet import find_contacts, skate
 from marey.motion.rotations import Array
@@ -25,7 +25,7 @@ MOST_SKATE, MOST_JERK, MOST_LOST = 1.2, 1.25, 5.0
 
 
 @dataclass(frozen=True)
-class Reading:
+class ConstraintReading:
     """Measures of one case; those with `free_` are of the motion without constraints.
 
     Attributes:
@@ -53,13 +53,13 @@ class Reading:
         return [error for error in self.errors if error["type"] == kind]
 
 
-def read_case(case: Case, clip: MotionClip, free: MotionClip) -> Reading:
+def read_case(case: Case, clip: MotionClip, free: MotionClip) -> ConstraintReading:
     """Measure the motion of a case and the one without constraints."""
     quality, plain = read_quality(clip.manifest), read_quality(free.manifest)
     assert quality is not None
     assert plain is not None
     actions = _judged_actions(case.prompt)
-    return Reading(
+    return ConstraintReading(
         case.name,
         case.group,
         [error.model_dump(mode="json") for error in quality.constraints or []],
@@ -105,7 +105,7 @@ def _judged_actions(prompt: str) -> list[str]:
     return known if len(known) == len(named) else []
 
 
-def summary(readings: Sequence[Reading]) -> dict[str, Any]:
+def summary(readings: Sequence[ConstraintReading]) -> dict[str, Any]:
     """Return the figures that the bars are for."""
 
     def errors(kind: str, field: str) -> list[float]:
@@ -144,7 +144,7 @@ def _share(values: Sequence[bool]) -> float:
     return round(100 * float(np.mean(values)), 1) if values else 0.0
 
 
-def constraints_markdown(bundle: str, readings: Sequence[Reading]) -> str:
+def constraints_markdown(bundle: str, readings: Sequence[ConstraintReading]) -> str:
     """Return a report with a table, a row for each measure and a column for each group of cases."""
     groups = {"all": list(readings)}
     for reading in readings:
@@ -170,7 +170,9 @@ def constraints_markdown(bundle: str, readings: Sequence[Reading]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def constraints_document(bundle: str, settings: dict[str, object], readings: Sequence[Reading]) -> dict[str, Any]:
+def constraints_document(
+    bundle: str, settings: dict[str, object], readings: Sequence[ConstraintReading]
+) -> dict[str, Any]:
     """Return all data as JSON values, each case included."""
     groups = dict.fromkeys(reading.group for reading in readings)
     return {

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.generation.shots.constraints.asked import Asked
-from marey.generation.shots.constraints.curves import smooth_open, through
-from marey.generation.shots.constraints.effectors import with_targets
-from marey.generation.shots.constraints.paths import (
+from marey.generation.constraints.constraint_set import ConstraintSet
+from marey.generation.constraints.curves import smooth_open, through
+from marey.generation.constraints.effectors import with_targets
+from marey.generation.constraints.paths import (
     Course,
     asked_places,
     bent,
@@ -16,9 +16,9 @@ from marey.generation.shots.constraints.paths import (
     gradient,
     natural_course,
 )
-from marey.generation.shots.constraints.playing import played
-from marey.generation.shots.constraints.poses import Posed, heading, with_poses
-from marey.generation.shots.constraints.timing import NO_JUMPS, Timing, find_jumps, play_times
+from marey.generation.constraints.playing import played
+from marey.generation.constraints.poses import BodyMotion, heading, with_poses
+from marey.generation.constraints.timing import NO_JUMPS, Timing, find_jumps, play_times
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import posed as clip_of
 from marey.motion.rotations import Array
@@ -31,20 +31,20 @@ TURNING = 0.1
 """Weight of a turn of one radian a second beside speeds that differ by a factor of e."""
 
 
-def fit_clip(clip: MotionClip, asked: Asked) -> MotionClip:
+def fit_clip(clip: MotionClip, asked: ConstraintSet) -> MotionClip:
     """Return a clip of `asked.frames` frames that meets constraints, in the space of these."""
     skeleton, fps = clip.skeleton, asked.fps
     motion = played(clip, timing(clip.joints.astype(np.float64), asked, skeleton))
     natural = natural_course(motion.joints(skeleton), skeleton, fps)
     wanted = _course(motion, natural, asked, skeleton)
     if wanted is not None:
-        motion = Posed(*bent(motion.rotations, motion.root, motion.contacts, natural, wanted, skeleton, fps))
+        motion = BodyMotion(*bent(motion.rotations, motion.root, motion.contacts, natural, wanted, skeleton, fps))
     motion = with_poses(motion, asked.keyframes, skeleton, fps)
     motion = with_targets(motion, asked.targets, skeleton, fps)
     return clip_of(clip, motion.rotations, motion.root, contacts=motion.contacts)
 
 
-def timing(joints: Array, asked: Asked, skeleton: Skeleton) -> Timing:
+def timing(joints: Array, asked: ConstraintSet, skeleton: Skeleton) -> Timing:
     """Return which moments of a motion (N, J, 3) frames show."""
     weight, speeds = np.zeros(asked.frames), np.zeros(asked.frames)
     natural = natural_course(joints, skeleton, asked.fps)
@@ -57,7 +57,7 @@ def timing(joints: Array, asked: Asked, skeleton: Skeleton) -> Timing:
     return play_times(natural.speeds(asked.fps), speeds, weight, asked.fps, jumps)
 
 
-def misfit(joints: Array, asked: Asked, skeleton: Skeleton) -> float:
+def misfit(joints: Array, asked: ConstraintSet, skeleton: Skeleton) -> float:
     """Return how much a motion (N, J, 3) has to be changed to follow a path, 0 or more: speeds, and turns."""
     shown = timing(joints, asked, skeleton)
     natural = natural_course(joints, skeleton, asked.fps)
@@ -66,7 +66,7 @@ def misfit(joints: Array, asked: Asked, skeleton: Skeleton) -> float:
     return shown.cost + TURNING * float((((wanted - turning) * asked.fps) ** 2).mean())
 
 
-def _course(motion: Posed, natural: Course, asked: Asked, skeleton: Skeleton) -> Course | None:
+def _course(motion: BodyMotion, natural: Course, asked: ConstraintSet, skeleton: Skeleton) -> Course | None:
     """Return the course that a motion has to take; None = its own."""
     if asked.paths:
         return course_asked(asked, natural)
@@ -82,7 +82,7 @@ def _course(motion: Posed, natural: Course, asked: Asked, skeleton: Skeleton) ->
     return Course(natural.places + change[:, :2], natural.headings + change[:, 2])
 
 
-def _knots(motion: Posed, asked: Asked, skeleton: Skeleton) -> dict[int, Array]:
+def _knots(motion: BodyMotion, asked: ConstraintSet, skeleton: Skeleton) -> dict[int, Array]:
     """Return how far, in X, Z and heading, the root has to move and turn at frames, without a path."""
     found: dict[int, Array] = {}
     joints = motion.joints(skeleton)

@@ -11,13 +11,13 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.generation.candidates import DrawPlan, candidate_seed
+from marey.generation.constraints.choose import candidate_of, fit_candidate
+from marey.generation.constraints.constraint_set import ConstraintSet, asked_of
+from marey.generation.constraints.fit import misfit
+from marey.generation.constraints.timing import shortest
 from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
-from marey.generation.shots.constraints.asked import Asked, asked_of
-from marey.generation.shots.constraints.choose import candidate_of, fit_candidate
-from marey.generation.shots.constraints.fit import misfit
-from marey.generation.shots.constraints.timing import shortest
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.generation.shots.timelines import plan_timeline
 from marey.items.constraints import ROOT_PATH, check_clip, last_frame
@@ -44,7 +44,7 @@ class _Drawn:
 
     request: Request
     constraints: Constraints
-    asked: Asked
+    asked: ConstraintSet
     kept: list[tuple[float, int, Request, MotionFeatures]] = field(
         default_factory=list[tuple[float, int, Request, Any]]
     )
@@ -162,7 +162,7 @@ def _candidate(row: _Drawn, number: int, limits: Limits) -> Request:
     return replace(row.request, seed=candidate_seed(row.request.seed, number), frames=frames)
 
 
-def _cost(generator: Generator[Any], asked: Asked, generated: MotionFeatures, scale: float) -> float:
+def _cost(generator: Generator[Any], asked: ConstraintSet, generated: MotionFeatures, scale: float) -> float:
     """Return how much a candidate has to be changed for the path, from its joints as decoded."""
     if not asked.paths:
         return 0.0

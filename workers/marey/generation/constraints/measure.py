@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from marey.generation.shots.constraints.asked import Asked, Keyframe, Path, Target
-from marey.generation.shots.constraints.poses import heading
+from marey.generation.constraints.constraint_set import ConstraintSet, Keyframe, Path, Target
+from marey.generation.constraints.poses import heading
 from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH
 from marey.motion.clip import MotionClip
 from marey.motion.filters import smooth
@@ -18,12 +18,12 @@ from marey.motion.skeleton import Skeleton
 from marey.quality.constraints import ConstraintError
 
 
-def constraint_errors(clip: MotionClip, asked: Asked) -> list[ConstraintError]:
+def constraint_errors(clip: MotionClip, asked: ConstraintSet) -> list[ConstraintError]:
     """Measure a clip in the space of its constraints; in their order."""
     return sorted(_errors(clip, asked), key=lambda each: each.index)
 
 
-def _errors(clip: MotionClip, asked: Asked) -> Iterator[ConstraintError]:
+def _errors(clip: MotionClip, asked: ConstraintSet) -> Iterator[ConstraintError]:
     for path in asked.paths:
         yield _path_error(clip, path)
     for key in asked.keyframes:

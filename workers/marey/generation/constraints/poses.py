@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.shots.constraints.asked import Keyframe
-from marey.generation.shots.constraints.curves import fades
+from marey.generation.constraints.constraint_set import Keyframe
+from marey.generation.constraints.curves import fades
 from marey.motion.filters import smooth_above
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import MAX_DROP, follow_feet, foot_chain
@@ -31,7 +31,7 @@ FLOOR = 0.015
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class BodyMotion:
     """A motion: (T, J, 4) local rotations, (T, 3) root in metres, (T, 4) contacts."""
 
     rotations: Array = field(repr=False)
@@ -57,7 +57,7 @@ def standing_height(rotations: Array, skeleton: Skeleton) -> float:
     return FLOOR - float(joints[0, :, 1].min())
 
 
-def placed(key: Keyframe, posed: Posed, skeleton: Skeleton) -> tuple[Array, Array]:
+def placed(key: Keyframe, posed: BodyMotion, skeleton: Skeleton) -> tuple[Array, Array]:
     """Return rotations (J, 4) and root (3,) of a keyframe; without a place of its own, it takes the place and heading
     that the motion has there."""
     if key.root is not None:
@@ -70,7 +70,7 @@ def placed(key: Keyframe, posed: Posed, skeleton: Skeleton) -> tuple[Array, Arra
     return rotations, root
 
 
-def with_poses(posed: Posed, keyframes: Sequence[Keyframe], skeleton: Skeleton, fps: float) -> Posed:
+def with_poses(posed: BodyMotion, keyframes: Sequence[Keyframe], skeleton: Skeleton, fps: float) -> BodyMotion:
     """Return the motion with the poses of keyframes: the body passes into them, and the feet step to their places."""
     if not keyframes:
         return posed
@@ -86,7 +86,9 @@ def with_poses(posed: Posed, keyframes: Sequence[Keyframe], skeleton: Skeleton, 
     moves = np.concatenate([turns.reshape(len(at), -1), roots - posed.root[at]], axis=1)
     whole = fades(at, moves, spans, count)
     rotations = multiply(from_rotvec(whole[:, :-3].reshape(count, -1, 3)), posed.rotations)
-    passed = Posed(rotations, over_the_floor(rotations, posed.root + whole[:, -3:], at, skeleton, fps), posed.contacts)
+    passed = BodyMotion(
+        rotations, over_the_floor(rotations, posed.root + whole[:, -3:], at, skeleton, fps), posed.contacts
+    )
     before = passed.joints(skeleton)
     moved, contacts = before.copy(), posed.contacts.copy()
     for side in range(2):
@@ -100,7 +102,7 @@ def with_poses(posed: Posed, keyframes: Sequence[Keyframe], skeleton: Skeleton, 
     near = np.abs(np.arange(count)[:, None] - at).min(axis=1)
     most_drop = np.minimum(DROP_PER_FRAME * near, MAX_DROP)
     follow_feet(before, moved, contacts[:, 1::2], skeleton, fps, most_drop=most_drop)
-    return Posed(aim_bones(moved, rotations, skeleton), moved[:, 0], contacts)
+    return BodyMotion(aim_bones(moved, rotations, skeleton), moved[:, 0], contacts)
 
 
 def over_the_floor(rotations: Array, root: Array, at: NDArray[np.intp], skeleton: Skeleton, fps: float) -> Array:

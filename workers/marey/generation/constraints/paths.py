@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.shots.constraints.asked import Asked
-from marey.generation.shots.constraints.curves import hump, smooth_open, through
+from marey.generation.constraints.constraint_set import ConstraintSet
+from marey.generation.constraints.curves import hump, smooth_open, through
 from marey.motion.feet import runs
 from marey.motion.filters import smooth
 from marey.motion.kinematics import facing, forward_kinematics
@@ -74,7 +74,7 @@ def natural_course(joints: Array, skeleton: Skeleton, fps: float) -> Course:
     return Course(smooth_open(joints[:, 0, [0, 2]], sigma), smooth_open(headings[:, None], sigma)[:, 0])
 
 
-def asked_places(asked: Asked) -> tuple[Array, int]:
+def asked_places(asked: ConstraintSet) -> tuple[Array, int]:
     """Return the path asked for (T, 2) with straight ends, and the frame in which it ends.
 
     A path that begins later than frame 0 is reached from the origin, where every clip begins.
@@ -90,7 +90,7 @@ def asked_places(asked: Asked) -> tuple[Array, int]:
     return smooth_open(through(frames, places, at), ASKED_S * asked.fps), end
 
 
-def course_asked(asked: Asked, natural: Course) -> Course:
+def course_asked(asked: ConstraintSet, natural: Course) -> Course:
     """Return the course for a motion with the natural one (T): the path asked for, and the heading that the motion has
     to it, or the one asked for. Behind the end of the path the motion goes on by itself."""
     places, end = asked_places(asked)

@@ -49,7 +49,7 @@ def hump(t: Array) -> Array:
     return s**3 * (s * (6 * s - 15) + 10)
 
 
-def fades(frames: Array, values: Array, spans: Array, count: int) -> Array:
+def fades(frames: NDArray[np.intp], values: Array, spans: Array, count: int) -> Array:
     """Return changes (count, C) that are `values` (n, C) at whole rising frames (n,) and fade within `spans` (n,)
     frames.
 
@@ -60,7 +60,7 @@ def fades(frames: Array, values: Array, spans: Array, count: int) -> Array:
     first, last = frames[0], frames[-1]
     changes += np.where(at < first, hump((at - first) / spans[0]), 0.0)[:, None] * values[0]
     changes += np.where(at > last, hump((at - last) / spans[-1]), 0.0)[:, None] * values[-1]
-    changes[np.asarray(frames, np.intp)] = values
+    changes[frames] = values
     for k in range(len(frames) - 1):
         begin, end = int(frames[k]), int(frames[k + 1])
         inner = slice(begin + 1, end)
@@ -71,10 +71,3 @@ def fades(frames: Array, values: Array, spans: Array, count: int) -> Array:
             changes[inner] = hump((at[inner] - begin) / spans[k])[:, None] * values[k]
             changes[inner] += hump((at[inner] - end) / spans[k + 1])[:, None] * values[k + 1]
     return changes
-
-
-def runs_over(mask: NDArray[np.bool_], shortest: int) -> list[tuple[int, int]]:
-    """Return (begin, end) of stretches of True of at least `shortest` frames, end exclusive."""
-    from marey.motion.feet import runs
-
-    return [(begin, end) for begin, end in runs(mask) if end - begin >= shortest]

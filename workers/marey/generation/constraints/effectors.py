@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.shots.constraints.asked import Target
-from marey.generation.shots.constraints.curves import fades
-from marey.generation.shots.constraints.poses import Posed
+from marey.generation.constraints.constraint_set import Target
+from marey.generation.constraints.curves import fades
+from marey.generation.constraints.poses import BodyMotion
 from marey.motion.hands import arms
 from marey.motion.kinematics import facing, forward_kinematics, global_rotations
 from marey.motion.legs import follow_feet, foot_chain, two_bone_knee
@@ -50,7 +50,7 @@ def trunk(skeleton: Skeleton) -> list[int]:
     return [j for j in above if j not in (skeleton.parents[shoulder],)] or above
 
 
-def with_targets(posed: Posed, targets: Sequence[Target], skeleton: Skeleton, fps: float) -> Posed:
+def with_targets(posed: BodyMotion, targets: Sequence[Target], skeleton: Skeleton, fps: float) -> BodyMotion:
     """Return the motion with its effectors at their targets."""
     if not targets:
         return posed
@@ -74,7 +74,7 @@ def with_targets(posed: Posed, targets: Sequence[Target], skeleton: Skeleton, fp
         follow_feet(before, joints, np.zeros((len(joints), 2), bool), skeleton, fps)
     rotations = aim_bones(joints, posed.rotations, skeleton)
     rotations = _turn_ends(rotations, targets, skeleton, fps)
-    return Posed(rotations, joints[:, 0], contacts)
+    return BodyMotion(rotations, joints[:, 0], contacts)
 
 
 def _by_frame(targets: Sequence[Target]) -> Mapping[int, list[tuple[str, int, Array]]]:
@@ -100,7 +100,9 @@ def _spans(need: Array, fps: float) -> Array:
     return np.clip(PER_METRE_S * np.linalg.norm(need, axis=1), FADE_S, LONGEST_S) * fps
 
 
-def _body(posed: Posed, wanted: Mapping[int, list[tuple[str, int, Array]]], skeleton: Skeleton, fps: float) -> Posed:
+def _body(
+    posed: BodyMotion, wanted: Mapping[int, list[tuple[str, int, Array]]], skeleton: Skeleton, fps: float
+) -> BodyMotion:
     """Return the motion with a trunk that leans, and a root that gives way, as far as limbs do not reach."""
     frames = sorted(wanted)
     solved = [_lean(posed.rotations[f], posed.root[f], wanted[f], skeleton) for f in frames]
@@ -117,7 +119,7 @@ def _body(posed: Posed, wanted: Mapping[int, list[tuple[str, int, Array]]], skel
         chain = foot_chain(skeleton, toe)
         moved[:, chain] = before[:, chain]
     follow_feet(start, moved, posed.contacts[:, 1::2], skeleton, fps)
-    return Posed(aim_bones(moved, rotations, skeleton), moved[:, 0], posed.contacts)
+    return BodyMotion(aim_bones(moved, rotations, skeleton), moved[:, 0], posed.contacts)
 
 
 def _leaning(rotations: Array, lean: Array, skeleton: Skeleton) -> Array:

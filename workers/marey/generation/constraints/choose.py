@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from marey.generation.constraints.constraint_set import ConstraintSet
+from marey.generation.constraints.fit import fit_clip
+from marey.generation.constraints.measure import constraint_errors
 from marey.generation.export import judged
 from marey.generation.port import Request
-from marey.generation.shots.constraints.asked import Asked
-from marey.generation.shots.constraints.fit import fit_clip
-from marey.generation.shots.constraints.measure import constraint_errors
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import at_origin
 from marey.quality.record import KEY, SHOWN, Flag, MotionQuality, PromptMatch, read_quality
@@ -32,7 +32,7 @@ class Fitted:
     seed: int
 
 
-def fit_candidate(clip: MotionClip, request: Request, asked: Asked, misfit: float) -> Fitted:
+def fit_candidate(clip: MotionClip, request: Request, asked: ConstraintSet, misfit: float) -> Fitted:
     """Fit a finished candidate, and put it to the origin, with its errors in the quality record."""
     made = fit_clip(clip, asked)
     errors = constraint_errors(made, asked)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.generation.shots.constraints.curves import hump
-from marey.generation.shots.constraints.poses import Posed
-from marey.generation.shots.constraints.timing import Timing
+from marey.generation.constraints.curves import hump
+from marey.generation.constraints.poses import BodyMotion
+from marey.generation.constraints.timing import Timing
 from marey.motion.clip import MotionClip
 from marey.motion.feet import clean_feet
 from marey.motion.kinematics import facing, forward_kinematics
@@ -19,16 +19,16 @@ BLEND_S = 0.25
 """Seconds on each side of a seam within which both motions pass into each other."""
 
 
-def played(clip: MotionClip, timing: Timing) -> Posed:
+def played(clip: MotionClip, timing: Timing) -> BodyMotion:
     """Return a clip as it is at other moments; at seams the poses pass into each other, and feet stand still."""
     times = timing.times
     if len(times) == clip.frames and np.array_equal(times, np.arange(clip.frames)):
-        return Posed(clip.rotations.astype(np.float64), clip.root.astype(np.float64), clip.contacts)
+        return BodyMotion(clip.rotations.astype(np.float64), clip.root.astype(np.float64), clip.contacts)
     rotations, root = clip.rotations.astype(np.float64), clip.root.astype(np.float64)
     turns, moved = interpolate_rotations(rotations, times), interpolate(root, times)
     contacts = clip.contacts[np.rint(times).astype(np.intp)]
     if not timing.begins:
-        return Posed(turns, moved, contacts)
+        return BodyMotion(turns, moved, contacts)
     skeleton, span = clip.skeleton, round(BLEND_S * clip.fps)
     for before, piece in zip(timing.pieces, timing.pieces[1:], strict=False):
         after = min(times[before.stop - 1] + 1, clip.frames - 1.0)  # that the piece before would have shown next
@@ -44,7 +44,7 @@ def played(clip: MotionClip, timing: Timing) -> Posed:
         _blend(turns, moved, next_turns[0], next_root[0], piece.start, span)
     joints = forward_kinematics(skeleton, turns, moved)
     joints, contacts = clean_feet(joints, skeleton, clip.fps, contacts=contacts)
-    return Posed(aim_bones(joints, turns, skeleton), joints[:, 0], contacts)
+    return BodyMotion(aim_bones(joints, turns, skeleton), joints[:, 0], contacts)
 
 
 def _to(turns: Array, root: Array, there_turns: Array, there_root: Array, skeleton: Skeleton) -> tuple[Array, Array]:

@@ -78,7 +78,7 @@ class Target:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class ConstraintSet:
     """All constraints of one clip.
 
     Attributes:
@@ -94,20 +94,20 @@ class Asked:
     targets: tuple[Target, ...]
     retimed: bool = True
 
-    def at_rate(self, fps: float, frames: int) -> Asked:
+    def at_rate(self, fps: float, frames: int) -> ConstraintSet:
         """Return the paths at another rate, without other constraints."""
         paths = tuple(replace(path, frames=path.frames * (fps / self.fps)) for path in self.paths)
-        return Asked(fps, frames, paths, (), (), self.retimed)
+        return ConstraintSet(fps, frames, paths, (), (), self.retimed)
 
 
-def asked_of(constraints: Sequence[Mapping[str, Any]], skeleton: Skeleton, frames: int, fps: float) -> Asked:
+def asked_of(constraints: Sequence[Mapping[str, Any]], skeleton: Skeleton, frames: int, fps: float) -> ConstraintSet:
     """Return checked constraints as arrays.
 
     Raises:
         InvalidInput: a pose of another skeleton, or one that still names a motion; with the field in `where`.
     """
     numbered = list(enumerate(constraints))
-    return Asked(
+    return ConstraintSet(
         fps,
         frames,
         tuple(_path(number, each, fps) for number, each in numbered if each["type"] == ROOT_PATH),
