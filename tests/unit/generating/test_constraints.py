@@ -1,0 +1,212 @@
+"""Motions with constraints: of tiny bundles with random weights, and the parts of the fit."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidInput
+from marey.generate.poses import with_poses
+from marey.generation.candidates import DrawPlan
+from marey.generation.constraints.curves import fades, smooth_open, through
+from marey.generation.constraints.draw import constrained_clips, constrained_request
+from marey.generation.constraints.paths import stand_clock
+from marey.generation.constraints.timing import NO_JUMPS, play_times
+from marey.generation.port import Request
+from marey.items.constraints import read_constraints
+from marey.motion.arrange import placement_of
+from marey.motion.clip import MotionClip
+from marey.motion.rotations import rotate
+from marey.motion.skeleton import HUMANML3D
+from marey.quality.record import Flag, read_quality
+from marey.registry import get_model, resolve
+from marey.text.features import TextFeatures
+from marey.text.graph import build_graph
+from tests.support.models import random_bundle
+
+FRAMES = 60
+AT = [*range(0, FRAMES, 6), FRAMES - 1]
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    spec = get_model("hgm3")
+    assert spec.training is not None
+    config = replace(resolve(spec.training.config)("tiny"), max_frames=196)
+    bundle = random_bundle("hgm3", tmp_path_factory.mktemp("models") / "hgm3", config=config, seed=0)
+    return resolve(spec.load)(bundle, device="cpu", threads=1)
+
+
+def request(generator: Any, seed: int = 0, prompt: str = "a person walks") -> Request:
+    graph = build_graph(prompt, (), max_actions=8, max_specifics=16)
+    drawn = np.random.default_rng(int.from_bytes(hashlib.sha256(prompt.encode()).digest()[:4], "little"))
+    nodes = drawn.standard_normal((len(graph.nodes), generator.limits.text_width)).astype(np.float16)
+    return Request(TextFeatures(prompt, prompt, graph, nodes), seed, FRAMES)
+
+
+def line(start: tuple[float, float] = (0.0, 0.0), turn: float = 0.0) -> dict[str, Any]:
+    way = np.linspace(0, 2.0, FRAMES)[AT]
+    places = [[start[0] + float(np.sin(turn)) * w, start[1] + float(np.cos(turn)) * w] for w in way.tolist()]
+    return {"type": "root_path", "frames": AT, "positions_xz": places, "heading_radians": [turn] * len(AT)}
+
+
+POSE = {"type": "pose_keyframe", "frame": FRAMES - 1, "joint_rotations": [[1.0, 0.0, 0.0, 0.0]] * len(HUMANML3D)}
+
+
+def hand(clip_frame: int = 30) -> dict[str, Any]:
+    return {"type": "effector_target", "joint": "left_wrist", "frames": [clip_frame], "positions": [[0.35, 1.1, 1.3]]}
+
+
+def make(generator: Any, constraints: list[dict[str, Any]], *seeds: int, fps: float | None = None) -> list[MotionClip]:
+    read, plan = read_constraints(constraints), DrawPlan(fps)
+    asked = [constrained_request(generator, request(generator, seed), read, 3.0, fps) for seed in seeds]
+    made = constrained_clips(generator, asked, [read] * len(asked), generator.settings({}), plan)
+    assert all(clip is not None for clip in made)
+    return [clip for clip in made if clip is not None]
+
+
+def in_given_space(clip: MotionClip) -> np.ndarray[Any, Any]:
+    turn, shift = placement_of(clip)
+    return rotate(turn, clip.joints.astype(np.float64)) + shift
+
+
+def test_a_path_a_pose_and_a_hand_are_met_at_once(generator: Any) -> None:
+    (clip,) = make(generator, [line(), POSE, hand()], 0)
+    quality = read_quality(clip.manifest)
+    assert quality is not None
+    assert quality.constraints is not None
+    assert [error.type for error in quality.constraints] == ["root_path", "pose_keyframe", "effector_target"]
+    assert not any(error.missed for error in quality.constraints)
+    assert Flag.CONSTRAINT_MISSED not in quality.flags
+    joints = in_given_space(clip)
+    far = np.linalg.norm(joints[AT, 0][:, [0, 2]] - np.array(line()["positions_xz"]), axis=1)
+    assert far.mean() < 0.10
+    assert np.linalg.norm(joints[30, HUMANML3D.index("L_wrist")] - hand()["positions"][0]) < 0.03
+    assert clip.frames == FRAMES
+    assert clip.manifest["constraints"] == read_constraints([line(), POSE, hand()])
+
+
+def test_a_path_elsewhere_is_moved_to_the_origin_and_the_move_is_kept(generator: Any) -> None:
+    (clip,) = make(generator, [line((3.0, -2.0), 1.2)], 0)
+    assert np.abs(clip.root[0, [0, 2]]).max() < 0.02
+    placement = clip.manifest["placement"]
+    assert placement["x"] == pytest.approx(3.0, abs=0.05)
+    assert placement["z"] == pytest.approx(-2.0, abs=0.05)
+    assert placement["heading"] == pytest.approx(1.2, abs=0.3)
+    far = in_given_space(clip)[AT, 0][:, [0, 2]] - np.array(line((3.0, -2.0), 1.2)["positions_xz"])
+    assert np.linalg.norm(far, axis=1).mean() < 0.10
+
+
+def test_a_motion_does_not_depend_on_its_batch(generator: Any) -> None:
+    together, (alone,) = make(generator, [line(), hand()], 3, 4), make(generator, [line(), hand()], 4)
+    assert together[1].to_npz() == alone.to_npz()
+    assert together[0].to_npz() != alone.to_npz()
+
+
+def test_frames_are_those_of_the_output(generator: Any) -> None:
+    target = {**hand(60), "frames": [60]}
+    (clip,) = make(generator, [target], 0, fps=40.0)
+    assert np.linalg.norm(in_given_space(clip)[60, HUMANML3D.index("L_wrist")] - target["positions"][0]) < 0.03
+
+
+def test_a_missed_constraint_is_flagged(generator: Any) -> None:
+    far = {**hand(), "positions": [[0.0, 2.55, 0.0]]}
+    (clip,) = make(generator, [line(), far], 0)
+    quality = read_quality(clip.manifest)
+    assert quality is not None
+    assert quality.constraints is not None
+    assert Flag.CONSTRAINT_MISSED in quality.flags
+    assert quality.constraints[1].max_m > 0.03
+
+
+def test_the_path_decides_the_length(generator: Any) -> None:
+    free = replace(request(generator), frames=100)
+    asked = constrained_request(generator, free, read_constraints([line()]), None, None)
+    assert asked.frames == FRAMES
+
+
+@pytest.mark.parametrize(
+    ("constraint", "where", "message"),
+    [
+        ({**POSE, "joint_rotations": {"tail": [1, 0, 0, 0]}}, "constraints.0.joint_rotations", "unknown joint 'tail'"),
+        ({**POSE, "joint_rotations": {"pelvis": [1, 0, 0, 0]}}, "constraints.0.joint_rotations", "'L_hip' is missing"),
+        ({**POSE, "joint_rotations": [[1, 0, 0, 0]] * 21}, "constraints.0.joint_rotations", "21 rotations"),
+        ({**POSE, "frame": FRAMES}, "constraints.0.frame", "beyond the clip"),
+    ],
+)
+def test_refused(generator: Any, constraint: dict[str, Any], where: str, message: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        constrained_request(generator, request(generator), read_constraints([constraint]), 3.0, None)
+    assert refused.value.where == where
+    assert message in refused.value.message
+
+
+def test_a_pose_is_read_from_a_motion_file(generator: Any, tmp_path: Path) -> None:
+    (clip,) = make(generator, [hand()], 5)
+    clip.save_npz(tmp_path / "pose.npz")
+    named = {"type": "pose_keyframe", "frame": 59, "motion": {"file": "pose.npz", "frame": 7}}
+    (read,) = with_poses(read_constraints([named]), tmp_path)
+    assert read["root_height"] == pytest.approx(float(clip.root[7, 1]))
+    (posed,) = make(generator, [read], 0)
+    quality = read_quality(posed.manifest)
+    assert quality is not None
+    assert quality.constraints is not None
+    assert quality.constraints[0].max_m < 0.05
+    for wrong, field in (
+        ({"file": "pose.npz", "frame": 600}, "frame"),
+        ({"file": "none.npz", "frame": 0}, "file"),
+        ({"id": "0199", "frame": 0}, "id"),
+    ):
+        with pytest.raises(InvalidInput) as refused:
+            with_poses(read_constraints([{**named, "motion": wrong}]), tmp_path)
+        assert refused.value.where == f"constraints.0.motion.{field}"
+
+
+def test_smoothing_keeps_both_ends() -> None:
+    values = np.random.default_rng(0).standard_normal((50, 2)).cumsum(axis=0)
+    smoothed = smooth_open(values, 4.0)
+    assert np.allclose(smoothed[[0, -1]], values[[0, -1]])
+    assert np.abs(np.diff(smoothed, 2, axis=0)).mean() < 0.3 * np.abs(np.diff(values, 2, axis=0)).mean()
+
+
+def test_a_curve_passes_through_its_points() -> None:
+    frames, values = np.array([0.0, 7.0, 20.0]), np.array([[0.0, 1.0], [2.0, 0.0], [2.5, 4.0]])
+    assert np.allclose(through(frames, values, frames), values)
+    assert np.allclose(
+        through(frames, values, np.array([-1.0]))[0] - values[0],
+        values[0] - through(frames, values, np.array([1.0]))[0],
+        atol=0.1,
+    )
+
+
+def test_changes_are_whole_at_their_frames_and_fade() -> None:
+    changes = fades(np.array([10, 40]), np.array([[1.0], [-2.0]]), np.array([5.0, 5.0]), 60)
+    assert changes[[10, 40], 0].tolist() == [1.0, -2.0]
+    assert not changes[[0, 5, 16, 34, 46], 0].any()
+    near = fades(np.array([10, 14]), np.array([[1.0], [1.0]]), np.array([5.0, 5.0]), 60)
+    assert np.allclose(near[10:15], 1.0)
+
+
+def test_time_is_played_faster_or_cut_where_speeds_ask_for_it() -> None:
+    natural = np.concatenate([np.zeros(30), np.full(70, 1.0)])
+    asked, weight = np.full(60, 1.0), np.ones(60)
+    timing = play_times(natural, asked, weight, 20.0, NO_JUMPS)
+    assert timing.times[0] >= 25  # the stand before the walk is cut
+    assert (np.diff(timing.times) >= 0).all()
+    assert play_times(natural, np.zeros(100), np.zeros(100), 20.0, NO_JUMPS).times.tolist() == [*range(100)]
+
+
+def test_a_standing_foot_has_one_moment() -> None:
+    stands = np.zeros(60, bool)
+    stands[10:25], stands[35:50] = True, True
+    clock, still = stand_clock(stands, 20.0)
+    assert set(clock[10:25]) == {17.0}
+    assert set(clock[35:50]) == {42.0}
+    assert (np.diff(clock) >= 0).all()
+    assert still[10:25].all()
+    assert not still[27:33].any()
