@@ -415,6 +415,26 @@ def studio(
     _measure(lambda how: measure_studio(bundle, how), seeds, settings, threads, output, as_json)
 
 
+@app.command()
+def constraints(
+    bundle: JudgedBundle,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="DATA", help="A prepared folder, for paths and poses of its test clips."),
+    ] = None,
+    captured: Annotated[int, typer.Option("--captured", min=1, help="Test clips of DATA.")] = 140,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each drawn shape at each speed.")] = 5,
+    settings: evaluating.Settings = None,
+    threads: Threads = 0,
+    output: ReportFolder = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure how well a bundle's motions meet constraints, and what that costs them. Needs no server."""
+    from marey.cli.roles.constraining import measure_constraints
+
+    _measure(lambda how: measure_constraints(bundle, data, captured, how), seeds, settings, threads, output, as_json)
+
+
 def _measure(
     measure: Callable[[MeasureOptions], RefereeReport],
     seeds: int,
