@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from marey.generation.constraints.constraint_set import ConstraintSet
 from marey.generation.constraints.fit import fit_clip
 from marey.generation.constraints.measure import constraint_errors
@@ -14,8 +16,8 @@ from marey.motion.edits.place import at_origin
 from marey.quality.record import KEY, SHOWN, Flag, MotionQuality, PromptMatch, read_quality
 from marey.quality.selection import Candidate
 
-SLIDING = 2.0
-"""Weight of the share of sliding frames beside `misfit`."""
+SLIDING, JERKING = 2.0, 0.3
+"""Weights beside `misfit`: of the share of sliding frames, and of the logarithm of how much jerk the fit added."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,8 @@ def fit_candidate(clip: MotionClip, request: Request, asked: ConstraintSet, misf
     quality = quality.with_constraints(errors)
     met = Flag.CONSTRAINT_MISSED not in quality.flags
     match = None if quality.match is None else quality.match.value
-    rank = (met, match is None or match >= SHOWN, sound, -misfit - SLIDING * quality.skate)
+    cost = misfit + SLIDING * quality.skate + JERKING * float(np.log(_jerk(made) / _jerk(clip)))
+    rank = (met, match is None or match >= SHOWN, sound, -cost)
     return Fitted(replace(made, manifest={**made.manifest, KEY: quality.model_dump(mode="json")}), rank, request.seed)
 
 
@@ -56,6 +59,12 @@ def candidate_of(index: int, fitted: Fitted) -> Candidate:
     flags = [] if quality is None else quality.flags
     match = None if quality is None or quality.match is None else quality.match.value
     return Candidate(index=index, seed=fitted.seed, flags=flags, ok=not flags, match=match)
+
+
+def _jerk(clip: MotionClip) -> float:
+    """Return the mean jerk of joints, m/s³, 1 or more."""
+    third = np.diff(clip.joints.astype(np.float64), 3, axis=0) * clip.fps**3
+    return 1.0 + float(np.linalg.norm(third, axis=-1).mean()) if len(third) else 1.0
 
 
 def _value(quality: MotionQuality | None) -> float:

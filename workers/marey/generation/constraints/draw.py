@@ -28,7 +28,7 @@ from marey.quality.selection import KEY, Selection
 
 CANDIDATES = 8
 """Candidates of a motion, unless its `best_of` asks for more."""
-FITTED = 3
+FITTED = 4
 """Candidates that are fitted, the best by `misfit`."""
 LENGTHS = (1.0, 1.25, 1.5, 1.0, 2.0, 0.9, 1.25, 1.5)
 """Lengths of candidates for a path, as shares of the clip's: of a longer one the part with the best speeds is shown, or

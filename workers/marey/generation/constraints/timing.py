@@ -28,7 +28,7 @@ STILL = 0.4
 """Metres a second that are added to both speeds: under it they hardly differ."""
 CUT = 0.03
 """Cost of a frame that is not shown, beside a frame at speeds that differ by a factor of e."""
-STEADY = 1.5
+STEADY = 2.5
 """Weight of the play rate's own logarithm beside that of the speeds' ratio."""
 SMOOTH_S = 0.2
 JUMP, JUMP_PER_METRE = 0.6, 20.0
