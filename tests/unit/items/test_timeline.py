@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
-from marey.items.item import Item, read_item
+from marey.items.item import read_item
 from marey.items.timeline import MIN_ROW_SECONDS, read_timeline, timeline_text
 
 WALK = {"start": 0, "end": 3, "prompt": "a person walks"}
@@ -125,12 +125,3 @@ def test_the_seconds_of_a_timeline_may_be_said_again() -> None:
 def test_an_item_needs_a_prompt_or_a_timeline() -> None:
     item, (problem,) = read_item({"seed": 3})
     assert (item, problem.field) == (None, "prompt")
-
-
-def test_constraints_are_objects() -> None:
-    item, problems = read_item({"prompt": "walk", "constraints": [{"type": "root_path"}]})
-    assert item == Item("walk", constraints=[{"type": "root_path"}])
-    assert problems == []
-    assert [each.field for each in read_item({"prompt": "walk", "constraints": {"type": "root_path"}})[1]] == [
-        "constraints"
-    ]

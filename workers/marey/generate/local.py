@@ -228,6 +228,9 @@ def _constraints(given: Sequence[Mapping[str, object]] | None) -> Sequence[Mappi
 def _wanted(
     item: Item, seconds: float | None, settings: Mapping[str, float], constraints: Sequence[Mapping[str, Any]]
 ) -> Iterator[Wanted]:
+    from marey.generate.poses import constraints_of
+
     seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+    asked = constraints_of(item, constraints)
     for variant in range(item.variants):
-        yield Wanted(item.prompt, seed + variant, seconds, settings, item.timeline, item.constraints or constraints)
+        yield Wanted(item.prompt, seed + variant, seconds, settings, item.timeline, asked)

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.errors import InvalidInput, MareyError
+from marey.items.constraints import MAX_FILE, parse_constraints
+from marey.items.item import Item
 
 
 def with_poses(constraints: Sequence[Mapping[str, Any]], folder: Path) -> list[dict[str, Any]]:
@@ -49,3 +51,22 @@ def _with_pose(each: Mapping[str, Any], where: str, folder: Path) -> dict[str, A
     read = {name: value for name, value in each.items() if name != "motion"}
     height = {} if "root_position" in each or "root_height" in each else {"root_height": float(clip.root[frame, 1])}
     return {**read, "joint_rotations": rotations, **height}
+
+
+def constraints_of(item: Item, given: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
+    """Return the constraints of an item, read from the working directory, or else those given for all."""
+    return with_poses(item.constraints, Path()) if item.constraints else given
+
+
+def read_file(file: Path | None) -> Sequence[Mapping[str, Any]]:
+    """Return the constraints of a JSON file; motion files that they name are found from its folder.
+
+    Raises:
+        NotFound, TooLarge: the file cannot be read.
+        InvalidInput: constraints that cannot be used, with the field.
+    """
+    if file is None:
+        return ()
+    from marey.motion.files import read_limited
+
+    return with_poses(parse_constraints(read_limited(file, MAX_FILE)), file.parent)

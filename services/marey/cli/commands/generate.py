@@ -78,6 +78,7 @@ def generate(
     """Generate motions in this process, without a server or a queue."""
     from marey.cli.roles.editing import loop as loop_clip
     from marey.cli.roles.generating import OneShot
+    from marey.cli.roles.generating import read_file as read_constraints_file
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
@@ -100,7 +101,7 @@ def generate(
     shaped = _body_of(chosen, body)
     if scope is options.ScopeOption.REFUSE:
         _refuse(reader, items, chosen)
-    planned = _plan(items, chosen, output, name_template, kinds, _constraints(constraints))
+    planned = _plan(items, chosen, output, name_template, kinds, read_constraints_file(constraints))
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
     studio = OneShot(chosen, config, body=shaped)
@@ -121,22 +122,6 @@ def generate(
             else:
                 for path in line["files"].values():
                     console.result(console.home_relative(path))
-
-
-def _constraints(file: Path | None) -> Sequence[Mapping[str, Any]]:
-    """Return the constraints of a JSON file; motion files that they name are found from its folder.
-
-    Raises:
-        NotFound, TooLarge: the file cannot be read.
-        InvalidInput: constraints that cannot be used, with the field.
-    """
-    if file is None:
-        return ()
-    from marey.cli.roles.generating import with_poses
-    from marey.items.constraints import MAX_FILE, parse_constraints
-    from marey.motion.files import read_limited
-
-    return with_poses(parse_constraints(read_limited(file, MAX_FILE)), file.parent)
 
 
 def _body_of(bundle: Bundle, given: str) -> NamedBody | None:
@@ -327,7 +312,7 @@ def _plan(
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
     """
     from marey.bundles.limits import length_of, sampling_of
-    from marey.cli.roles.generating import Wanted
+    from marey.cli.roles.generating import Wanted, constraints_of
 
     names = FileNames(template)
 
@@ -335,7 +320,7 @@ def _plan(
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         settings, seconds = sampling_of(bundle, item), length_of(bundle, item)
         for variant in range(item.variants):
-            asked = item.constraints or constraints
+            asked = constraints_of(item, constraints)
             wanted = Wanted(item.prompt, seed + variant, seconds, settings, item.timeline, asked)
             name = item.name or slug(item.prompt)
             naming = Naming(

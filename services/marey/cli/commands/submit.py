@@ -30,6 +30,7 @@ MAX_GAP_NOTES = 3
 def submit(
     prompts: options.Prompts = None,
     timelines: options.Timelines = None,
+    constraints: options.Constraints = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
     extra_columns: options.Extra = options.ExtraColumns.REFUSE,
@@ -89,6 +90,10 @@ def submit(
         variety=None if variety is None else variety.value,
         tags=tags,
     )
+    if constraints is not None:
+        from marey.cli.roles.generating import read_file as read_constraints_file
+
+        defaults = {**defaults, "constraints": read_constraints_file(constraints)}
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
     with Lines(item.as_json() for item in report_gaps(reader)) as lines:
         if reader.total:

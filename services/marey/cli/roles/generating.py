@@ -6,10 +6,10 @@ from pathlib import Path
 
 from marey.core.errors import InvalidInput
 from marey.generate.oneshot import OneShot, Wanted
-from marey.generate.poses import with_poses
+from marey.generate.poses import constraints_of, read_file
 from marey.registry import get_model, resolve
 
-__all__ = ["OneShot", "Wanted", "make_random_bundle", "with_poses"]
+__all__ = ["OneShot", "Wanted", "constraints_of", "make_random_bundle", "read_file"]
 
 
 def make_random_bundle(model: str, path: Path) -> None:
