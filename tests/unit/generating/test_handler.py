@@ -284,3 +284,21 @@ def test_a_replaced_bundle_is_refused(model: str, bundle: str, tmp_path: Path) -
     exact = bundle.rpartition("@")[2]
     with pytest.raises(Exception, match="replaced since"):
         handler_of(model).load(f"{other.path}@{exact}")
+
+
+def test_constrained_items_beside_others_in_a_batch(handler: GeneratorHandler[Any]) -> None:
+    path = {"type": "root_path", "frames": [0, 20, 39], "positions_xz": [[0.0, 0.0], [0.2, 0.6], [0.5, 1.0]]}
+    free, late = make_item("walk", 1, 2.0), [{**path, "frames": [0, 20, 2000]}]
+    bound = replace(make_item("walk", 2, 2.0), constraints=[path])
+    bad = replace(make_item("walk", 3, 2.0), constraints=late)
+    made = run(handler, make_batch(handler, free, bound, bad))
+    failed, clip = made[bad.id], clip_of(made[bound.id])
+    assert isinstance(failed, Failed)
+    assert failed.problem.where == "constraints.0.frames.2"
+    assert clip_of(made[free.id]).manifest["seed"] == 1
+    assert clip.manifest["seed"] == 2
+    assert clip.manifest["constraints"] == [path]
+    first, last = clip.root[0, [0, 2]], clip.root[-1, [0, 2]]
+    assert np.linalg.norm(last - first) == pytest.approx(np.hypot(0.5, 1.0), abs=0.25)
+    alone = clip_of(run(handler, make_batch(handler, bound))[bound.id])
+    assert alone.to_npz() == clip.to_npz()
