@@ -76,8 +76,8 @@ def read_case(case: Case, clip: MotionClip, free: MotionClip) -> ConstraintReadi
 
 
 def shows(actions: Sequence[str], clip: MotionClip) -> bool:
-    """Return True if the referee sees the actions, in the motion or in the same motion along a straight line: who walks
-    along a circle walks."""
+    """Return True if the referee sees the actions, in the motion or in the same motion along a straight line: a walk
+    along a circle is a walk."""
     joints = clip.joints.astype(np.float64)
     return any(shows_in_order(actions, Body(each, clip.fps)) for each in (joints, straightened(clip)))
 
