@@ -18,7 +18,7 @@ from marey.generation.port import Limits, Request
 from marey.generation.shots import context, edits
 from marey.generation.shots.context import context_error, model_features
 from marey.generation.shots.editor import EditModel
-from marey.generation.shots.windows import CONTEXT, Gap, crossfaded, fill, most_frames, no_text
+from marey.generation.shots.windows import CONTEXT, FrameGap, crossfaded, fill, most_frames, no_text
 from marey.models.hgm3.generate import Generator
 from marey.motion import MotionClip, edit
 from marey.motion.body import standard_body
@@ -67,7 +67,7 @@ def steps(clip: MotionClip) -> np.ndarray:
     return np.linalg.norm(np.diff(clip.joints, axis=0), axis=-1).max(1)
 
 
-def apart(first: np.ndarray, second: np.ndarray) -> float:
+def moved_between(first: np.ndarray, second: np.ndarray) -> float:
     """Return the largest difference of the distances to the first pose: 0 where one motion is the other elsewhere."""
     lengths = [np.linalg.norm(each[:, :, None] - each[:1, None], axis=-1) for each in (first, second)]
     return float(np.abs(lengths[0] - lengths[1]).max())
@@ -107,7 +107,7 @@ def test_an_extension_is_longer_than_a_window_of_the_model(model: EditModel, cli
     assert longer.frames == clip.frames + 500
     assert np.array_equal(longer.joints[: clip.frames], clip.joints)
     pieces = [longer.joints[start : start + 40] for start in (130, 330, 530)]
-    assert min(apart(a, b) for a, b in pairwise(pieces)) > 0.001  # no window repeats another
+    assert min(moved_between(a, b) for a, b in pairwise(pieces)) > 0.001  # no window repeats another
 
 
 def test_the_same_seed_gives_the_same_frames_and_another_seed_others(model: EditModel, clip: MotionClip) -> None:
@@ -123,7 +123,7 @@ def test_a_repaint_keeps_the_frames_before_and_after(model: EditModel, clip: Mot
     changed = one(model, clip, {"op": "repaint", "from": "f40", "to": "f70"})
     assert changed.frames == clip.frames
     assert np.array_equal(changed.joints[:40], clip.joints[:40])
-    assert apart(changed.joints[71:], clip.joints[71:]) < EXACT
+    assert moved_between(changed.joints[71:], clip.joints[71:]) < EXACT
     assert not np.allclose(changed.joints[40:71], clip.joints[40:71], atol=0.01)
 
 
@@ -138,8 +138,8 @@ def test_frames_after_a_repaint_can_keep_their_place(model: EditModel, clip: Mot
 def test_the_beginning_is_repainted_before_the_rest(model: EditModel, clip: MotionClip) -> None:
     changed = one(model, clip, {"op": "repaint", "to": 1.5, "prompt": "a person jumps"})
     assert changed.frames == clip.frames
-    assert apart(changed.joints[31:], clip.joints[31:]) < EXACT
-    assert apart(changed.joints[:31], clip.joints[:31]) > 0.01
+    assert moved_between(changed.joints[31:], clip.joints[31:]) < EXACT
+    assert moved_between(changed.joints[:31], clip.joints[:31]) > 0.01
 
 
 def test_the_way_between_two_motions_keeps_both(generator: Generator, model: EditModel, clip: MotionClip) -> None:
@@ -149,7 +149,7 @@ def test_the_way_between_two_motions_keeps_both(generator: Generator, model: Edi
     behind = whole.joints[clip.frames + 20 :]
     assert len(behind) == 79
     (at_20,) = edit(other, [{"op": "fps", "rate": 20}])
-    assert apart(behind, at_20.joints) < EXACT
+    assert moved_between(behind, at_20.joints) < EXACT
     prompted = one(model, clip, {"op": "in-between", "with": other, "seconds": 1.0, "prompt": "a person turns"})
     assert not np.array_equal(prompted.joints[clip.frames : clip.frames + 20], whole.joints[clip.frames :][:20])
 
@@ -280,7 +280,7 @@ def test_features_of_a_clip_are_its_own_or_those_of_its_poses(generator: Generat
     assert model_features(again, layout) is again.features
     scale = body.offsets[4, 1] / layout.skeleton.offsets[4, 1]
     there = layout.decode(made) * scale
-    assert apart(there[:, LEGS], moving.joints[:, LEGS]) < 2e-3
+    assert moved_between(there[:, LEGS], moving.joints[:, LEGS]) < 2e-3
 
 
 def test_tokens_show_their_own_motion_exactly_enough(generator: Generator) -> None:
@@ -291,7 +291,7 @@ def test_tokens_show_their_own_motion_exactly_enough(generator: Generator) -> No
 
 def test_a_crossfade_changes_the_context_alone(generator: Generator) -> None:
     source = generated(generator, 5, 120).features
-    gap = Gap(source[:40], 10, source[50:], no_text(384), 3, free=True)
+    gap = FrameGap(source[:40], 10, source[50:], no_text(384), 3, free=True)
     (window,) = fill(generator, [gap], generator.settings({}))
     assert window is not None
     assert (window.first, window.end) == (40, 50)
@@ -304,7 +304,9 @@ def test_a_crossfade_changes_the_context_alone(generator: Generator) -> None:
 
 def test_windows_are_equal_in_any_batch(generator: Generator) -> None:
     source = generated(generator, 5, 160).features
-    gaps = [Gap(source[:at], 12 + at // 10, source[at + 12 + at // 10 :], text_features(at), at) for at in (20, 60, 90)]
+    gaps = [
+        FrameGap(source[:at], 12 + at // 10, source[at + 12 + at // 10 :], text_features(at), at) for at in (20, 60, 90)
+    ]
     together = fill(generator, gaps, generator.settings({}))
     for gap, window in zip(gaps, together, strict=True):
         (alone,) = fill(generator, [gap], generator.settings({}))
@@ -317,9 +319,9 @@ def test_windows_are_equal_in_any_batch(generator: Generator) -> None:
 def test_a_gap_that_no_window_holds_is_refused(generator: Generator) -> None:
     source = generated(generator, 5, 160).features
     most = most_frames(generator.limits, 2)
-    fill(generator, [Gap(source[:CONTEXT], most, source[:CONTEXT], text_features(1), 1)])
+    fill(generator, [FrameGap(source[:CONTEXT], most, source[:CONTEXT], text_features(1), 1)])
     with pytest.raises(InvalidInput, match="at once"):
-        fill(generator, [Gap(source[:CONTEXT], most + 1, source[:CONTEXT], text_features(1), 1)])
+        fill(generator, [FrameGap(source[:CONTEXT], most + 1, source[:CONTEXT], text_features(1), 1)])
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -335,4 +337,4 @@ def test_any_range_of_a_motion_at_any_rate_is_repainted_in_its_length(
     assert changed.frames == source.frames
     assert np.array_equal(changed.joints[:first], source.joints[:first])
     if last + 1 < source.frames:
-        assert apart(changed.joints[last + 1 :], source.joints[last + 1 :]) < EXACT
+        assert moved_between(changed.joints[last + 1 :], source.joints[last + 1 :]) < EXACT

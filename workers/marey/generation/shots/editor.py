@@ -12,7 +12,7 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Generator, KeepingGenerator
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
-from marey.generation.shots.windows import CONTEXT, Gap, Window, crossfaded, fill, most_frames, no_text
+from marey.generation.shots.windows import CONTEXT, FrameGap, Window, crossfaded, fill, most_frames, no_text
 from marey.generation.software import software_of
 from marey.items.item import MAX_SEED
 from marey.motion.body import NamedBody
@@ -166,14 +166,16 @@ class EditModel:
             most = most_frames(limits, (start > 0) + (end < len(whole)))
             count = left if left <= most else min(left - limits.keeps, most_frames(limits, int(start > 0)))
             after = whole[end:] if count == left else whole[:0]
-            window = self._window(Gap(whole[:start], count, after, text, seed, free=prompt is None, context=context))
+            window = self._window(
+                FrameGap(whole[:start], count, after, text, seed, free=prompt is None, context=context)
+            )
             # A window may end with frames that the others have no place for.
             window = replace(window, features=window.features[: len(whole) - start + window.first])
             whole = crossfaded(whole, window, start - window.first)
             start, seed = start + count, (seed + 1) % (MAX_SEED + 1)
         return whole
 
-    def _window(self, gap: Gap) -> Window:
+    def _window(self, gap: FrameGap) -> Window:
         (window,) = fill(self.generator, [gap], self.settings, control=self.control)
         if window is None:
             raise InvalidInput(CANCELLED)

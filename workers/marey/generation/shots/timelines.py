@@ -18,7 +18,7 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
-from marey.generation.shots.windows import CONTEXT, Float32, Gap, Window, crossfaded, fill, most_frames
+from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.text.features import TextFeatures
@@ -167,10 +167,10 @@ class _Row(_Strand):
         """Return the request of the first window."""
         return Request(self.text, self.seed, self.lengths[0])
 
-    def gap(self) -> Gap:
+    def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
         assert self.features is not None
-        return Gap(self.features, self.lengths[len(self.windows)], self.features[:0], self.text, self.seed)
+        return FrameGap(self.features, self.lengths[len(self.windows)], self.features[:0], self.text, self.seed)
 
     def add(self, window: Window) -> None:
         """Append a window."""
@@ -194,12 +194,12 @@ class _Transition(_Strand):
         self._before = before.features[: part.start - before.part.start]
         self._after = after.features[part.end - after.part.start :]
 
-    def gap(self) -> Gap:
+    def gap(self) -> FrameGap:
         """Return the gap of the next window."""
         made = [window.new for window in self.windows]
         before = np.concatenate([self._before[-CONTEXT:], *made]) if made else self._before
         after = self._after if self.is_last else self._after[:0]
-        return Gap(before, self.lengths[len(self.windows)], after, self.text, self.seed, free=True)
+        return FrameGap(before, self.lengths[len(self.windows)], after, self.text, self.seed, free=True)
 
     def add(self, window: Window) -> None:
         """Append a window."""

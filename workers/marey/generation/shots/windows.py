@@ -37,7 +37,7 @@ def no_text(width: int) -> TextFeatures:
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
+class FrameGap:
     """Frames to generate between others.
 
     Attributes:
@@ -87,7 +87,7 @@ def most_frames(limits: Limits, sides: int) -> int:
 
 def fill(
     generator: Generator[S],
-    gaps: Sequence[Gap],
+    gaps: Sequence[FrameGap],
     settings: S | None = None,
     *,
     control: GenerationControl | None = None,
@@ -130,7 +130,7 @@ def crossfaded(frames: Float32, window: Window, start: int) -> Float32:
     return mixed
 
 
-def _plan(gap: Gap, limits: Limits) -> tuple[Request, int]:
+def _plan(gap: FrameGap, limits: Limits) -> tuple[Request, int]:
     """Return the request of a gap, and the frames of context before it."""
     grid = limits.keeps
     if not grid:
