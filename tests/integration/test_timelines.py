@@ -14,18 +14,19 @@ from marey.client import Client
 from marey.vocabulary.scope import ActionLists
 from tests.support.command import Command
 from tests.support.live_api import BUNDLE, LiveApi, write_bundle
+from tests.support.models import NOT_KEEPING
 
 ROWS = [{"start": 0, "end": 3, "prompt": "a person walks"}, {"start": 4, "end": 20, "prompt": "a person runs"}]
 TEXT = "0-3 a person walks; 4-20 a person runs"
 BAD = "0-3 a person walks; 3-5 asdf qwer zxcv"
-MOGO = "mogo-listed"
+OTHER = "other-listed"
 
 
 @pytest.fixture(scope="module")
 def api_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("api")
     write_bundle(home / "models", actions=ActionLists(("walk", "run"), tried=("kick",)))
-    write_bundle(home / "models", MOGO, model="mogo")
+    write_bundle(home / "models", OTHER, model=NOT_KEEPING)
     return home
 
 
@@ -58,7 +59,7 @@ def test_problems_name_line_field_and_row(http: httpx2.Client) -> None:
         {"timeline": "0-3 a person walks; 2-5 a person runs"},
         {"timeline": TEXT, "prompt": "a person walks"},
         {"timeline": TEXT, "seconds": 5},
-        {"timeline": TEXT, "model": MOGO},
+        {"timeline": TEXT, "model": OTHER},
         {"seed": 3},
     )
     problem = answer.json()
@@ -70,8 +71,8 @@ def test_problems_name_line_field_and_row(http: httpx2.Client) -> None:
         (
             4,
             "timeline",
-            "the model 'mogo' cannot generate timelines: it makes no motion between other frames. Choose a bundle of "
-            "hgm3 or momaskpp, or submit each row as a prompt.",
+            f"the model {NOT_KEEPING!r} cannot generate timelines: it makes no motion between other frames. Choose a "
+            "bundle of the default model, or submit each row as a prompt.",
         ),
         (5, "prompt", "is missing: say what the person does"),
     ]

@@ -19,6 +19,10 @@ GENERATORS = tuple(sorted(name for model in model_names() for name in get_model(
 """The shipped bundles of models, by name."""
 TEXT_BUNDLES = ("minilm-l6", "srl-light", "srl-open")
 """The shipped bundles that read prompts."""
+KEEPING = tuple(name for name in model_names() if get_model(name).keeps_frames)
+"""The models that generate frames around others."""
+NOT_KEEPING = next(name for name in model_names() if name not in KEEPING)
+"""A model that does not."""
 OTHERS = tuple(name for name in model_names() if name != defaults.MODEL)
 """The models that are not the default."""
 

@@ -24,7 +24,7 @@ MAX_TIMELINE_CHARACTERS = 10_000
 SEPARATOR = ";"
 TIME_DIGITS = 3
 """Decimal places of times; more are rounded."""
-TIMELINE_HINT = "Choose a bundle of hgm3 or momaskpp, or submit each row as a prompt."
+TIMELINE_HINT = "Choose a bundle of the default model, or submit each row as a prompt."
 _ROW = re.compile(r"\s*(\d+(?:\.\d+)?)\s*s?\s*[-–]\s*(\d+(?:\.\d+)?)\s*s?(?![\w.-])[\s:,]*(.*)", re.DOTALL)
 _FORM = "write START-END and a prompt, as 0-3 a person walks; 3-5 a person waves"
 _FIELDS = ("start", "end", "prompt")

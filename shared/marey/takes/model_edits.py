@@ -80,7 +80,7 @@ def check_generator(steps: Sequence[Step], generator: EditGenerator | None) -> N
         raise InvalidInput(
             f"{manifest.name!r} cannot generate frames around others",
             where="model",
-            hint="Use a bundle of hgm3 or momaskpp.",
+            hint="Use a bundle of the default model.",
         )
 
 

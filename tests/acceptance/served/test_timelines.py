@@ -8,6 +8,7 @@ import numpy as np
 
 from marey.motion.clip import load_npz
 from tests.support.marey import Marey
+from tests.support.models import NOT_KEEPING
 
 TEXT = "0-2 a person walks forward; 2-4.5 a person waves; 6-17 a person runs"
 
@@ -36,6 +37,6 @@ def test_rows_that_overlap_are_refused(offline: Marey, tmp_path: Path) -> None:
 
 
 def test_a_model_that_cannot_refuses_before_it_is_loaded(offline: Marey, tmp_path: Path) -> None:
-    ran = offline("generate", "--timeline", TEXT, "--model", "mogo", "-o", tmp_path)
-    ran.refused(2, "timeline: the model 'mogo' cannot generate timelines")
+    ran = offline("generate", "--timeline", TEXT, "--model", NOT_KEEPING, "-o", tmp_path)
+    ran.refused(2, f"timeline: the model {NOT_KEEPING!r} cannot generate timelines")
     assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,8 @@ from marey.core.settings import Settings
 from marey.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
 
 READ_BY_HAND = {
-    "NewItemBody": {"prompt", "tags", "name", "model"},  # marey.items.item
+    "NewItemBody": {"prompt", "tags", "name", "model", "timeline", "constraints"},  # marey.items.item
+    "NewEditBody": {"model", "ops"},  # a bundle is found by it; marey.motion.edits.steps
     "EvaluationPromptBody": {"prompt", "expected"},  # marey.items.evaluation_prompts
     "NewStreamBody": {"prompt", "name", "model"},  # marey.items.item
     "ParseBody": {"prompts"},  # marey.items.prompts

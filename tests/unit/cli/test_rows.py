@@ -13,6 +13,7 @@ from marey.client.rows import defaults_of, evaluation_prompts_from_file, items_f
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import InvalidItems, Item
+from tests.support.models import NOT_KEEPING
 
 
 def write(folder: Path, name: str, content: str | bytes) -> str:
@@ -76,9 +77,9 @@ def test_a_timeline_of_jsonl_has_rows_or_a_text(tmp_path: Path) -> None:
     lines = '{"timeline": [{"start": 0, "end": 3, "prompt": "walk"}]}\n{"timeline": "0-3 walk", "model": "hgm3"}\n'
     first, second = items_from_file(write(tmp_path, "p.jsonl", lines))
     assert first.timeline == second.timeline == [{"start": 0.0, "end": 3.0, "prompt": "walk"}]
-    assert problems(tmp_path, "q.jsonl", '{"timeline": "0-3 walk", "model": "mogo"}\n') == [
-        "line 1: timeline: the model 'mogo' cannot generate timelines: it makes no motion between other frames. "
-        "Choose a bundle of hgm3 or momaskpp, or submit each row as a prompt."
+    assert problems(tmp_path, "q.jsonl", f'{{"timeline": "0-3 walk", "model": "{NOT_KEEPING}"}}\n') == [
+        f"line 1: timeline: the model {NOT_KEEPING!r} cannot generate timelines: it makes no motion between other "
+        "frames. Choose a bundle of the default model, or submit each row as a prompt."
     ]
 
 

@@ -24,7 +24,7 @@ from marey.items.timeline import read_timeline, timeline_rows
 from marey.registry import get_model, model_names, resolve
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
-from tests.support.models import random_bundle
+from tests.support.models import NOT_KEEPING, random_bundle
 
 LIMITS = Limits(16, 196, 20.0, 8, keeps=4)
 WALK = "0-3 a person walks forward; 3-5 a person waves; 6-9 a person sits down"
@@ -231,9 +231,9 @@ def test_candidates_are_of_the_whole(generator: Any) -> None:
 
 
 def test_a_model_that_keeps_no_frames_refuses(tmp_path: Path) -> None:
-    mogo = load("mogo", tmp_path)
-    with pytest.raises(InvalidInput, match="the model 'mogo' cannot generate timelines"):
-        asked_of(mogo, WALK)
+    other = load(NOT_KEEPING, tmp_path)
+    with pytest.raises(InvalidInput, match=f"the model '{NOT_KEEPING}' cannot generate timelines"):
+        asked_of(other, WALK)
 
 
 def test_features_of_another_encoder_are_refused(generator: Any) -> None:

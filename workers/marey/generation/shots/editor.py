@@ -65,7 +65,7 @@ class EditModel:
             raise InvalidInput(
                 f"{generator.bundle.manifest.name!r} cannot generate frames around others",
                 where="model",
-                hint="Use a bundle of hgm3 or momaskpp.",
+                hint="Use a bundle of the default model.",
             )
         return cls(cast("KeepingGenerator[Any]", generator), generator.settings(settings), read, control)
 
