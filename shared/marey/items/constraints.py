@@ -74,17 +74,11 @@ def parse_constraints(text: str | bytes) -> list[Constraint]:
     return read_constraints(value)
 
 
-def check_poses(constraints: Sequence[Mapping[str, Any]]) -> None:
-    """Check that no keyframe names a motion: a server stores poses, not names of them.
-
-    Raises:
-        InvalidInput: with the field in `where`.
-    """
+def named_motions(constraints: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the field and the value of each keyframe's `motion`, as `constraints.0.motion`."""
     for number, each in enumerate(constraints):
         if "motion" in each:
-            raise InvalidInput(
-                "a server reads no motions for poses: give `joint_rotations`", where=f"constraints.{number}.motion"
-            )
+            yield f"constraints.{number}.motion", each["motion"]
 
 
 def frames_of(constraint: Mapping[str, Any], fps: float) -> list[float]:
@@ -283,7 +277,9 @@ def _motion(value: object, where: str) -> dict[str, Any]:
     given = _object(value, where)
     named = [name for name in ("id", "file") if given.get(name) is not None]
     if len(named) != 1 or set(given) - {"id", "file", "frame"}:
-        raise InvalidInput('is not a frame of a motion: write {"file": "pose.npz", "frame": 0}', where=where)
+        raise InvalidInput(
+            'is not a frame of a motion: write {"id": "…", "frame": 0} or {"file": "pose.npz", "frame": 0}', where=where
+        )
     name = given[named[0]]
     if not isinstance(name, str) or not 0 < len(name) <= 1024:
         raise InvalidInput("is not a name", where=f"{where}.{named[0]}")

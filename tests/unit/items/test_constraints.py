@@ -15,8 +15,8 @@ from marey.items.constraints import (
     EFFECTORS,
     FASTEST,
     check_clip,
-    check_poses,
     last_frame,
+    named_motions,
     parse_constraints,
     read_constraints,
 )
@@ -150,11 +150,9 @@ def test_speed_depends_on_the_rate_of_the_clip() -> None:
         check_clip(fast, 60, 20.0)
 
 
-def test_a_server_refuses_names_of_motions() -> None:
-    check_poses(read_constraints([POSE]))
-    with pytest.raises(InvalidInput) as refused:
-        check_poses(read_constraints([PATH, MOTION]))
-    assert refused.value.where == "constraints.1.motion"
+def test_names_of_motions_are_found_with_their_fields() -> None:
+    assert [*named_motions(read_constraints([POSE]))] == []
+    assert [*named_motions(read_constraints([PATH, MOTION]))] == [("constraints.1.motion", MOTION["motion"])]
 
 
 def test_an_item_names_the_field_of_a_constraint() -> None:

@@ -1,0 +1,79 @@
+"""Poses that constraints name as frames of motions: read, and put in their place. numpy is loaded with the first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from marey.core.errors import InvalidInput, MareyError
+from marey.core.extras import needs_extra
+
+if TYPE_CHECKING:
+    from marey.motion.clip import MotionClip
+
+KEPT_FILES = 16
+"""Motion files that stay in memory, for the next constraint that names one."""
+
+
+class PoseFiles:
+    """Poses of motion files.
+
+    Args:
+        folder: that paths of motion files begin at.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._load = lru_cache(KEPT_FILES)(self._read)
+
+    def fill(self, constraints: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Return checked constraints in which no keyframe names a file; those with ids stay as they are.
+
+        Raises:
+            InvalidInput: a file that cannot be read, or a frame that it does not have; with the field in `where`.
+        """
+        return [self._filled(each, f"constraints.{number}.motion") for number, each in enumerate(constraints)]
+
+    def _filled(self, each: Mapping[str, Any], where: str) -> dict[str, Any]:
+        named = each.get("motion", {})
+        if "file" not in named:
+            return dict(each)
+        try:
+            clip = self._load(named["file"])
+        except MareyError as error:
+            raise InvalidInput(error.message, where=f"{where}.file", hint=error.hint) from error
+        if named["frame"] >= clip.frames:
+            raise InvalidInput(beyond(named["frame"], clip.frames), where=f"{where}.frame")
+        return with_pose(each, pose_of(clip, named["frame"]))
+
+    def _read(self, name: str) -> MotionClip:
+        try:
+            from marey.motion.clip import load_npz
+        except ImportError as error:
+            missing = needs_extra("motion", error)
+            missing.hint = "pip install 'marey[motion]', or name a motion of the server by its `id`."
+            raise missing from error
+        return load_npz(self._folder / name)
+
+
+def pose_of(clip: MotionClip, frame: int) -> dict[str, Any]:
+    """Return a frame of a clip as fields of a pose keyframe: rotations by joint, and the height of the root."""
+    turns = zip(clip.skeleton.joint_names, clip.rotations[frame], strict=True)
+    return {
+        "joint_rotations": {name: [float(x) for x in turn] for name, turn in turns},
+        "root_height": float(clip.root[frame, 1]),
+    }
+
+
+def with_pose(constraint: Mapping[str, Any], pose: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a pose keyframe with a pose (`pose_of`) in place of its `motion`; its own place or height comes first."""
+    rest = {name: value for name, value in constraint.items() if name != "motion"}
+    placed = "root_position" in rest or "root_height" in rest
+    return {**rest, **{name: value for name, value in pose.items() if not (placed and name == "root_height")}}
+
+
+def beyond(frame: int, frames: int) -> str:
+    """Return the message about a frame that a motion does not have."""
+    return f"frame {frame} is beyond the motion, which has {frames}"
