@@ -38,7 +38,7 @@ from marey.jobs.leases import (
     WorkerRow,
 )
 from marey.jobs.listings import events_after, get_job, list_items, list_jobs
-from marey.jobs.motions import get_motion, motions_of
+from marey.jobs.motions import find_motions, get_motion, motions_of
 from marey.jobs.operate import cancel, pause, resume, retry, set_comment, set_fail_early, set_priority
 from marey.jobs.policy import Policy, policy
 from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
@@ -120,6 +120,7 @@ __all__ = [
     "estimate",
     "events_after",
     "fail_items",
+    "find_motions",
     "get_job",
     "get_motion",
     "heartbeat",

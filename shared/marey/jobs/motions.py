@@ -32,8 +32,7 @@ def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> l
         NotFound: the tenant lacks one of them.
     """
     asked = list(dict.fromkeys(motions))
-    table = tables.motion.c
-    rows = {row.id: row for row in read_motions(conn, (table.tenant_id == tenant) & among(table.id, asked))}
+    rows = find_motions(conn, tenant, asked)
     missing = [motion for motion in asked if motion not in rows]
     if missing:
         more = f" (and {len(missing) - 1} more of those given)" if len(missing) > 1 else ""
@@ -41,6 +40,12 @@ def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> l
             f"there is no such motion{more}", where=f"motion {missing[0]}", hint="`marey motions list` shows yours."
         )
     return [rows[motion] for motion in asked]
+
+
+def find_motions(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> dict[UUID, MotionRow]:
+    """Return those of these motions that the tenant has."""
+    table = tables.motion.c
+    return {row.id: row for row in read_motions(conn, (table.tenant_id == tenant) & among(table.id, list(motions)))}
 
 
 def read_motions(

@@ -15,6 +15,7 @@ from marey.api.context import Connection, Context, Shared, deadline
 from marey.api.jobs import service
 from marey.api.jobs.estimates import EstimateView, QueueView
 from marey.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
+from marey.api.jobs.poses import read_poses
 from marey.api.jobs.schemas import (
     SCOPE,
     CheckedView,
@@ -100,6 +101,7 @@ async def submit_job(
     }
     async with kept_body(request, shared, key.tenant) as body:
         submission = await body.run(_read, kind, body.file, fields, shared)
+        submission = submission.with_poses(await read_poses(shared, key, submission.named))
         if validate_only:
             report = await body.run(submission.examine)
             if report is not None and report.left and (decided := await shared.texts.scopes(report.left)):

@@ -80,7 +80,11 @@ class NewItemBody(BaseModel):
         "`0-3 a person walks forward; 3-5 a person waves`.",
         json_schema_extra=TIMELINE,
     )
-    constraints: list[dict[str, Any]] | None = Field(None, description="What the motion keeps to.")
+    constraints: list[dict[str, Any]] | None = Field(
+        None,
+        description="What the motion keeps to. A pose keyframe may name a frame of a stored motion, as "
+        '`"motion": {"id": "…", "frame": 0}`: its pose is read when the job is submitted.',
+    )
 
 
 class CommonJobFields(BaseModel):

@@ -5,18 +5,18 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
+from marey.api.jobs.poses import NamedPoses, Poses, posed
 from marey.api.jobs.schemas import JobFields
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
-from marey.items.constraints import check_poses
 from marey.items.item import InvalidItems, Item, Problem, read_item, read_items, read_json
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
@@ -45,6 +45,13 @@ class Submission:
     _raws: Raws
     _generators: Mapping[str | None, GeneratorCapabilities]
     """Generator capabilities by the item's model name."""
+    named: NamedPoses
+    """Frames of stored motions that constraints name."""
+    _poses: Poses = field(default_factory=dict[Any, Any])
+
+    def with_poses(self, poses: Poses) -> Submission:
+        """Return the submission with the poses that its constraints name; its items need them."""
+        return replace(self, _poses=poses)
 
     @property
     def bundles(self) -> list[str]:
@@ -83,7 +90,8 @@ class Submission:
                     yield line, row, prompt, bundle
 
     def _items(self) -> Iterator[tuple[Item, GeneratorCapabilities]]:
-        return ((item, self._generators[item.model]) for item in read_items(self._raws()))
+        items = read_items(self._raws())
+        return ((posed(item, self._poses), self._generators[item.model]) for item in items)
 
 
 def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Submission:
@@ -135,6 +143,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     failed: dict[str | None, MareyError] = {}
     """Models of a body by name; a missing one is looked up once, for any number of lines."""
     default_model: set[Problem] = set()
+    named = NamedPoses()
     line = 0
 
     def counted() -> Iterator[tuple[int, object]]:
@@ -168,19 +177,19 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             ("settings", generator.check_settings),
             ("variety", generator.check_variety),
             ("timeline", generator.check_timeline),
-            ("constraints", check_poses),
         )
-        for field, hold in checks:
+        for name, hold in checks:
             try:
-                if field in values:
-                    hold(values[field])
+                if name in values:
+                    hold(values[name])
             except MareyError as error:
-                yield _problem(error, line, field)
+                yield _problem(error, line, name)
+        yield from named.add(values.get("constraints", ()), line)
 
     for item in read_items(counted(), check=check):
         bundle = generators[item.model].bundle
         by_bundle[bundle.manifest.model, bundle.reference] += item.variants
-    submission = Submission(fields, by_bundle.total(), by_bundle, raws, generators)
+    submission = Submission(fields, by_bundle.total(), by_bundle, raws, generators, named)
     if fields.scope == "refuse":
         refuse_unknown(submission.prompts())
     return submission

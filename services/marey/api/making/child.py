@@ -1,5 +1,5 @@
-"""A process that makes files and reads rigs: `python -m marey.api.making.child SECONDS BYTES` reads requests from
-stdin until its end.
+"""A process that makes files, and reads rigs and poses: `python -m marey.api.making.child SECONDS BYTES` reads
+requests from stdin until its end.
 
 It has neither a database nor a store: the API sends the npz or the file of the rig, and gets the result back.
 """
@@ -55,7 +55,7 @@ def main(seconds: int, memory: int) -> None:
 
 
 def _answer(answers: BinaryIO, request: dict[str, Any], content: bytes) -> None:
-    answer, problem = (_report, _rig_problem) if request["task"] == "report" else (_make, _problem)
+    answer, problem = TASKS[request["task"]]
     try:
         result = answer(request, content)
     except MemoryError:
@@ -100,6 +100,29 @@ def _report(request: dict[str, Any], data: bytes) -> bytes:
     return report
 
 
+def _poses(request: dict[str, Any], npz: bytes) -> bytes:
+    """Return frames of an npz as JSON: fields of pose keyframes, in the order asked for."""
+    try:
+        from marey.motion.clip import parse_npz
+        from marey.motion.keyframes import beyond, pose_of
+    except ImportError as error:
+        raise needs_extra("motion", error) from error
+    clip = parse_npz(npz, request["where"])
+    for frame in request["frames"]:
+        if frame >= clip.frames:
+            raise InvalidInput(beyond(frame, clip.frames))
+    return json.dumps([pose_of(clip, frame) for frame in request["frames"]], allow_nan=False).encode()
+
+
+def _pose_problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
+    """Describe why poses cannot be read, without a word of this machine."""
+    if isinstance(error, MissingExtra):
+        error = InvalidInput("this server reads no poses", hint=f"Ask its operator for the extra {error.extra!r}.")
+    elif isinstance(error, InvalidFile):
+        error = Conflict(f"the npz of the motion cannot be read: {error.message}")
+    return {"type": error.problem_type, "message": error.message, "where": request["where"], "hint": error.hint}
+
+
 def _rig_problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
     """Describe why a rig cannot be read, by the field of the request that is wrong."""
     where = error.where if error.where in ("format", "map") else "body"
@@ -122,6 +145,9 @@ def _problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
     where = next((each for each in (error.where, error.argument) if each in known), "format")
     return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}
 
+
+TASKS = {"make": (_make, _problem), "report": (_report, _rig_problem), "poses": (_poses, _pose_problem)}
+"""Answer of each task, and the description of its errors."""
 
 if __name__ == "__main__":
     main(int(sys.argv[1]), int(sys.argv[2]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -122,6 +122,23 @@ class FileMaker:
         """
         with self._slots.take(key):
             found = await self._processes.report(name, format, rig_map, data)
+        if isinstance(found, FailureReason):
+            raise _error(found)
+        return found
+
+    async def poses(self, key: ApiKey, frames: Sequence[int], npz: bytes, where: str) -> list[dict[str, Any]]:
+        """Return frames of a motion as fields of pose keyframes (`marey.motion.keyframes.pose_of`).
+
+        Args:
+            npz: the motion.
+            where: its name in errors.
+
+        Raises:
+            InvalidInput, Conflict, TooLarge: the npz cannot be read, or has no such frame.
+            Busy: too many files are waiting.
+        """
+        with self._slots.take(key):
+            found = await self._processes.poses(frames, npz, where)
         if isinstance(found, FailureReason):
             raise _error(found)
         return found

@@ -1,4 +1,4 @@
-"""The child processes that make files and read rigs: started when needed, two at most, ended when idle."""
+"""The child processes that make files, and read rigs and poses: started when needed, two at most, ended when idle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import IO, Any, TypeVar
 
@@ -83,6 +83,16 @@ class MakingProcess:
         answer = self._ask(request, data, "body")
         return answer if isinstance(answer, FailureReason) else json.loads(answer)
 
+    def poses(self, frames: Sequence[int], npz: bytes, where: str) -> list[dict[str, Any]] | FailureReason:
+        """Return frames of a motion as poses (`marey.motion.keyframes.pose_of`), or why they cannot be read. Blocks.
+
+        Args:
+            npz: the motion.
+            where: its name in errors.
+        """
+        answer = self._ask({"task": "poses", "frames": [*frames], "where": where}, npz, where)
+        return answer if isinstance(answer, FailureReason) else json.loads(answer)
+
     def _ask(self, request: dict[str, Any], content: bytes, where: str) -> bytes | FailureReason:
         """Return the answer to a request; `where` names its field in the errors of a process that ends."""
         try:
@@ -133,6 +143,10 @@ class MakingProcesses:
     async def report(self, name: str, format: str, rig_map: Any, data: bytes) -> dict[str, Any] | FailureReason:
         """Return what is found in a rig, or why it cannot be used; waits for its turn."""
         return await self._run(lambda process: process.report(name, format, rig_map, data))
+
+    async def poses(self, frames: Sequence[int], npz: bytes, where: str) -> list[dict[str, Any]] | FailureReason:
+        """Return frames of a motion as poses, or why they cannot be read; waits for its turn."""
+        return await self._run(lambda process: process.poses(frames, npz, where))
 
     async def _run(self, call: Callable[[MakingProcess], Answer]) -> Answer:
         answer = await to_thread.run_sync(self._call, call, limiter=self._threads)
