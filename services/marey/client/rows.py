@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
+from marey.client.poses import RowPoses
 from marey.client.ranges import check_ranges
 from marey.client.tables import EXTRA_HINT, TEXTS, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
 from marey.client.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
@@ -57,6 +58,7 @@ class PromptReader:
         self.lines: list[int | None] = []
         self.total = 0
         self._raws = raws
+        self._poses = RowPoses()
         self._problems: list[Problem] = []
 
     def __iter__(self) -> Iterator[Item]:
@@ -71,7 +73,8 @@ class PromptReader:
             for line, raw in self._raws:
                 values, problems = read_values(raw, line)
                 values, beyond = check_ranges(values, line)
-                problems += beyond
+                values, unread = self._poses.read(values, line)
+                problems += [*beyond, *unread]
                 self.add(problems)
                 count += 1 if problems else values.get("variants", 1)
                 check_count(count, line, self.where)

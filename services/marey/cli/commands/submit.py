@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console, options
+from marey.cli.poses import StoredMotions
 from marey.client import rows
 from marey.client.names import check_template
 from marey.core.errors import InvalidInput, MareyError
@@ -90,12 +91,11 @@ def submit(
         variety=None if variety is None else variety.value,
         tags=tags,
     )
+    motions = StoredMotions()
     if constraints is not None:
-        from marey.cli.roles.generating import read_file as read_constraints_file
-
-        defaults = {**defaults, "constraints": read_constraints_file(constraints)}
+        defaults = {**defaults, "constraints": motions.read_file(constraints)}
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
-    with Lines(item.as_json() for item in report_gaps(reader)) as lines:
+    with Lines(item.as_json() for item in motions.in_items(reader, report_gaps(reader))) as lines:
         if reader.total:
             raise _all_problems(reader, lines)
         with Client() as client:
