@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.viz.gallery import Card, html_gallery
+from marey.viz.gallery import Card, EditNote, html_gallery
 from tests.support import chromium
 from tests.support.tab import Tab, open_tab
 from tests.support.walker import walker
@@ -64,4 +64,25 @@ def test_a_page_plays_its_motions_and_turns_clicks_into_commands(tab: Tab, tmp_p
     assert tab.ask("document.getElementById('commands').value.split('\\n')") == [
         "marey motions keep id-2", "marey motions reject id-0",
     ]  # fmt: skip
+    assert tab.complaints == []
+
+
+def test_an_edit_links_its_source_and_stands_beside_it(tab: Tab, tmp_path: Path) -> None:
+    note = EditNote("id-0", HOSTILE, "trim (from 0.5), mirror")
+    cards = [
+        Card("id-0", walker(), HOSTILE, "00000"),
+        Card("id-1", walker(turn=0.4), "a person walks to the right", "00001", edit=note),
+        Card("id-2", walker(), "a person waves", "00002", edit=EditNote("gone", "", "smooth")),
+    ]
+    html_gallery(cards, tmp_path / "e.html", title="day 1", columns=2)
+    tab.prefer("light")
+    tab.size(1000, 900)
+    tab.go((tmp_path / "e.html").as_uri())
+    assert tab.ask("[...document.querySelectorAll('.edited')].map((p) => p.textContent)") == [
+        f"edited from “{HOSTILE}”: trim (from 0.5), mirror", "edited from gone: smooth",
+    ]  # fmt: skip
+    assert tab.ask("[...document.querySelectorAll('.edited a')].map((a) => a.getAttribute('href'))") == ["#motion-0"]
+    tops = tab.ask("[...document.querySelectorAll('.clip')].map((c) => c.getBoundingClientRect().top)")
+    assert tops[0] == tops[1] < tops[2]
+    assert tab.ask("document.documentElement.dataset.taken ?? 'no'") == "no"
     assert tab.complaints == []

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from marey.core.errors import InvalidInput
@@ -23,6 +24,21 @@ MOST_CARDS = 400
 
 
 @dataclass(frozen=True)
+class EditNote:
+    """How an edited motion came about.
+
+    Args:
+        source: id of the motion that was edited; its card is linked where the page has it.
+        prompt: of the source; empty = not known.
+        operations: in one line.
+    """
+
+    source: str
+    prompt: str
+    operations: str
+
+
+@dataclass(frozen=True)
 class Card:
     """A motion with its description.
 
@@ -31,6 +47,7 @@ class Card:
         facts: one line: number, name, seed, length.
         said: earlier review; empty = none.
         flags: what is wrong with it, by `marey.quality`.
+        edit: of an edited motion.
     """
 
     id: str
@@ -40,6 +57,21 @@ class Card:
     tags: Sequence[str] = ()
     said: str = ""
     flags: Sequence[str] = ()
+    edit: EditNote | None = None
+
+    def document(self) -> dict[str, Any]:
+        """Return what the page shows of the motion."""
+        edit = self.edit
+        note = None if edit is None else {name: one_line(text) for name, text in vars(edit).items()}
+        return {
+            "id": self.id,
+            "prompt": one_line(self.prompt),
+            "facts": one_line(self.facts),
+            "tags": [one_line(tag) for tag in self.tags],
+            "said": one_line(self.said),
+            "flags": [one_line(flag) for flag in self.flags],
+            "edit": note,
+        }
 
 
 def html_gallery(
@@ -77,17 +109,7 @@ def html_gallery(
         "columns": columns,
         "earlier": None if earlier is None else f"./{quote(earlier)}",
         "later": None if later is None else f"./{quote(later)}",
-        "cards": [
-            {
-                "id": card.id,
-                "prompt": one_line(card.prompt),
-                "facts": one_line(card.facts),
-                "tags": [one_line(tag) for tag in card.tags],
-                "said": one_line(card.said),
-                "flags": [one_line(flag) for flag in card.flags],
-            }
-            for card in cards
-        ],
+        "cards": [card.document() for card in cards],
     }
     body = fill(
         asset("gallery.html"),

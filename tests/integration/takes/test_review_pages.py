@@ -10,14 +10,20 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
+from uuid import UUID
 
 import numpy as np
 import psutil
 import pytest
 from PIL import Image
 
+from marey.db import transaction
+from marey.takes import delete
+from marey.tenants import DEFAULT_TENANT
 from marey.viz.overview import GAP, MARGIN, TILE
 from tests.support.command import Command
+from tests.support.editing import edited, stored
 from tests.support.live_api import LiveApi
 from tests.support.walker import walker
 
@@ -167,3 +173,33 @@ def test_an_interrupt_ends_the_command_and_all_that_draws(api: LiveApi, tmp_path
     assert ("drawing" in progress, rest) == (True, ["marey: interrupted"])
     assert psutil.wait_procs(drawing, timeout=60)[1] == []
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("r.png", b"old")]
+
+
+def test_a_card_says_what_a_motion_was_edited_from(marey: Command, api: LiveApi, tmp_path: Path) -> None:
+    source, other = stored(api, "a person walks to the left"), stored(api, "a person waves")
+    (edit,) = edited(api, source["id"], {"op": "trim", "from": 0.5, "to": "f30"}, {"op": "mirror"})
+    (joined,) = edited(api, edit["id"], {"op": "concat", "with": other["id"], "blend": 0.1})
+    jobs = (joined["job"], other["job"], source["job"], edit["job"])
+    marey("review", *jobs, "-o", tmp_path / "all.html").ok()
+    cards: Any = embedded(tmp_path / "all.html", "cards")["cards"]
+    assert [card["id"] for card in cards] == [other["id"], source["id"], edit["id"], joined["id"]]
+    assert [card["edit"] for card in cards[:3]] == [
+        None,
+        None,
+        {
+            "source": source["id"],
+            "prompt": "a person walks to the left",
+            "operations": "trim (from 0.5, to f30), mirror",
+        },
+    ]
+    assert cards[2]["facts"].endswith(f"edit of {source['id'][-8:]}")
+    assert cards[3]["edit"]["prompt"] == edit["prompt"]
+    assert cards[3]["edit"]["operations"] == f"concat (blend 0.1, with {other['id'][-8:]})"
+    marey("review", edit["job"], "-o", tmp_path / "alone.html").ok()
+    (alone,) = embedded(tmp_path / "alone.html", "cards")["cards"]
+    assert alone["edit"] == cards[2]["edit"]
+    with transaction(api.engine) as conn:
+        delete(conn, DEFAULT_TENANT, UUID(source["job"]))
+    marey("review", edit["job"], "-o", tmp_path / "alone.html", "--overwrite").ok()
+    (alone,) = embedded(tmp_path / "alone.html", "cards")["cards"]
+    assert alone["edit"] == {**cards[2]["edit"], "prompt": ""}

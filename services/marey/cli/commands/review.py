@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from marey.cli.drawing import Drawers
     from marey.client import Client, Motion
+    from marey.viz.gallery import Card, EditNote
 
 ENDINGS = (".html", ".htm", ".png")
 PER_PAGE = 400
@@ -80,6 +81,7 @@ def review(
         per_page = max(per_page // len(ids), 1) * len(ids)  # a page holds all motions of its last prompt
         pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]
         paths = _paths(output, len(pages))
+        sources = {motion.id: motion.prompt for motion in found}
         _check_free(paths, overwrite=overwrite)
         with console.bar() as bar, _together(paths) as drafts, Drawers(len(found)) as drawers:
             task = bar.add_task("drawing", total=len(found))
@@ -92,7 +94,8 @@ def review(
                         _sheet(page, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task))
                     else:
                         beside = [None, *(path.name for path in paths), None]
-                        _page(page, files, drafts[number], (name, count), beside[number : number + 3 : 2], len(ids))
+                        cards = _cards(client, page, files, sources)
+                        _page(cards, drafts[number], (name, count), beside[number : number + 3 : 2], len(ids))
                         bar.advance(task, len(page))
     for path in paths:
         console.result(console.home_relative(path))
@@ -173,15 +176,27 @@ def _motions(
 
 
 def _side_by_side(of_jobs: Sequence[Sequence[Motion]]) -> list[Motion]:
-    """Put the motions of each prompt together, in the order of the prompts; a prompt that a job has several times is
-    paired in order."""
-    groups: dict[tuple[str, int], list[Motion]] = {}
+    """Put the motions of each prompt together, in the order of the prompts, and edits behind their sources; a prompt
+    that a job has several times is paired in order."""
+    shown = {motion.id: motion for motions in of_jobs for motion in motions}
+    groups: dict[object, list[Motion]] = {}
+    of_motion: dict[str, list[Motion]] = {}
     for motions in of_jobs:
         seen = Counter[str]()
         for motion in motions:
-            groups.setdefault((motion.prompt, seen[motion.prompt]), []).append(motion)
-            seen[motion.prompt] += 1
+            if not _has_source(motion, shown):
+                of_motion[motion.id] = groups.setdefault((motion.prompt, seen[motion.prompt]), [])
+                of_motion[motion.id].append(motion)
+                seen[motion.prompt] += 1
+    edits = [motion for motion in shown.values() if _has_source(motion, shown)]
+    for motion in sorted(edits, key=lambda each: each.id):  # an edit of an edit comes later
+        of_motion[motion.id] = of_motion[motion.edited_from[0]]
+        of_motion[motion.id].append(motion)
     return [motion for group in groups.values() for motion in group]
+
+
+def _has_source(motion: Motion, shown: Mapping[str, Motion]) -> bool:
+    return bool(motion.edited_from) and motion.edited_from[0] in shown
 
 
 def _sheet(
@@ -213,29 +228,61 @@ def _sheet(
     save_png(sheet, path)
 
 
-def _page(
-    motions: Sequence[Motion],
-    files: Sequence[Path],
-    path: Path,
-    heading: tuple[str, str],
-    beside: Sequence[str | None],
-    columns: int,
-) -> None:
+def _cards(client: Client, motions: Sequence[Motion], files: Sequence[Path], sources: dict[str, str]) -> list[Card]:
     from marey.motion.clip import load_npz
-    from marey.viz.gallery import Card, html_gallery
+    from marey.viz.gallery import Card
 
-    cards = [
-        Card(
-            motion.id,
-            load_npz(file),
-            motion.prompt,
-            facts,
-            motion.tags,
-            _review_text(motion),
-            motion.quality.flags if motion.quality else (),
-        )
-        for motion, file, facts in zip(motions, files, _facts(motions), strict=True)
-    ]
+    cards: list[Card] = []
+    for motion, file, facts in zip(motions, files, _facts(motions), strict=True):
+        clip, flags = load_npz(file), motion.quality.flags if motion.quality else ()
+        edit = _edit_note(client, motion, clip.manifest, sources)
+        cards.append(Card(motion.id, clip, motion.prompt, facts, motion.tags, _review_text(motion), flags, edit))
+    return cards
+
+
+def _edit_note(client: Client, motion: Motion, manifest: Mapping[str, Any], sources: dict[str, str]) -> EditNote | None:
+    """Describe an edit; None for a generated motion.
+
+    Args:
+        sources: prompts of motions, by id; those that are asked for are added. Empty = deleted.
+    """
+    from marey.viz.gallery import EditNote
+
+    if not motion.edited_from:
+        return None
+    source = motion.edited_from[0]
+    if source not in sources:
+        try:
+            sources[source] = client.motions.get(source).prompt
+        except NotFound:
+            sources[source] = ""
+    record = manifest.get("edited_from", {})
+    names = {each["sha256"]: each.get("name", each["sha256"]) for each in record.get("sources", ())}
+    return EditNote(source, sources[source], ", ".join(_operation_text(op, names) for op in record.get("ops", ())))
+
+
+def _operation_text(op: Mapping[str, Any], names: Mapping[str, str]) -> str:
+    """Describe an operation in a few words, as `trim (from 0.5, to f30)`.
+
+    Args:
+        names: ids of joined motions, by the SHA-256 that operations of a manifest name them by.
+    """
+    values = {name: value for name, value in op.items() if name != "op" and value not in (None, False)}
+    if "with" in values:
+        values["with"] = console.short_id(names.get(values["with"], values["with"]))
+    said = [name if value is True else f"{name} {_value_text(value)}" for name, value in values.items()]
+    return f"{op['op']} ({', '.join(said)})" if said else str(op["op"])
+
+
+def _value_text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _page(
+    cards: Sequence[Card], path: Path, heading: tuple[str, str], beside: Sequence[str | None], columns: int
+) -> None:
+    from marey.viz.gallery import html_gallery
+
     (title, count), (earlier, later) = heading, beside
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later, columns=columns)
 
@@ -248,6 +295,7 @@ def _facts(motions: Sequence[Motion]) -> list[str]:
 
 def _fact(motion: Motion, bundle: str | None) -> str:
     take = ["take of another"] if motion.replaces else []
+    edit = [f"edit of {console.short_id(motion.edited_from[0])}"] if motion.edited_from else []
     name = [motion.name] if motion.name else []
     match = motion.quality.match if motion.quality else None
     shown = [f"match {match.value:g}"] if match and match.value is not None else []
@@ -255,7 +303,7 @@ def _fact(motion: Motion, bundle: str | None) -> str:
     of = [f"candidate {chosen.chosen} of {len(chosen.candidates)}"] if chosen else []
     made_by = [bundle] if bundle else []
     place = [f"{motion.index:05}", *name, *made_by, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
-    return "  ·  ".join([*place, *of, *shown, *take])
+    return "  ·  ".join([*place, *of, *shown, *take, *edit])
 
 
 def _verdict(motion: Motion) -> str:

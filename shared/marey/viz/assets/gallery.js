@@ -51,14 +51,22 @@
     document.getElementById("wishes").hidden = !commands.length;
   }
 
+  function edited({ source, prompt, operations }) {
+    const about = prompt ? `“${prompt}”` : source;
+    const there = cards.findIndex((card) => card.id === source);
+    const name = there < 0 ? element("span", { title: source }, about) : element("a", { href: `#motion-${there}`, title: source }, about);
+    return element("p", { class: "edited" }, "edited from ", name, operations && `: ${operations}`);
+  }
+
   function draw(card, index) {
     const caption = element("figcaption", {}, element("p", { class: "prompt" }, card.prompt || "(prompt erased)"));
     caption.append(element("p", { class: "remark" }, card.facts));
+    if (card.edit) caption.append(edited(card.edit));
     if (card.tags.length) caption.append(element("div", { class: "tags" }, ...card.tags.map((tag) => element("span", {}, tag))));
     if (card.flags.length) caption.append(element("div", { class: "tags flags" }, ...card.flags.map((flag) => element("span", {}, flag))));
     if (card.said) caption.append(element("p", { class: "said" }, card.said));
     caption.append(element("p", { class: "id" }, card.id));
-    const figure = element("figure", { class: "clip" }, player(index, card.prompt), caption);
+    const figure = element("figure", { class: "clip", id: `motion-${index}` }, player(index, card.prompt), caption);
     caption.append(wishes(card, figure));
     return figure;
   }
@@ -72,8 +80,11 @@
   clips.append(...cards.map(draw));
   if (columns > 1) {
     clips.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
+    let row = []; // the motions that belong together: of one prompt, and edits of them
     cards.forEach((card, index) => {
-      if (index && card.prompt !== cards[index - 1].prompt) clips.children[index].style.gridColumnStart = 1;
+      const joins = row.some((each) => each.prompt === card.prompt || each.id === card.edit?.source);
+      row = joins ? [...row, card] : [card];
+      if (!joins) clips.children[index].style.gridColumnStart = 1;
     });
   }
   document.getElementById("commands").onfocus = (event) => event.target.select();
