@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         MetricPair,
     )
     from marey.client.types.jobs import (
+        CheckedEdit,
         CheckedJob,
         Counters,
         Edits,
@@ -124,8 +125,8 @@ __getattr__ = lazy_names(
             "EvaluationRequest MetricChange MetricPair"
         ),
         "marey.client.types.jobs": (
-            "CheckedJob Counters Edits Erasure Estimate Job JobEvent JobItem NamedAction QualityCounts QueuePosition "
-            "Quota Scope ScopeExample ScopeReport Speed SubmittedJob"
+            "CheckedEdit CheckedJob Counters Edits Erasure Estimate Job JobEvent JobItem NamedAction QualityCounts "
+            "QueuePosition Quota Scope ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
         "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
@@ -149,6 +150,7 @@ __all__ = [
     "BrokenModel",
     "Busy",
     "Candidate",
+    "CheckedEdit",
     "CheckedJob",
     "Client",
     "ComparedRun",

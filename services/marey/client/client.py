@@ -17,7 +17,7 @@ from marey.client.rigs import Rigs
 from marey.client.schedules import Schedules
 from marey.client.streams import Streams
 from marey.client.transport import Transport
-from marey.client.types.jobs import Job
+from marey.client.types.jobs import CheckedEdit, Job
 from marey.client.types.motions import Motion
 from marey.client.webhooks import Webhooks
 
@@ -115,9 +115,27 @@ class Client:
             "priority": priority or None,
             "keep_days": keep_days,
         }
-        body = {"ops": [_named(op) for op in ops], **{key: each for key, each in given.items() if each is not None}}
-        path = f"/v1/motions/{identifier(motion)}/edits"
+        path, body = _edit_request(motion, ops, given)
         return Job.of(self._transport.post_new(path, body, idempotency_key=idempotency_key))
+
+    def check_edit(
+        self,
+        motion: Motion | str,
+        ops: Sequence[Mapping[str, Any]],
+        *,
+        model: str | None = None,
+        settings: Mapping[str, float] | None = None,
+    ) -> CheckedEdit:
+        """Check what `edit` would submit, and submit nothing; the result has the number of motions and an estimate.
+
+        Args:
+            motion, ops, model, settings: see `edit`.
+
+        Raises:
+            NotFound, InvalidInput, TooLarge, QuotaUsedUp, Conflict, Refused, Unreachable: as `edit`.
+        """
+        path, body = _edit_request(motion, ops, {"model": model, "settings": settings})
+        return CheckedEdit.of(self._transport.post(path, body, validate_only=True))
 
     @property
     def server(self) -> Server:
@@ -127,6 +145,14 @@ class Client:
     def close(self) -> None:
         """Close the connections."""
         self._transport.close()
+
+
+def _edit_request(
+    motion: Motion | str, ops: Sequence[Mapping[str, Any]], given: Mapping[str, object]
+) -> tuple[str, dict[str, Any]]:
+    """Return path and body of an edit."""
+    body = {"ops": [_named(op) for op in ops], **{key: each for key, each in given.items() if each is not None}}
+    return f"/v1/motions/{identifier(motion)}/edits", body
 
 
 def _named(op: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -1,7 +1,7 @@
 """User actions on motions: search, edits, reviews and re-rolls, references, retention, erasure, rigs, files
 made on request, garbage collection."""
 
-from marey.takes.edits import NewEdit, revert, submit_edit
+from marey.takes.edits import NewEdit, check_edit, revert, submit_edit
 from marey.takes.gc import collect_garbage, remove_assets, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
 from marey.takes.made import (
@@ -38,6 +38,7 @@ __all__ = [
     "Reroll",
     "RigRow",
     "add_rig",
+    "check_edit",
     "claim_making",
     "collect_garbage",
     "delete",

@@ -103,25 +103,19 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
         QuotaUsedUp, IdempotencyMismatch: as `marey.jobs.submit`.
     """
     steps = _read_steps(edit.ops)
-    check_generator(steps, edit.generator)
-    others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
     # An erasure of a source waits, and then finds the edit.
     conn.execute(HOLD_JOBS, {"motions": _sources(edit.motion, steps), "tenant": edit.tenant})
-    rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
-    for where, motion in others.items():
-        rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")
-    _check_sources(rows[edit.motion], [rows[motion] for motion in (edit.motion, *others.values())], edit.generator)
-    pieces = pieces_of(with_prompts(steps, rows[edit.motion]))
+    items = _items(conn, edit, steps)
     submitted = submit(
         conn,
         NewJob(
-            items=[_item(number, piece, rows, edit) for number, piece in enumerate(pieces)],
+            items=items,
             tenant=edit.tenant,
             name=edit.name,
             comment=edit.comment,
             priority=edit.priority,
             keep_days=edit.keep_days,
-            count=len(pieces),
+            count=len(items),
             idempotency_key=edit.idempotency_key,
             body_sha256=edit.body_sha256,
             traceparent=edit.traceparent,
@@ -131,6 +125,23 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
     if not submitted.replayed:
         conn.execute(LINK, {"job": submitted.id})
     return submitted
+
+
+def check_edit(conn: sa.Connection, edit: NewEdit) -> list[NewItem]:
+    """Return the items that `submit_edit` would submit, and write nothing; raises as it, but for quotas."""
+    return _items(conn, edit, _read_steps(edit.ops))
+
+
+def _items(conn: sa.Connection, edit: NewEdit, steps: Sequence[Step]) -> list[NewItem]:
+    """Check the steps of an edit and its motions, and return an item for each resulting motion."""
+    check_generator(steps, edit.generator)
+    others = {step.where: UUID(step.values["with"]) for step in steps if "with" in step.values}
+    rows = {edit.motion: get_motion(conn, edit.tenant, edit.motion)}
+    for where, motion in others.items():
+        rows[motion] = _other(conn, edit.tenant, motion, f"{where}.with")
+    _check_sources(rows[edit.motion], [rows[motion] for motion in (edit.motion, *others.values())], edit.generator)
+    pieces = pieces_of(with_prompts(steps, rows[edit.motion]))
+    return [_item(number, piece, rows, edit) for number, piece in enumerate(pieces)]
 
 
 def edit_jobs_of(conn: sa.Connection, job: UUID) -> Sequence[UUID]:

@@ -114,3 +114,17 @@ def test_only_an_edit_whose_source_exists_is_reverted(api: LiveApi) -> None:
             delete(conn, DEFAULT_TENANT, UUID(source["job"]))
         with pytest.raises(NotFound, match="the motion that it was made from was deleted"):
             client.motions.revert(edit["id"])
+
+
+def test_a_dry_run_submits_nothing(marey: Command, api: LiveApi) -> None:
+    source = stored(api)
+    with Client(api.url, api.key) as client:
+        before = [job.id for job in client.jobs.list()]
+        done = marey("motions", "edit", source["id"][-8:], "--split", "f20", "--dry-run", "--json").ok()
+        assert "2 motions would be made, with edit; nothing was submitted." in done.err
+        assert (json.loads(done.out)["items"], json.loads(done.out)["valid"]) == (2, True)
+        refused = marey("motions", "edit", source["id"], "--concat", "0" * 32, "--dry-run")
+        assert (refused.code, "ops.0.with" in refused.err) == (3, True), refused.err
+        checked = client.check_edit(source["id"], [{"op": "mirror"}])
+        assert (checked.valid, checked.items, checked.bundles, len(checked.prompts)) == (True, 1, ("edit",), 1)
+        assert [job.id for job in client.jobs.list()] == before

@@ -283,3 +283,40 @@ def test_an_edit_is_noted_in_the_audit_log_and_the_tables_stay_sound(api: LiveAp
         noted = conn.execute(sa.text("SELECT verb, target FROM audit_event ORDER BY id DESC LIMIT 1")).one()
         assert tuple(noted) == ("motion.edit", source["id"])
         assert audit(conn) == []
+
+
+def test_an_edit_is_checked_and_estimated_without_a_job(api: LiveApi, http: httpx2.Client) -> None:
+    source = stored(api, "a person walks to the left")
+    edited(api, source["id"], {"op": "mirror"})  # measures the bundle `edit`
+    before = [job["id"] for job in http.get("/v1/jobs").json()["items"]]
+    path, ops = f"/v1/motions/{source['id']}/edits?validate_only=true", [{"op": "mirror"}, {"op": "split", "at": "f20"}]
+    answer = http.post(path, json={"ops": ops})
+    assert answer.status_code == 200, answer.text
+    checked = answer.json()
+    assert (checked["valid"], checked["items"], checked["bundles"]) == (True, 2, ["edit"])
+    assert checked["prompts"] == ["a person walks to the right"] * 2
+    assert checked["estimate"]["items"] == 2
+    assert checked["estimate"]["seconds"] is not None
+    assert checked["waiting"] == 0
+    for wrong, where in (({"op": "explode"}, "ops.0.op"), ({"op": "concat", "with": str(uuid4())}, "ops.0.with")):
+        refused = http.post(path, json={"ops": [wrong]})
+        assert (refused.status_code >= 400, refused.json()["where"]) == (True, where)
+    assert http.post(f"/v1/motions/{uuid4()}/edits?validate_only=true", json={"ops": ops}).status_code == 404
+    assert [job["id"] for job in http.get("/v1/jobs").json()["items"]] == before
+
+
+def test_a_check_of_an_edit_knows_the_quota(api: LiveApi) -> None:
+    tenant = f"t{uuid4().hex[:8]}"
+    with transaction(api.engine) as conn:
+        create_tenant(conn, tenant, Quotas(queued=3))
+        secret = create_key(conn, tenant, ["admin"], tenant=tenant).secret
+    with httpx2.Client(base_url=api.url, headers={"Authorization": f"Bearer {secret}"}) as theirs:
+        job = theirs.post("/v1/jobs", json={"items": [{"prompt": "a person walks"}]}).json()["id"]
+        api.work(walker().to_npz())
+        (motion,) = theirs.get(f"/v1/jobs/{job}/motions").json()["items"]
+        path = f"/v1/motions/{motion['id']}/edits?validate_only=true"
+        split = {"op": "split", "at": 0.1}
+        (quota,) = theirs.post(path, json={"ops": [split]}).json()["quotas"]
+        assert (quota["name"], quota["asked"], quota["left"]) == ("queued", 2, 3)
+        refused = theirs.post(path, json={"ops": [split, split]})
+        assert (refused.status_code, refused.json()["type"]) == (429, "urn:marey:problem:quota")

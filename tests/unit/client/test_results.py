@@ -34,6 +34,7 @@ NAMES = {
     jobs.Estimate: "EstimateView",
     jobs.Quota: "QuotaBody",
     jobs.CheckedJob: "CheckedView",
+    jobs.CheckedEdit: "CheckedEditView",
     jobs.Scope: "ScopeView",
     jobs.NamedAction: "NamedActionView",
     jobs.ScopeExample: "ScopeExampleView",

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
+from typing import Annotated
 from uuid import UUID
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
+from fastapi.responses import JSONResponse
 
 from marey import db, jobs, takes
 from marey.api.audit import note
 from marey.api.auth import Submitter
 from marey.api.context import Connection, Context, Shared, deadline
-from marey.api.edits.schemas import NewEditBody
+from marey.api.edits.schemas import CheckedEditView, NewEditBody
+from marey.api.jobs.estimates import check_capacity
 from marey.api.jobs.schemas import JobView
 from marey.api.takes.schemas import MotionView
 from marey.core import tracing
@@ -26,7 +30,12 @@ log = logger(__name__)
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 
 
-@router.post("/{motion}/edits", status_code=202)
+@router.post(
+    "/{motion}/edits",
+    status_code=202,
+    response_model=JobView,
+    responses={200: {"model": CheckedEditView, "description": "`validate_only`: nothing was written"}},
+)
 @deadline(db.BULK)
 def edit_motion(
     motion: UUID,
@@ -35,8 +44,9 @@ def edit_motion(
     response: Response,
     key: Submitter,
     shared: Shared,
+    validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,
     idempotency_key: IdempotencyKey = None,
-) -> JobView:
+) -> JobView | Response:
     """Edit a motion: cut, join, loop, mirror, retime or smooth it, or let a model generate frames of it. The motion
     itself does not change.
 
@@ -52,6 +62,8 @@ def edit_motion(
         traceparent=tracing.current(),
         **body.model_dump(exclude={"ops", "model", "settings"}),
     )
+    if validate_only:
+        return JSONResponse(_check(conn, new).model_dump(mode="json"))
     submitted = takes.submit_edit(conn, new)
     row = jobs.get_job(conn, key.tenant, submitted.id)
     response.headers["Location"] = f"/v1/jobs/{submitted.id}"
@@ -72,6 +84,18 @@ def revert_motion(motion: UUID, conn: Connection, key: Submitter) -> MotionView:
     source = takes.revert(conn, key.tenant, motion, by=key.name)
     note(conn, key, "motion.revert", motion, source=str(source.id))
     return MotionView.of(source)
+
+
+def _check(conn: Connection, new: takes.NewEdit) -> CheckedEditView:
+    items = takes.check_edit(conn, new)
+    by_bundle = Counter((item.model, item.bundle) for item in items)
+    return CheckedEditView(
+        valid=True,
+        items=len(items),
+        bundles=sorted({item.bundle for item in items}),
+        prompts=[item.prompt for item in items],
+        **check_capacity(conn, new.tenant, by_bundle, parsed=new.generator is not None),
+    )
 
 
 def _generator(body: NewEditBody, shared: Context) -> takes.EditGenerator | None:

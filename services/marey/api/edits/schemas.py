@@ -7,8 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, WithJsonSchema
 
+from marey.api.jobs.estimates import EstimateView
 from marey.api.jobs.schemas import CommonJobFields
 from marey.http.fields import ITEM_MODEL, SAMPLING
+from marey.http.problems import QuotaBody
+from marey.http.schemas import View
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
 
@@ -46,3 +49,18 @@ class NewEditBody(CommonJobFields):
         description="Operations, applied in their order; `with` is the id of another motion. Each `split` makes "
         "two motions of one.",
     )
+
+
+class CheckedEditView(View):
+    """The answer to `validate_only` of an edit."""
+
+    valid: bool
+    items: int
+    """Number of resulting motions."""
+    bundles: list[str] = Field(description="The bundle that generates frames; `edit` if no model is needed.")
+    prompts: list[str] = Field(description="Prompts of the resulting motions, in their order.")
+    estimate: EstimateView
+    quotas: list[QuotaBody] = Field(
+        description="The tenant's quotas of queued items and of bytes, with the capacity left."
+    )
+    waiting: int = Field(description="Items of all tenants that wait for the same workers.")

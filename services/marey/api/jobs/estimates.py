@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
+from typing import Any
 
+import sqlalchemy as sa
 from pydantic import Field
 
+from marey.http.problems import QuotaBody
 from marey.http.schemas import View
-from marey.jobs import Estimate, JobState, QueuePlace, Speed
+from marey.jobs import TEXT_QUEUE, Estimate, JobState, QueuePlace, Speed, estimate, waiting_items
+from marey.tenants import check_quotas
 
 
 class SpeedView(View):
@@ -84,3 +89,24 @@ def basis_of(row: Estimate) -> str:
         for name, count in row.workers.items()
     ]
     return "; ".join((*parts, *workers))
+
+
+def check_capacity(
+    conn: sa.Connection, tenant: str, by_bundle: Mapping[tuple[str, str], int], *, parsed: bool = True
+) -> dict[str, Any]:
+    """Return the estimate, the quotas and the waiting items for motions that could be submitted.
+
+    Args:
+        by_bundle: motions by model and exact bundle.
+        parsed: their prompts go through the text queue.
+
+    Raises:
+        QuotaUsedUp: a quota is exhausted.
+    """
+    rooms, waiting = check_quotas(conn, tenant, sum(by_bundle.values())), waiting_items(conn)
+    queues = {model for model, _ in by_bundle} | ({TEXT_QUEUE} if parsed else set())
+    return {
+        "estimate": EstimateView.of(estimate(conn, by_bundle)),
+        "quotas": [QuotaBody.of(room) for room in rooms],
+        "waiting": sum(waiting.get(queue, 0) for queue in queues),
+    }

@@ -13,7 +13,7 @@ from marey.api.audit import note
 from marey.api.auth import Operator, Reader, Submitter
 from marey.api.context import Connection, Context, Shared, deadline
 from marey.api.jobs import service
-from marey.api.jobs.estimates import EstimateView, QueueView
+from marey.api.jobs.estimates import QueueView, check_capacity
 from marey.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
 from marey.api.jobs.poses import read_poses
 from marey.api.jobs.schemas import (
@@ -37,7 +37,7 @@ from marey.core import metrics, tracing
 from marey.core.errors import InvalidInput
 from marey.http import schemas
 from marey.http.bodies import kept_body
-from marey.http.problems import RESPONSES, QuotaBody
+from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from marey.jobs.quality_counts import count_quality
 from marey.jobs.states import ENDED
@@ -126,18 +126,13 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
 def _check(
     shared: Context, key: tenants.ApiKey, submission: service.Submission, report: ScopeReport | None
 ) -> JSONResponse:
-    by_bundle = submission.by_bundle
     with db.transaction(shared.engine, db.SEARCH) as conn:
-        rooms = tenants.check_quotas(conn, key.tenant, submission.count)
-        estimate = jobs.estimate(conn, by_bundle)
-        waiting = jobs.waiting_items(conn)
+        capacity = check_capacity(conn, key.tenant, submission.by_bundle)
     checked = CheckedView(
         valid=True,
         items=submission.count,
         bundles=submission.bundles,
-        estimate=EstimateView.of(estimate),
-        quotas=[QuotaBody.of(room) for room in rooms],
-        waiting=sum(waiting.get(queue, 0) for queue in {jobs.TEXT_QUEUE, *(model for model, _ in by_bundle)}),
+        **capacity,
         scope=submission.fields.scope,
         **report_fields(report),
     )

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from typing import Unpack
 
-    from marey.client import CheckedJob, Client
+    from marey.client import CheckedEdit, CheckedJob, Client
     from marey.client.jobs import Defaults, JobOptions
     from marey.client.lines import Lines
     from marey.items.item import Item
@@ -138,6 +138,12 @@ def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
 
 
 def _show_check(checked: CheckedJob) -> None:
+    show_capacity(checked)
+    _show_scope(checked)
+
+
+def show_capacity(checked: CheckedJob | CheckedEdit) -> None:
+    """Say what a check found: the number of motions, quotas, and the time that it takes."""
     console.say(f"{checked.items} motions would be made, with {', '.join(checked.bundles)}; nothing was submitted.")
     for quota in checked.quotas:
         size = console.size if quota.name == "bytes" else str
@@ -151,7 +157,6 @@ def _show_check(checked: CheckedJob) -> None:
         behind = f", behind {checked.waiting} that wait now" if checked.waiting else ""
         console.say(f"That takes about {console.length_of_time(estimate.seconds)}{behind}.")
     console.say(estimate.basis)
-    _show_scope(checked)
 
 
 def _show_scope(checked: CheckedJob) -> None:

@@ -130,6 +130,7 @@ def edit(
     wait: Annotated[
         bool, typer.Option("--wait/--no-wait", help="Wait for the motions; without it, print the job's id.")
     ] = True,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check everything without submitting.")] = False,
     timeout: Annotated[
         float | None, typer.Option("--timeout", help="Timeout in seconds; exit 7 when it passes.")
     ] = None,
@@ -142,6 +143,7 @@ def edit(
     The motion itself does not change. Operations apply in the order in which they are given; others to join are motions
     of the server.
     """
+    from marey.cli.commands.submit import show_capacity
     from marey.cli.watching import check_ended, watch_job
     from marey.client import Client
 
@@ -151,6 +153,12 @@ def edit(
         steps = [_with_id(client, step.as_json()) for step in given]
         found = find(client, "motion", motion).id
         settings = options.settings_of(sampling or ()) or None
+        if dry_run:
+            checked = client.check_edit(found, steps, model=bundle or model, settings=settings)
+            show_capacity(checked)
+            if as_json:
+                console.result_json(checked.raw)
+            return
         job = client.edit(
             found, steps, model=bundle or model, settings=settings, name=name, priority=priority, keep_days=keep_days
         )

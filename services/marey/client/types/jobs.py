@@ -264,6 +264,23 @@ class CheckedJob(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CheckedEdit(Result):
+    """The answer to `validate_only` of an edit."""
+
+    valid: bool = False
+    items: int = 0
+    """Resulting motions."""
+    bundles: tuple[str, ...] = ()
+    """The bundle that generates frames; `edit` if no model is needed."""
+    prompts: tuple[str, ...] = ()
+    """Of the resulting motions, in their order."""
+    estimate: Estimate = field(default_factory=Estimate)
+    quotas: tuple[Quota, ...] = ()
+    waiting: int = 0
+    """Items of all tenants that wait for the same workers now."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class QualityCounts(Result):
     """The motions of a job by their quality.
 
