@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     )
     from marey.client.types.motions import (
         Candidate,
+        ConstraintError,
         Motion,
         MotionDetail,
         MotionQuality,
@@ -129,7 +130,9 @@ __getattr__ = lazy_names(
             "QueuePosition Quota Scope ScopeExample ScopeReport Speed SubmittedJob"
         ),
         "marey.client.types.models": "BrokenModel Model ModelActions ModelCatalogue SamplingSetting TrainingData",
-        "marey.client.types.motions": "Candidate Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection",
+        "marey.client.types.motions": (
+            "Candidate ConstraintError Motion MotionDetail MotionQuality PromptMatch Reroll Review Selection"
+        ),
         "marey.client.types.references": "ReferenceMatch",
         "marey.client.types.rigs": "Rig RigDetail",
         "marey.client.types.schedules": "Schedule",
@@ -156,6 +159,7 @@ __all__ = [
     "ComparedRun",
     "Comparison",
     "Conflict",
+    "ConstraintError",
     "Counters",
     "Defaults",
     "Delivery",

@@ -46,6 +46,7 @@ NAMES = {
     motions.Motion: "MotionView",
     motions.MotionDetail: "MotionDetailView",
     motions.MotionQuality: "MotionQuality",
+    motions.ConstraintError: "ConstraintError",
     motions.PromptMatch: "PromptMatch",
     motions.Candidate: "Candidate",
     motions.Selection: "Selection",

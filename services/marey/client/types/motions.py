@@ -35,6 +35,22 @@ class PromptMatch(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConstraintError(Result):
+    """Distance of a motion from one of its constraints."""
+
+    index: int = 0
+    """Of the constraint in the item's `constraints`."""
+    type: str = ""
+    mean_m: float = 0.0
+    """Metres; of the root over the points of a path, of the joints of a pose, of the effector over its targets."""
+    max_m: float = 0.0
+    mean_deg: float | None = None
+    """Degrees; None without headings or rotations that were asked for."""
+    missed: bool = False
+    """Beyond its bar."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MotionQuality(Result):
     """Physical quality of a motion: measures of the whole clip, and what is wrong with it."""
 
@@ -60,6 +76,8 @@ class MotionQuality(Result):
     """True without flags."""
     match: PromptMatch | None = None
     """None for motions of earlier releases."""
+    constraints: tuple[ConstraintError, ...] | None = None
+    """In the order of the item's constraints; None without any."""
 
 
 @dataclass(frozen=True, kw_only=True)
