@@ -19,7 +19,7 @@ from marey.items.item import InvalidItems
 
 Split = Literal["test", "compositional", "test+compositional"]
 Prompt = EvaluationPrompt | Mapping[str, object] | str
-"""A prompt, a dict with prompt, seconds and expected, or an `EvaluationPrompt`."""
+"""A prompt, a dict with prompt or timeline, seconds, expected and constraints, or an `EvaluationPrompt`."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class EvaluationOptions(TypedDict, total=False):
 
     Attributes:
         split: captions of the evaluator's bundle; `test` where there are no prompts.
-        prompts: in place of a split: prompts, or the path of a CSV or JSONL file with the columns prompt, seconds and
-            expected.
+        prompts: in place of a split: prompts, or the path of a CSV or JSONL file with the columns prompt or timeline,
+            seconds, expected and, in JSONL, constraints.
         evaluator: bundle that measures; by default the one that the server has.
         settings: of sampling, by name.
         repeats: motions of each prompt; by default 1.

@@ -260,7 +260,9 @@ def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
 def read_evaluation_prompts(
     path: str, *, extra_columns: ExtraColumns = "refuse", check: PromptCheck | None = None
 ) -> tuple[tuple[EvaluationPrompt, ...], list[int | None]]:
-    """Read the prompts of an evaluation, and the line of each; columns `prompt`, `seconds` and `expected`.
+    """Read the prompts of an evaluation, and the line of each.
+
+    Columns are `prompt` or `timeline`, `seconds`, `expected` and, in JSONL, `constraints`.
 
     Args:
         check: returns further problems of a row that can be used.

@@ -55,6 +55,8 @@ class EvaluationPlan:
                 seed=request.seed + number * request.repeats,
                 variants=request.repeats,
                 settings=request.settings,
+                timeline=prompt.timeline,
+                constraints=prompt.constraints,
             )
 
 
@@ -68,7 +70,7 @@ def plan_evaluation(
 
     Raises:
         NotFound, InvalidBundle, Refused: of the bundles; `where` is the field that names it.
-        InvalidItems: with every prompt whose length the model cannot make.
+        InvalidItems: with every prompt whose length, or timeline, the model cannot make.
         InvalidInput: a setting that the model lacks, too many motions, a seed that is too high.
     """
     with named_by("bundle"):
@@ -81,7 +83,7 @@ def plan_evaluation(
     prompts = captions if prompts is None else prompts
     settings = generator.check_settings(request.settings)
     if not request.splits:
-        _check_seconds(prompts, generator)
+        _check_prompts(prompts, generator)
     _check_size(request, len(prompts))
     exact = replace(
         request,
@@ -130,13 +132,19 @@ def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
         )
 
 
-def _check_seconds(prompts: tuple[EvaluationPrompt, ...], generator: GeneratorCapabilities) -> None:
+def _check_prompts(prompts: tuple[EvaluationPrompt, ...], generator: GeneratorCapabilities) -> None:
     problems: list[Problem] = []
     for line, prompt in enumerate(prompts, 1):
         try:
             generator.check_seconds(prompt.seconds)
         except InvalidInput as error:
             problems.append(Problem(line, "seconds", error.message))
+        try:
+            generator.check_timeline(prompt.timeline)
+        except InvalidInput as error:
+            problems.append(
+                Problem(line, "timeline", f"{error.message}. {error.hint}" if error.hint else error.message)
+            )
     if problems:
         raise InvalidItems(problems[:MAX_PROBLEMS], total=len(problems))
 

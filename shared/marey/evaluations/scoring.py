@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -21,6 +20,7 @@ from marey.evaluations.types import (
     NewScore,
     ScoreRows,
 )
+from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import tables as job_tables
 from marey.jobs.journal import NewEvent, record
 from marey.jobs.leased import LeasedItems, document, drop_empty_lease, end_items, lock_lease
@@ -123,7 +123,7 @@ def _refuse_over(evaluation: EvaluationRow) -> None:
 
 def _made_items(conn: sa.Connection, evaluation: EvaluationRow, job: UUID, prompts: str) -> tuple[MadeItem, ...]:
     """Return the items of the generation with their npz, in one query."""
-    expected = [prompt.expected for prompt in load_prompts(conn, evaluation.tenant, prompts)]
+    asked = load_prompts(conn, evaluation.tenant, prompts)
     item, motion, file, asset = job_tables.item.c, job_tables.motion.c, job_tables.motion_file.c, job_tables.asset.c
     rows = conn.execute(
         sa.select(
@@ -136,13 +136,14 @@ def _made_items(conn: sa.Connection, evaluation: EvaluationRow, job: UUID, promp
         .where(item.job_id == job)
         .order_by(item.position)
     )
-    return tuple(_made_item(row, expected) for row in rows.mappings())
+    return tuple(_made_item(row, asked[int(row["index"])]) for row in rows.mappings())
 
 
-def _made_item(row: sa.RowMapping, expected: Sequence[str | None]) -> MadeItem:
+def _made_item(row: sa.RowMapping, asked: EvaluationPrompt) -> MadeItem:
     own = {name: row[name] for name in OWN}
     return MadeItem(
-        expected=expected[int(row["index"])],
+        expected=asked.expected,
+        constrained=asked.constraints is not None,
         state=ItemState(row["state"]),
         problem=None if row["problem"] is None else FailureReason(**row["problem"]),
         npz=None if row["sha256"] is None else AssetDigest(row["sha256"], row["size"], row["media_type"]),

@@ -186,6 +186,8 @@ class MadeItem:
     """Licence of the generating weights."""
     npz: AssetDigest | None
     """The motion; None if there is none."""
+    constrained: bool = False
+    """Constraints were asked for."""
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from marey.core.characters import WHITESPACE, check_text
 from marey.core.errors import InvalidInput, TooLarge
+from marey.items.constraints import check_poses, read_constraints
 from marey.items.expected import read_expected
-from marey.items.item import CHECKS, Problem, checked, read_fields
+from marey.items.item import CHECKS, Problem, Rows, checked, complete_timeline, read_fields
+from marey.items.timeline import timeline_text
 
-COLUMNS = ("prompt", "seconds", "expected")
+COLUMNS = ("prompt", "seconds", "expected", "timeline")
+"""Of tables; a cell holds no constraints."""
 PromptCheck = Callable[[Mapping[str, Any], int | None], Iterable[Problem]]
 MIN_PROMPTS = 2
 """Minimum of prompts: metrics of a set (realism, diversity, retrieval) are undefined for one prompt."""
@@ -25,15 +28,28 @@ MAX_PROMPTS = 10_000
 
 @dataclass(frozen=True)
 class EvaluationPrompt:
-    """One prompt; `expected` is text for `marey.items.expected`, None = nothing is checked."""
+    """One prompt, or a timeline.
+
+    Attributes:
+        prompt: the text; of a timeline its text form.
+        seconds: requested length; None = the model's estimate.
+        expected: text for `marey.items.expected`; None = nothing is checked.
+        timeline: prompts at stated times (`marey.items.timeline`); None = the prompt alone.
+        constraints: what the motion keeps to (`marey.items.constraints`); None = nothing.
+    """
 
     prompt: str
     seconds: float | None = None
     expected: str | None = None
+    timeline: Rows | None = field(default=None, kw_only=True)
+    constraints: Rows | None = field(default=None, kw_only=True)
 
     def as_json(self) -> dict[str, Any]:
         """Return a line of a body, with the given fields only."""
-        return {name: value for name in COLUMNS if (value := getattr(self, name)) is not None}
+        given = {name: value for name in _CHECKS if (value := getattr(self, name)) is not None}
+        if self.timeline is not None:
+            del given["prompt"]
+        return given
 
 
 def read_prompts(
@@ -52,6 +68,11 @@ def read_prompts(
 
     def read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[Problem]]:
         values, problems = read_fields(raw, _CHECKS, line)
+        if "timeline" in values:
+            problems += complete_timeline(values, line)
+            if "expected" in values:
+                message = "stands beside a timeline, whose rows are judged by their prompts: leave it out"
+                problems.append(Problem(line, "expected", message))
         if check is not None:
             problems += check(values, line)
         return (None, problems) if problems else (EvaluationPrompt(**values), [])
@@ -68,7 +89,10 @@ def read_prompts(
 
 def prompts_of(rows: Iterable[Mapping[str, Any]]) -> tuple[EvaluationPrompt, ...]:
     """Rebuild prompts from the output of `as_json`."""
-    return tuple(EvaluationPrompt(**row) for row in rows)
+    return tuple(
+        EvaluationPrompt(**row) if "timeline" not in row else EvaluationPrompt(timeline_text(row["timeline"]), **row)
+        for row in rows
+    )
 
 
 def prompts_sha256(prompts: Sequence[EvaluationPrompt]) -> str:
@@ -92,4 +116,16 @@ def _expected(value: object) -> str:
     return " ".join(value.lower().split())
 
 
-_CHECKS = {"prompt": CHECKS["prompt"], "seconds": CHECKS["seconds"], "expected": _expected}
+def _constraints(value: object) -> list[dict[str, Any]]:
+    found = read_constraints(value)
+    check_poses(found)
+    return found
+
+
+_CHECKS: Mapping[str, Callable[[object], object]] = {
+    "prompt": CHECKS["prompt"],
+    "seconds": CHECKS["seconds"],
+    "expected": _expected,
+    "timeline": CHECKS["timeline"],
+    "constraints": _constraints,
+}

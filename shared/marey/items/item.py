@@ -208,14 +208,14 @@ def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], l
     """Return the usable fields of an item, and all its problems; see `read_item`."""
     values, problems = read_fields(raw, CHECKS, line)
     if "timeline" in values:
-        problems += _complete_timeline(values, line)
+        problems += complete_timeline(values, line)
     seed, variants = values.get("seed"), values.get("variants", 1)
     if seed is not None and seed + variants - 1 > MAX_SEED:
         problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
     return values, problems
 
 
-def _complete_timeline(values: dict[str, Any], line: int | None) -> list[Problem]:
+def complete_timeline(values: dict[str, Any], line: int | None) -> list[Problem]:
     """Give an item with a timeline its text form as the prompt, and check the fields that exclude one another."""
     problems: list[Problem] = []
     if "prompt" in values:

@@ -15,8 +15,9 @@ from marey.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
 
 READ_BY_HAND = {
     "NewItemBody": {"prompt", "tags", "name", "model", "timeline", "constraints"},  # marey.items.item
+    "TimelineRowBody": {"prompt"},  # marey.items.timeline
     "NewEditBody": {"model", "ops"},  # a bundle is found by it; marey.motion.edits.steps
-    "EvaluationPromptBody": {"prompt", "expected"},  # marey.items.evaluation_prompts
+    "EvaluationPromptBody": {"prompt", "expected", "timeline", "constraints"},  # marey.items.evaluation_prompts
     "NewStreamBody": {"prompt", "name", "model"},  # marey.items.item
     "ParseBody": {"prompts"},  # marey.items.prompts
 }

@@ -19,12 +19,14 @@ from marey.checks.quality import Quality, quality
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.evaluations import MAX_MISSING, MadeItem
 from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
+from marey.evaluator.shots import RowReading, constraints_of, rows_of
 from marey.items.expected import read_expected
 from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.features import FeatureLayout, PosedLayout, layout
 from marey.motion.resample import resample
 from marey.motion.rotations import conjugate, multiply
+from marey.quality.constraints import ConstraintError
 from marey.quality.record import read_quality
 
 Piece = TypeVar("Piece")
@@ -51,12 +53,18 @@ class EvaluatedMotion:
 
     Attributes:
         flags: those of the quality record that it was delivered with; None without a record.
+        rows: of a timeline; none for one prompt.
+        constraints: errors of its constraints; None = it has no record of any.
+        kinematic: it has no features of a network, as edited and constrained motions; `raw` is measured on its files.
     """
 
     item: MadeItem
     raw: Checked
     exported: Checked
     flags: tuple[str, ...] | None = None
+    rows: tuple[RowReading, ...] = ()
+    constraints: tuple[ConstraintError, ...] | None = None
+    kinematic: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class Broken:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedMotions:
-    """All motions of an evaluation, in input order, repeats within prompt."""
+    """All motions of an evaluation, in input order, repeats within prompt. Embeddings of timelines are 0."""
 
     motions: tuple[EvaluatedMotion, ...]
     raw: Embeddings  # (N, E)
@@ -86,6 +94,11 @@ class EvaluatedMotions:
     def variants(self) -> NDArray[np.int64]:
         """Return the repeat (N,) of each motion."""
         return np.array([motion.item.variant for motion in self.motions], np.int64)
+
+    @property
+    def single(self) -> NDArray[np.bool_]:
+        """Return which (N,) motions are of one prompt: evaluators embed these alone."""
+        return np.array([not motion.rows for motion in self.motions], bool)
 
 
 def measure(
@@ -121,27 +134,44 @@ def measure(
                 broken.append(clip)
                 continue
             clips.append(clip)
-            raw_joints = space.decode(clip.features)
-            record = read_quality(clip.manifest)
-            found.append(
-                EvaluatedMotion(
-                    item,
-                    raw=check(raw_joints, space.fps, item.expected),
-                    exported=check(clip.joints, clip.fps, item.expected),
-                    flags=None if record is None else tuple(record.flags),
-                )
-            )
-        raw.append(evaluator.embed_motion([clip.features for clip in clips]))
-        exported.append(evaluator.embed_motion([encoded(space, clip) for clip in clips]))
+            found.append(_evaluated(item, clip, space))
+        single = [not motion.rows for motion in found[len(found) - len(clips) :]]
+        alone = [clip for clip, is_single in zip(clips, single, strict=True) if is_single]
+        raw.append(_scattered(single, evaluator.embed_motion([_features(space, clip) for clip in alone])))
+        exported.append(_scattered(single, evaluator.embed_motion([encoded(space, clip) for clip in alone])))
         done += len(some)
         progress(done, len(made))
+    single = [not motion.rows for motion in found]
+    prompts = [motion.item.prompt for motion in found if not motion.rows]
+    text = embed_prompts(prompts, evaluator, lambda: progress(done, len(made)))
     return EvaluatedMotions(
-        tuple(found),
-        np.concatenate(raw),
-        np.concatenate(exported),
-        embed_prompts([motion.item.prompt for motion in found], evaluator, lambda: progress(done, len(made))),
-        tuple(broken),
+        tuple(found), np.concatenate(raw), np.concatenate(exported), _scattered(single, text), tuple(broken)
     )
+
+
+def _evaluated(item: MadeItem, clip: MotionClip, space: FeatureLayout) -> EvaluatedMotion:
+    record = read_quality(clip.manifest)
+    return EvaluatedMotion(
+        item,
+        raw=check(space.decode(_features(space, clip)), space.fps, item.expected),
+        exported=check(clip.joints, clip.fps, item.expected),
+        flags=None if record is None else tuple(record.flags),
+        rows=rows_of(clip),
+        constraints=constraints_of(clip),
+        kinematic=not clip.features.size,
+    )
+
+
+def _features(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
+    """Return the features as the network made them; of a clip without any those of its joints."""
+    return clip.features if clip.features.size else encoded(space, clip)
+
+
+def _scattered(rows: Sequence[bool], embeddings: Embeddings) -> Embeddings:
+    """Return (N, E) with the embeddings where `rows` (N,) is true, and 0 elsewhere."""
+    found = np.zeros((len(rows), embeddings.shape[1]), np.float32)
+    found[np.array(rows, bool)] = embeddings
+    return found
 
 
 def check_measured(measured: EvaluatedMotions, asked: int) -> None:
@@ -196,7 +226,7 @@ def _read(
         clip = parse_npz(read(item), where=f"prompt {item.index}, repeat {item.variant}")
     except (InvalidFile, NotFound) as error:
         return Broken(item, error.message)
-    if clip.features.shape[1] != space.dim or clip.features_fps != space.fps:
+    if clip.features.size and (clip.features.shape[1] != space.dim or clip.features_fps != space.fps):
         raise InvalidInput(
             f"the motions have {clip.features.shape[1]} features at {clip.features_fps:g} fps; "
             f"{evaluator.name} reads {space.dim} at {space.fps:g} fps ({space.name})",

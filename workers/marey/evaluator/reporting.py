@@ -35,6 +35,7 @@ from marey.evaluator.report import (
 from marey.evaluator.report.model import MOST_EXHIBITS, Against
 from marey.evaluator.rows import Ruler, embedded_sets, generated_rows, reconstruction_row, truth_row
 from marey.evaluator.scoring import REPEATS, EmbeddedSet, metrics_of, retrieved
+from marey.evaluator.shots import constraint_section, timeline_section
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.runtime.scoring import ScoreInput
@@ -99,6 +100,8 @@ def report_of(
         alarms=why,
         trend=_trend(source, exported, now),
         heat=_heat(source, measured, real),
+        timelines=timeline_section(measured.motions),
+        constraints=constraint_section(measured.motions),
         ranked_by="prompt adherence, then R-precision",
         best=best,
         worst=worst,
@@ -187,8 +190,8 @@ def _heat(source: ScoreInput, measured: EvaluatedMotions, real: RealClips) -> tu
 def _exhibits(
     source: ScoreInput, measured: EvaluatedMotions, scores: Sequence[MotionScore]
 ) -> tuple[tuple[Exhibit, ...], tuple[Exhibit, ...]]:
-    """Return the best and the worst motions; a prompt is shown once."""
-    order = sorted(range(len(scores)), key=lambda row: _rank(scores[row]))
+    """Return the best and the worst motions of one prompt; a prompt is shown once."""
+    order = sorted(np.flatnonzero(measured.single).tolist(), key=lambda row: _rank(scores[row]))
     worst = _distinct(order, measured)[:MOST_EXHIBITS]
     shown = {measured.motions[row].item.index for row in worst}
     rest = [row for row in order[::-1] if measured.motions[row].item.index not in shown]
@@ -263,6 +266,11 @@ def _software(measured: EvaluatedMotions, source: ScoreInput) -> Mapping[str, st
 
 def _notes(source: ScoreInput, measured: EvaluatedMotions) -> tuple[str, ...]:
     notes = [f"Not measured: prompt {b.item.index}, repeat {b.item.variant}: {b.reason}" for b in measured.broken[:20]]
+    if kinematic := sum(motion.kinematic for motion in measured.motions):
+        notes.append(
+            f"{kinematic} motions were changed after the network (constraints, edits) and have no features of it: the "
+            "row Generated is measured on their files."
+        )
     unmade = [item for item in source.items if item.npz is None]
     for item in unmade[:20]:
         why = item.problem.message if item.problem else str(item.state)

@@ -145,7 +145,7 @@ def embedded_sets(
 ) -> tuple[EmbeddedSet, EmbeddedSet]:
     """Return embedded sets of the raw and the exported motions; `labels` (N,) are those of their prompts."""
     raw, exported = (
-        EmbeddedSet(motion, measured.text, labels, measured.variants, progress)
+        EmbeddedSet(motion, measured.text, labels, measured.variants, progress, measured.single)
         for motion in (measured.raw, measured.exported)
     )
     return raw, exported

@@ -39,6 +39,8 @@ KID_SUBSETS, KID_SIZE = 50, 100
 PAIRS_OF_A_PROMPT = 10
 COMPOSITIONAL_COLUMNS = (OBEYED, *(f"r_precision_{k}_of_{POOLS[0]}" for k in TOP), "clip_score", "kid")
 """Metrics with columns of their own for the compositional split: those that 342 motions can support."""
+EMBEDDED = ("clip_score", "mm_dist", "diversity", "fid", "kid")
+"""Measures of embeddings besides R-precision."""
 JOINTS = "joints, without a network"
 QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 1000.0}
 """Numbers of `Quality`, and their factors to the printed unit: per cent, m/s³, mm, mm."""
@@ -62,6 +64,7 @@ class EmbeddedSet:
     labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
     variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
     progress: ProgressCallback = no_progress
+    single: NDArray[np.bool_] | None = None  # (N,): motions with embeddings, those of one prompt; None = all
     _pools: dict[tuple[int, int], list[PoolDraw]] = field(
         default_factory=dict[tuple[int, int], list[PoolDraw]], repr=False
     )
@@ -69,6 +72,10 @@ class EmbeddedSet:
     def only(self, rows: NDArray[np.bool_]) -> EmbeddedSet:
         """Return a subset of the motions."""
         return EmbeddedSet(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows], self.progress)
+
+    def embedded(self) -> EmbeddedSet:
+        """Return the motions with embeddings."""
+        return self if self.single is None or self.single.all() else self.only(self.single)
 
     def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
         """Return for each of the 20 repeats its rows and its random generator."""
@@ -157,6 +164,10 @@ def compositional(values: Mapping[str, Value]) -> dict[str, Value]:
 def embedded(embeddings: EmbeddedSet, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
     """Return all values that come from embeddings; with `real` (M, E) None, without distances to real motions."""
     found: dict[str, Value] = {}
+    embeddings = embeddings.embedded()
+    if not len(embeddings.motion):
+        keys = [key for pool in POOLS for key in keys_of(pool)]
+        return dict.fromkeys([*keys, *EMBEDDED], Value.missing("every motion is a timeline, which has no embedding"))
     for pool in POOLS:
         found |= retrieval(embeddings, evaluator, pool, seed)
     pairs = {"clip_score": clip_score, "mm_dist": matching_score}
@@ -177,8 +188,9 @@ def multimodality(measured: EvaluatedMotions, seed: int) -> Value:
     repeats = repeats_of(measured.variants)
     if repeats <= PAIRS_OF_A_PROMPT:
         return Value.missing(f"needs more than {PAIRS_OF_A_PROMPT} motions per prompt; there are {repeats}")
-    _, counts = np.unique(measured.indices, return_counts=True)
-    whole = measured.exported[np.repeat(counts == repeats, counts)].reshape(-1, repeats, measured.exported.shape[1])
+    _, counts = np.unique(measured.indices[measured.single], return_counts=True)
+    exported = measured.exported[measured.single]
+    whole = exported[np.repeat(counts == repeats, counts)].reshape(-1, repeats, exported.shape[1])
     if not len(whole):
         return Value.missing("no prompt has all of its motions")
     drawn = redraw(
@@ -216,6 +228,10 @@ def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArr
 
     Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
     """
+    if embeddings.single is not None and not embeddings.single.all():
+        shares = np.full(len(embeddings.motion), np.nan)
+        shares[embeddings.single] = retrieved(embeddings.embedded(), evaluator, seed)
+        return shares
     hits, drawn = np.zeros(len(embeddings.motion)), np.zeros(len(embeddings.motion))
     try:
         pools = embeddings.pools(evaluator, POOLS[0], seed)

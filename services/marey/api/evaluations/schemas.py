@@ -10,8 +10,9 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.files import FileView
+from marey.api.jobs.schemas import TimelineRowBody
 from marey.evaluations import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
-from marey.http.fields import EXPECTED, PROMPT, SAMPLING
+from marey.http.fields import EXPECTED, PROMPT, SAMPLING, TIMELINE
 from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
 from marey.items.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
 from marey.items.item import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
@@ -25,13 +26,21 @@ class EvaluationPromptBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    prompt: str = Field(description="What the person does, in English, at most 200 words.", json_schema_extra=PROMPT)
+    prompt: str | None = Field(
+        None,
+        description="What the person does, in English, at most 200 words; needed unless there is a `timeline`.",
+        json_schema_extra=PROMPT,
+    )
     seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
     expected: str | None = Field(
         None,
-        description='What the motion must show: "walk", "walk straight then wave left".',
+        description='What the motion must show: "walk", "walk straight then wave left"; not with a timeline.',
         json_schema_extra=EXPECTED,
     )
+    timeline: list[TimelineRowBody] | str | None = Field(
+        None, description="Instead of `prompt`: prompts at stated times, as in items.", json_schema_extra=TIMELINE
+    )
+    constraints: list[dict[str, Any]] | None = Field(None, description="What the motion keeps to, as in items.")
 
 
 class EvaluationFields(BaseModel):

@@ -84,7 +84,8 @@ def run(
 ) -> None:
     """Measure a model in the background; prints the run's id.
 
-    A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
+    A file of prompts has the columns prompt or timeline, seconds, expected, as in "walk straight then wave left", and
+    in JSONL constraints.
     """
     if protocol is not None:
         others = {

@@ -58,7 +58,7 @@ def read_case(case: Case, clip: MotionClip, free: MotionClip) -> ConstraintReadi
     quality, plain = read_quality(clip.manifest), read_quality(free.manifest)
     assert quality is not None
     assert plain is not None
-    actions = _judged_actions(case.prompt)
+    actions = judged_actions(case.prompt)
     return ConstraintReading(
         case.name,
         case.group,
@@ -98,7 +98,8 @@ def _skate(clip: MotionClip) -> float:
     return skate(joints, find_contacts(joints, clip.skeleton, clip.fps), clip.skeleton, clip.fps)
 
 
-def _judged_actions(prompt: str) -> list[str]:
+def judged_actions(prompt: str) -> list[str]:
+    """Return the actions that a prompt names; none if one of them has no rule of the referee."""
     every = ActionLists(supported=tuple(load_vocabulary().actions))
     named = [action.action for action in match_scope(prompt, every).actions]
     known = [name for name in named if name is not None and name in RULES]

@@ -15,6 +15,13 @@ from marey.evaluator.report.parts import (
     TrendPoint,
     Value,
 )
+from marey.evaluator.report.shots import (
+    ConstraintKind,
+    ConstraintSection,
+    TimelineSection,
+    WorstConstraint,
+    WorstRow,
+)
 from marey.evaluator.report.words import headline, sentence_of
 from marey.measures.scores import MotionScore
 
@@ -22,6 +29,8 @@ __all__ = [
     "ArtifactReference",
     "Baseline",
     "Change",
+    "ConstraintKind",
+    "ConstraintSection",
     "Exhibit",
     "GenerationSpeed",
     "HeatCell",
@@ -30,8 +39,11 @@ __all__ = [
     "MotionScore",
     "Repeats",
     "Report",
+    "TimelineSection",
     "TrendPoint",
     "Value",
+    "WorstConstraint",
+    "WorstRow",
     "from_json",
     "headline",
     "sentence_of",

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from marey.evaluator.report.model import Report
 from marey.evaluator.report.parts import Exhibit, HeatCell
+from marey.evaluator.report.shots import shots_of
 from marey.evaluator.report.tables import Cell, Heat, Line, Table, heat_of, in_percent, tables_of, trended, weakest_of
 from marey.evaluator.report.words import (
     CHANGES,
@@ -42,6 +43,7 @@ def to_markdown(report: Report) -> bytes:
         _text(CHANGES) if report.changes else "",
         _text(report.comparability),
         *_heat(heat_of(report)),
+        *_shots(report),
         *_exhibits("Worst clips", report.worst, report.ranked_by),
         *_exhibits("Best clips", report.best, report.ranked_by),
         *_trend(report),
@@ -125,6 +127,21 @@ def _heat(heat: Heat) -> list[str]:
     rows.append(["**all**", *(_place(heat.total(style=style)) for style in heat.styles), _place(heat.total())])
     head = ["passed of tried", *(_text(style) for style in heat.styles), "**all**"]
     return ["## Prompt checks by action and style", _text(weakest_of(heat)), _rows(head, rows)]
+
+
+def _shots(report: Report) -> list[str]:
+    blocks: list[str] = []
+    for section in shots_of(report.timelines, report.constraints):
+        tables = (
+            _rows(
+                [_text(name) for name in each.head],
+                [[_text(cell) for cell in row] for row in each.rows],
+                left=each.left,
+            )
+            for each in section.tables
+        )
+        blocks += [f"## {section.title}", _text(section.sentence), *tables]
+    return blocks
 
 
 def _place(cell: HeatCell | None) -> str:

@@ -25,6 +25,7 @@ from marey.evaluator.report.parts import (
     distinct,
     finite,
 )
+from marey.evaluator.report.shots import ConstraintSection, TimelineSection
 from marey.measures.comparing import Verdict
 from marey.measures.scores import MotionScore
 
@@ -115,6 +116,8 @@ class Report:
         alarms: a sentence for each reason.
         trend: runs with the same evaluator and data, the oldest first, this one last.
         heat: prompt checks by action and style.
+        timelines: rows of timelines; None = there is no timeline.
+        constraints: errors of constraints; None = no motion has any.
         ranked_by: order of `best` and `worst`.
         best: clips, the best first.
         worst: clips, the worst first.
@@ -147,6 +150,8 @@ class Report:
     alarms: tuple[str, ...] = ()
     trend: tuple[TrendPoint, ...] = ()
     heat: tuple[HeatCell, ...] = ()
+    timelines: TimelineSection | None = None
+    constraints: ConstraintSection | None = None
     ranked_by: str = ""
     best: tuple[Exhibit, ...] = ()
     worst: tuple[Exhibit, ...] = ()

@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
-from marey.evaluator.report import tables, trends, words
+from marey.evaluator.report import shots, tables, trends, words
 from marey.viz.pages import asset
 
 PACKAGE = "marey.evaluator.report"
@@ -35,6 +35,7 @@ def _environment() -> Environment:
 
 
 _NAMES = {
+    shots: ("shots_of",),
     tables: ("MOST_STYLES", "heat_of", "heat_step", "in_percent", "tables_of", "trended", "weakest_of"),
     trends: ("BOTTOM", "HEIGHT", "HIT", "LEFT", "RIGHT", "TOP", "WIDTH", "plot_of"),
     words: (

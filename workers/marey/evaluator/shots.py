@@ -1,0 +1,128 @@
+"""Rows of timelines and errors of constraints of measured motions, and their sections of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from marey.evaluator.constraints.measuring import judged_actions
+from marey.evaluator.report.shots import (
+    WORST,
+    ConstraintKind,
+    ConstraintSection,
+    TimelineSection,
+    WorstConstraint,
+    WorstRow,
+)
+from marey.items.timeline import TimelineRow
+from marey.motion.clip import MotionClip
+from marey.quality.constraints import ConstraintError
+from marey.quality.record import SHOWN, read_quality
+from marey.referee import Body, shows_in_order
+
+if TYPE_CHECKING:
+    from marey.evaluator.measuring import EvaluatedMotion
+
+
+@dataclass(frozen=True)
+class RowReading:
+    """A row of a timeline.
+
+    Attributes:
+        shown: the referee sees the actions of its prompt; None where they have no rules.
+        match: as its manifest says; None where an action has no check.
+    """
+
+    row: TimelineRow
+    shown: bool | None
+    match: float | None
+
+    @property
+    def fails(self) -> bool:
+        """Return True if the row does not show its prompt: by the referee, without it by the match."""
+        return self.match is not None and self.match < SHOWN if self.shown is None else not self.shown
+
+
+def rows_of(clip: MotionClip) -> tuple[RowReading, ...]:
+    """Judge each row of a timeline, from the place where it begins; none if the clip is no timeline."""
+    timeline = cast("Mapping[str, Any]", clip.manifest.get("timeline") or {})
+    return tuple(_reading(clip, row) for row in timeline.get("rows", ()))
+
+
+def constraints_of(clip: MotionClip) -> tuple[ConstraintError, ...] | None:
+    """Return the errors of a clip's constraints; None if its quality record has none."""
+    record = read_quality(clip.manifest)
+    return None if record is None or record.constraints is None else tuple(record.constraints)
+
+
+def _reading(clip: MotionClip, row: Mapping[str, Any]) -> RowReading:
+    known = TimelineRow(float(row["start"]), float(row["end"]), str(row["prompt"]))
+    part = clip.joints[round(known.start * clip.fps) : round(known.end * clip.fps)].astype(np.float64)
+    actions = judged_actions(known.prompt)
+    shown = shows_in_order(actions, Body(part - part[0, 0] * [1, 0, 1], clip.fps)) if actions else None
+    return RowReading(known, shown, row.get("match"))
+
+
+def timeline_section(motions: Iterable[EvaluatedMotion]) -> TimelineSection | None:
+    """Return the section about timelines; None without any."""
+    made = [motion for motion in motions if motion.rows]
+    if not made:
+        return None
+    every = [(motion, row) for motion in made for row in motion.rows]
+    rows = [row for _, row in every]
+    matched = [row.match for row in rows if row.match is not None]
+    failing = [(motion, row) for motion, row in every if row.fails]
+    worst = sorted(failing, key=lambda each: 1.0 if each[1].match is None else each[1].match)[:WORST]
+    return TimelineSection(
+        motions=len(made),
+        rows=len(rows),
+        judged=sum(row.shown is not None for row in rows),
+        shown=sum(row.shown is True for row in rows),
+        matched=len(matched),
+        off_prompt=sum(match < SHOWN for match in matched),
+        flagged=sum(bool(motion.flags) for motion in made),
+        worst=tuple(
+            WorstRow(row.row.prompt, row.row.times, motion.item.index, motion.item.seed, row.match)
+            for motion, row in worst
+        ),
+    )
+
+
+def constraint_section(motions: Iterable[EvaluatedMotion]) -> ConstraintSection | None:
+    """Return the section about constraints; None without any."""
+    asked = [motion for motion in motions if motion.item.constrained or motion.constraints is not None]
+    if not asked:
+        return None
+    every = [(motion, error) for motion in asked for error in motion.constraints or ()]
+    kinds = dict.fromkeys(error.type for _, error in every)
+    missed = [(motion, error) for motion, error in every if error.missed]
+    worst = sorted(missed, key=lambda each: -each[1].max_m)[:WORST]
+    known = [motion for motion in asked if motion.constraints is not None]
+    return ConstraintSection(
+        motions=len(known),
+        missed=sum(any(error.missed for error in motion.constraints or ()) for motion in known),
+        kinds=tuple(_kind(kind, [error for _, error in every if error.type == kind]) for kind in kinds),
+        unknown=len(asked) - len(known),
+        worst=tuple(
+            WorstConstraint(
+                motion.item.prompt, motion.item.index, motion.item.seed, error.index, error.type, error.max_m,
+                error.mean_deg,
+            )
+            for motion, error in worst
+        ),
+    )  # fmt: skip
+
+
+def _kind(kind: str, errors: Sequence[ConstraintError]) -> ConstraintKind:
+    degrees = [error.mean_deg for error in errors if error.mean_deg is not None]
+    return ConstraintKind(
+        kind,
+        len(errors),
+        sum(error.missed for error in errors),
+        float(np.mean([error.mean_m for error in errors])),
+        max(error.max_m for error in errors),
+        float(np.mean(degrees)) if degrees else None,
+    )
