@@ -42,8 +42,8 @@ class RowReading:
 
     @property
     def fails(self) -> bool:
-        """Return True if the row does not show its prompt: by the referee, without it by the match."""
-        return self.match is not None and self.match < SHOWN if self.shown is None else not self.shown
+        """Return True if the row does not show its prompt, by the referee or by the match."""
+        return self.shown is False or (self.match is not None and self.match < SHOWN)
 
 
 def rows_of(clip: MotionClip) -> tuple[RowReading, ...]:

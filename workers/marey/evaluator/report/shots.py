@@ -36,7 +36,7 @@ class TimelineSection:
         matched: rows with a match in their manifest.
         off_prompt: those whose match is too low.
         flagged: timelines whose quality record has a flag.
-        worst: rows that the referee does not pass, or without its verdict those of the lowest match.
+        worst: rows that fail by the referee or by their match, the lowest match first.
     """
 
     motions: int
