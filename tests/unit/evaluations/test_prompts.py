@@ -87,6 +87,42 @@ def test_one_prompt_is_too_few_and_ten_thousand_and_one_too_many() -> None:
         read_prompts(many)
 
 
+TIMELINE = "0-3 a person walks; 3-5 a person waves"
+PATH = [{"type": "root_path", "times": [0, 3], "positions_xz": [[0, 0], [0, 3]]}]
+
+
+def test_timelines_and_constraints_are_read_as_those_of_items_and_back() -> None:
+    raws = [(1, {"timeline": TIMELINE, "seconds": 5}), (2, {"prompt": "a person walks", "constraints": PATH})]
+    first, second = read_prompts(raws)
+    assert (first.prompt, first.seconds, len(first.timeline or ())) == (TIMELINE, None, 2)
+    assert second.constraints is not None
+    assert second.constraints[0]["positions_xz"] == [[0.0, 0.0], [0.0, 3.0]]
+    rows = [first.as_json(), second.as_json()]
+    assert [set(row) for row in rows] == [{"timeline"}, {"prompt", "constraints"}]
+    assert prompts_of(rows) == (first, second) == read_prompts(enumerate(rows, 1))
+    plain = EvaluationPrompt("a person walks")
+    assert prompts_sha256([second]) != prompts_sha256([plain])
+
+
+def test_problems_of_timelines_and_constraints_name_their_field() -> None:
+    pose = [{"type": "pose_keyframe", "frame": 3, "motion": {"id": "0" * 32, "frame": 0}}]
+    raws = [
+        (1, {"timeline": TIMELINE, "expected": "walk"}),
+        (2, {"timeline": TIMELINE, "prompt": "a person walks"}),
+        (3, {"timeline": "0-3 a person walks; 2-5 a person waves"}),
+        (4, {"prompt": "a person walks", "constraints": [{"type": "fly"}]}),
+        (5, {"prompt": "a person walks", "constraints": pose}),
+        (6, {"seconds": 3}),
+    ]
+    with pytest.raises(InvalidItems) as caught:
+        read_prompts(raws)
+    assert [(p.line, p.field) for p in caught.value.problems] == [
+        (1, "expected"), (2, "prompt"), (3, "timeline"), (4, "constraints.0.type"), (5, "constraints.0.motion"),
+        (6, "prompt"),
+    ]  # fmt: skip
+    assert "whose rows are judged by their prompts" in caught.value.problems[0].message
+
+
 def test_the_digest_is_that_of_prompts_lengths_expectations_and_order() -> None:
     one, other = EvaluationPrompt("walk", 2.0, "walk"), EvaluationPrompt("run")
     same = prompts_of([one.as_json(), other.as_json()])
