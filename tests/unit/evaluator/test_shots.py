@@ -88,6 +88,12 @@ def test_rows_are_cut_out_and_judged_by_their_own_prompts(shots: ScoreInput) -> 
     assert [each.fails for each in rows[1:]] == [True, False]
 
 
+def test_rows_beyond_the_end_of_a_cut_timeline_are_not_judged(shots: ScoreInput) -> None:
+    whole = parse_npz(shots.npz(shots.items[TIMELINES[0]]))
+    short = replace(part(whole, 0, 50), manifest=whole.manifest)
+    assert [each.shown for each in rows_of(short)][1:] == [None, None]
+
+
 def test_a_row_fails_by_the_referee_or_by_its_match(shots: ScoreInput) -> None:
     row = rows_of(parse_npz(shots.npz(shots.items[TIMELINES[0]])))[0]
     states = {(True, 0.9): False, (True, 0.2): True, (False, 0.9): True, (None, None): False, (False, None): True}

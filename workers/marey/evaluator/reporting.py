@@ -35,7 +35,7 @@ from marey.evaluator.report import (
 from marey.evaluator.report.model import MOST_EXHIBITS, Against
 from marey.evaluator.rows import Ruler, embedded_sets, generated_rows, reconstruction_row, truth_row
 from marey.evaluator.scoring import REPEATS, EmbeddedSet, metrics_of, retrieved
-from marey.evaluator.shots import constraint_section, timeline_section
+from marey.evaluator.shot_sections import constraint_section, timeline_section
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.runtime.scoring import ScoreInput
