@@ -36,9 +36,10 @@ def test_the_readme_is_short_and_begins_with_licence_and_actions() -> None:
     assert {"make demo", "make test"} <= set(re.findall(r"^\$ (make \w+)", README, re.MULTILINE))
 
 
-def test_the_readme_shows_one_small_picture() -> None:
-    (picture,) = re.findall(r"!\[[^\]]+\]\((docs/images/\w+\.png)\)", README)
-    assert (ROOT / picture).stat().st_size < 200_000
+def test_the_readme_shows_two_small_pictures() -> None:
+    pictures = re.findall(r"!\[[^\]]+\]\((docs/images/\w+\.png)\)", README)
+    assert len(pictures) == 2
+    assert all((ROOT / picture).stat().st_size < 200_000 for picture in pictures)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
