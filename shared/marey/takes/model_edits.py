@@ -20,6 +20,9 @@ from marey.registry import find_model
 from marey.text.keys import feature_key
 from marey.text.several import several_key
 
+CUTS = frozenset({"trim", "split", "loop", "reverse"})
+"""Operations after which another prompt of several may be the last."""
+
 
 @dataclass(frozen=True)
 class EditGenerator:
@@ -104,7 +107,8 @@ def with_prompts(steps: Sequence[Step], motion: MotionRow) -> tuple[Step, ...]:
 def _last_prompt(before: Sequence[Step], motion: MotionRow, where: str) -> str:
     prompts: Any = motion.metadata.get("prompts")
     prompt = str(prompts[-1][1]) if prompts else motion.prompt
-    if not prompt or any(step.operation.needs_model or "with" in step.values for step in before):
+    cut = bool(prompts) and any(step.operation.name in CUTS for step in before)  # only the frames show what is left
+    if not prompt or cut or any(step.operation.needs_model or "with" in step.values for step in before):
         raise InvalidInput(
             "is missing: which action goes on is not known", where=f"{where}.prompt", hint="Say what the person does."
         )

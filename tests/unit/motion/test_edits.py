@@ -166,6 +166,57 @@ def test_motions_join_where_the_last_pose_stands_and_nothing_jumps():
     np.testing.assert_allclose(one(second, {"op": "trim", "from": "f5"}).joints, tail.joints, atol=EXACT)
 
 
+def timeline_of(frames: int = 60) -> MotionClip:
+    """A motion of three prompts, as a timeline's manifest says it."""
+    prompts = [[0, "a person walks"], [20, "a person bows"], [40, "a person waves"]]
+    told = {"prompt": "0-1 …", "prompts": prompts, "timeline": {"rows": []}, "constraints": [{"type": "root_path"}]}
+    return replace(dance(1, frames), manifest=told)
+
+
+@pytest.mark.parametrize(
+    ("op", "expected"),
+    [
+        ({"op": "trim", "from": "f30", "to": "f45"}, [[0, "a person bows"], [10, "a person waves"]]),
+        ({"op": "trim", "from": "f25", "to": "f35"}, [[0, "a person bows"]]),
+        ({"op": "reverse"}, [[0, "a person waves"], [20, "a person bows"], [40, "a person walks"]]),
+        ({"op": "speed", "factor": 2}, [[0, "a person walks"], [10, "a person bows"], [20, "a person waves"]]),
+        ({"op": "fps", "rate": 40}, [[0, "a person walks"], [40, "a person bows"], [80, "a person waves"]]),
+        ({"op": "mirror"}, [[0, "a person walks"], [20, "a person bows"], [40, "a person waves"]]),
+    ],
+)
+def test_prompts_follow_their_frames(op: dict, expected: list):
+    about = one(timeline_of(), op).manifest
+    assert about["prompts"] == expected
+    assert not {"timeline", "constraints"} & set(about)  # of the frames of the source
+
+
+@given(st.integers(0, 58), st.integers(1, 59), st.floats(0.2, 4))
+@settings(deadline=None, max_examples=30)
+def test_each_frame_keeps_its_prompt(first: int, length: int, factor: float):
+    last = min(first + length, 59)
+    result = one(
+        timeline_of(), {"op": "trim", "from": f"f{first}", "to": f"f{last}"}, {"op": "speed", "factor": factor}
+    )
+    told = result.manifest["prompts"]
+    source = {"a person walks": 0, "a person bows": 20, "a person waves": 40}
+    for frame, text in told[1:]:
+        assert source[text] <= first + frame * factor + 1e-5 < source[text] + max(factor, 1) + 1e-5
+    assert told[0][0] == 0
+    assert all(frame < result.frames for frame, _ in told)
+
+
+def test_pieces_of_a_split_have_their_own_prompts():
+    pieces = edit(timeline_of(), [{"op": "split", "at": "f30"}])
+    firsts = [[[0, "a person walks"], [20, "a person bows"]], [[0, "a person bows"], [10, "a person waves"]]]
+    assert [piece.manifest["prompts"] for piece in pieces] == firsts
+
+
+def test_prompts_of_a_joined_motion_are_counted_at_the_rate_of_the_first():
+    second = one(timeline_of(), {"op": "fps", "rate": 60})
+    about = one(dance(2, 30), {"op": "concat", "with": second}).manifest
+    assert [frame for frame, _ in about["prompts"]] == [0, 29, 49, 69]
+
+
 def test_joined_motions_keep_both_prompts_and_the_strictest_licence():
     first, second = dance(1, 30), dance(2, 30)
     second = replace(second, manifest={"prompt": "a person bows", "licence": "CC-BY-NC-4.0", "rewritten": "bows"})

@@ -11,12 +11,12 @@ from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.edits.joining import faded_in, placed_after
 from marey.motion.edits.place import posed
+from marey.motion.edits.prompt_frames import PROMPTS, prompts_of, resampled, without_repeats
 from marey.motion.edits.prompts import joined
-from marey.motion.resample import resample
 
 SAME_BONES = 1e-4
 """Metres."""
-READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope", "timeline")
+READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope")
 """Keys of a manifest that say how its prompt was read."""
 
 
@@ -31,7 +31,7 @@ def concat(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     """
     second = values["with"]
     check_bodies(clip, second)
-    second = placed_after(clip, resample(second, clip.fps))
+    second = placed_after(clip, resampled(second, clip.fps))
     rotations, root = faded_in(clip, second, round(values["blend"] * clip.fps))
     return posed(
         clip,
@@ -56,17 +56,9 @@ def with_prompts(manifest: Mapping[str, Any], prompt: str, prompts: Sequence[Seq
     """
     if prompt == manifest.get("prompt", ""):
         return dict(manifest)
-    kept = {name: value for name, value in manifest.items() if name not in (*READ_PROMPT, "prompts")}
-    several = [[frame, text] for k, (frame, text) in enumerate(prompts) if not k or text != prompts[k - 1][1]]
-    return {**kept, "prompt": prompt, **({"prompts": several} if len(several) > 1 else {})}
-
-
-def prompts_of(clip: MotionClip) -> list[list[Any]]:
-    """Return the prompts of a motion, each with its first frame; none of a captured one."""
-    given: Any = clip.manifest.get("prompts")
-    if given:
-        return [[frame, text] for frame, text in given]
-    return [[0, clip.manifest["prompt"]]] if clip.manifest.get("prompt") else []
+    kept = {name: value for name, value in manifest.items() if name not in (*READ_PROMPT, PROMPTS)}
+    several = without_repeats(prompts)
+    return {**kept, "prompt": prompt, **({PROMPTS: several} if len(several) > 1 else {})}
 
 
 def check_bodies(clip: MotionClip, second: MotionClip) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.edits.operation import frame_number
 from marey.motion.edits.place import posed
+from marey.motion.edits.prompt_frames import with_prompts_at
 
 
 def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
@@ -17,7 +19,8 @@ def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     Raises:
         InvalidInput: a moment is outside the motion, or the second is before the first.
     """
-    return part(clip, *frames_of(clip, values["from"], values["to"]))
+    first, last = frames_of(clip, values["from"], values["to"])
+    return replace(part(clip, first, last), manifest=with_prompts_at(clip.manifest, range(first, last + 1)))
 
 
 def frames_of(clip: MotionClip, start: float | str, end: float | str | None) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from marey.motion.edits.steps import Step, pieces_of, read_steps
 EDITED_FROM = "edited_from"
 CYCLE = "loop"
 """Key of the record of a loop in a motion's manifest."""
-OUTDATED = ("quality", "selection", "travel", "travel_per_second")
+OUTDATED = ("quality", "selection", "travel", "travel_per_second", "timeline", "constraints")
 """Keys of a manifest that describe the frames of the source."""
 MOST_FRAMES = 100_000
 

@@ -16,6 +16,7 @@ from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import Closed, closed
 from marey.motion.edits.loop_search import SHORTEST_STILL, Cycle, cycles, has_steps
 from marey.motion.edits.place import heading_of, posed
+from marey.motion.edits.prompt_frames import with_prompts_at
 from marey.motion.feet import need_feet
 from marey.motion.rotations import about, rotate
 
@@ -85,10 +86,11 @@ def _result(clip: MotionClip, done: Closed, cycle: Cycle, values: Mapping[str, A
         },
     }
     kept = slice(None) if values["end"] == "closed" else slice(-1)
+    manifest = with_prompts_at(clip.manifest, range(cycle.first - done.earlier, cycle.last - done.earlier + 1)[kept])
     return posed(
         whole,
         done.rotations[kept],
         done.root[kept],
         contacts=done.contacts[kept],
-        manifest={**clip.manifest, "loop": record},
+        manifest={**manifest, "loop": record},
     )

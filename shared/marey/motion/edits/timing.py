@@ -10,6 +10,7 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import posed
+from marey.motion.edits.prompt_frames import with_prompts_at
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array
 
@@ -36,7 +37,8 @@ def change_speed(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
 
 def reverse(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     """Play backwards."""
-    return posed(clip, clip.rotations[::-1], clip.root[::-1], contacts=clip.contacts[::-1])
+    manifest = with_prompts_at(clip.manifest, reversed(range(clip.frames)))
+    return posed(clip, clip.rotations[::-1], clip.root[::-1], contacts=clip.contacts[::-1], manifest=manifest)
 
 
 def change_rate(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
@@ -73,5 +75,5 @@ def _at(clip: MotionClip, times: Array, fps: float, manifest: Mapping[str, Any])
         interpolate(clip.root.astype(np.float64), times),
         contacts=clip.contacts[np.rint(times).astype(np.intp)],
         fps=fps,
-        manifest=manifest,
+        manifest=with_prompts_at(manifest, times),
     )

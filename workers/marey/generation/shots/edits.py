@@ -14,13 +14,13 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.generation.shots.editor import EditModel
 from marey.motion.clip import MotionClip
-from marey.motion.edits.concat import check_bodies, prompts_of, with_prompts
+from marey.motion.edits.concat import check_bodies, with_prompts
 from marey.motion.edits.cuts import frames_of, part
 from marey.motion.edits.joining import bridged
 from marey.motion.edits.place import posed
+from marey.motion.edits.prompt_frames import prompts_of, resampled
 from marey.motion.edits.prompts import joined, with_own
 from marey.motion.edits.table import MOST_SEED
-from marey.motion.resample import resample
 from marey.motion.rotations import Array, slerp
 from marey.motion.skeleton import Skeleton
 from marey.selector.records import match_of
@@ -58,7 +58,7 @@ def in_between(clip: MotionClip, values: Mapping[str, Any], model: EditModel) ->
         InvalidInput: the skeletons differ; and as `EditModel.between`.
     """
     check_bodies(clip, values["with"])
-    other = resample(values["with"], clip.fps)
+    other = resampled(values["with"], clip.fps)
     frames = max(1, round(values["seconds"] * clip.fps))
     piece = model.between(clip, frames, other, values["prompt"], values["seed"], force=values["force"])
     piece, after = bridged(clip, piece, other, _blend(clip))
