@@ -52,7 +52,11 @@ def test_bad_constraints_name_the_field(marey_command: Command, tmp_path: Path) 
     fast = {**PATH, "positions_xz": [[0, 0], [0, 20], [0, 21], [0, 22]]}
     ran = marey_command("generate", "walk", "--bundle", BUNDLE, "--constraints", write(tmp_path, fast), "-o", tmp_path)
     assert ran.code == 2
-    assert "constraints.0.positions_xz.1: 20.0 m/s" in ran.err
+    assert f"{tmp_path / 'constraints.json'}: constraints.0.positions_xz.1: 20.0 m/s" in ran.err
+    (tmp_path / "text.json").write_text("hello")
+    ran = marey_command("generate", "walk", "--constraints", tmp_path / "text.json", "-o", tmp_path)
+    assert ran.code == 2
+    assert f"{tmp_path / 'text.json'}: constraints: is not JSON" in ran.err
 
 
 def test_python_takes_constraints_of_all_and_of_a_row() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from marey.cli import console
 from marey.cli.hints import hint_of_timeout
@@ -66,4 +67,6 @@ def _caption(now: Progress) -> str:
 
 def _show_event(bar: Bar, event: JobEvent) -> None:
     if event.item and event.reason:
-        bar.console.print(f"item {event.item[-8:]}: {event.reason}", markup=False)
+        problem: Mapping[str, Any] = event.data.get("problem") or {}
+        place = f"{problem['where']}: " if problem.get("where") else ""
+        bar.console.print(f"item {event.item[-8:]}: {place}{event.reason}", markup=False)

@@ -67,7 +67,8 @@ def parse_constraints(text: str | bytes) -> list[Constraint]:
     except RecursionError:
         raise InvalidInput("is nested too deeply", where="constraints") from None
     except ValueError as error:
-        raise InvalidInput(f"is not JSON: {error}", where="constraints") from None
+        hint = 'Write {"constraints": [{"type": "root_path", …}]}.'
+        raise InvalidInput(f"is not JSON: {error}", where="constraints", hint=hint) from None
     if isinstance(value, Mapping):
         given = cast("Mapping[str, object]", value)
         return read_constraints(given["constraints"] if set(given) == {"constraints"} else given)
@@ -108,7 +109,9 @@ def check_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: float
                 place = f"{where}.{field}" if field == "frame" else f"{where}.{field}.{point}"
                 said = f"{frame / fps:g} s is" if field == "times" else f"frame {frame:g} is"
                 raise InvalidInput(
-                    f"{said} beyond the clip, which has {frames} frames at {fps:g} fps, 0 to {frames - 1}", where=place
+                    f"{said} beyond the clip, which has {frames} frames at {fps:g} fps, 0 to {frames - 1}",
+                    where=place,
+                    hint=f"Its last frame is at {(frames - 1) / fps:g} s: end there, or ask for a longer clip.",
                 )
     _check_paths(constraints, fps)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +10,18 @@ import numpy as np
 import pytest
 
 from marey.core.settings import Settings
-from marey.db import transaction
 from marey.generation.handler import GeneratorHandler
-from marey.jobs import NewText, claim, commit_texts
-from marey.jobs.types import UNREAD, prompts_of_ops
+from marey.jobs.types import UNREAD
 from marey.registry import get_model, model_names
 from marey.takes import collect_garbage, rewrite_files
-from marey.text.several import SeveralTexts
 from tests.integration.takes.test_edits import post
 from tests.integration.takes.test_retention import SECRET, dump, objects
 from tests.support.command import Command
 from tests.support.editing import clip_of, edited, stored, work_edits
 from tests.support.live_api import LiveApi, write_bundle
 from tests.support.models import load, random_bundle
-from tests.support.prepared import text_features
 from tests.support.runtime import Loop
+from tests.support.text_stage import read_texts
 
 MODEL = next(name for name in model_names() if get_model(name).keeps_frames)
 PROMPT = "a person sits down"
@@ -43,25 +39,6 @@ def _bundles(api_home: Path) -> None:
     if not (models / "streams-only").exists():
         other = next(name for name in model_names() if not get_model(name).keeps_frames)
         write_bundle(models, "streams-only", model=other)
-
-
-def read_texts(api: LiveApi) -> list[tuple[str, ...]]:
-    """Do what the text stage would, and return the prompts of each item."""
-    told: list[tuple[str, ...]] = []
-    with transaction(api.engine) as conn:
-        while found := claim(conn, "text", "hands", 64):
-            texts: list[NewText] = []
-            for item in found.items:
-                assert item.edits is not None
-                told.append(prompts_of_ops(item.edits.ops))
-                several = SeveralTexts(tuple(read(prompt) for prompt in told[-1]))
-                texts.append(NewText(item.id, item.text_key, several.to_blob()))
-            commit_texts(conn, found.lease_token, texts)
-    return told
-
-
-def read(prompt: str) -> Any:
-    return replace(text_features(sum(prompt.encode()), 1, 1), prompt=prompt, rewritten=prompt)
 
 
 def work(api: LiveApi, generator: Any) -> None:

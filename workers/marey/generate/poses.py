@@ -43,10 +43,14 @@ def read_file(file: Path | None) -> Sequence[Mapping[str, Any]]:
 
     Raises:
         NotFound, TooLarge: the file cannot be read.
-        InvalidInput: constraints that cannot be used, with the field.
+        InvalidInput: constraints that cannot be used, with the file and the field.
     """
     if file is None:
         return ()
     from marey.motion.files import read_limited
 
-    return with_poses(parse_constraints(read_limited(file, MAX_FILE)), file.parent)
+    content = read_limited(file, MAX_FILE)
+    try:
+        return with_poses(parse_constraints(content), file.parent)
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where=f"{file}: {error.where}", hint=error.hint) from None

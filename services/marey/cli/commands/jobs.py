@@ -258,7 +258,8 @@ def _show_failures(client: Client, job: str, state: str, limit: int = 20) -> Non
     found = client.jobs.items(job, state=state, page_size=limit)
     for item in (each.raw for each in islice(found, limit)):
         error = item["error"] or {"message": item["reason"], "hint": None}
-        console.result(f"{state:<10} {item['index']}: {item['prompt'][:60]!r}: {error['message']}")
+        place = f"{error['where']}: " if error.get("where") else ""
+        console.result(f"{state:<10} {item['index']}: {item['prompt'][:60]!r}: {place}{error['message']}")
         if error.get("hint"):
             console.result(f"{'':<10} {error['hint']}")
     if next(found, None) is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,9 +15,12 @@ from marey.motion.features import FeatureLayout
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.resample import resample
 from marey.motion.rotations import Array, about, rotate
+from marey.motion.skeleton import Skeleton
 from marey.nn.motion_tokenizer import MotionTokenizer
 
 Float32 = NDArray[np.float32]
+MOST_NAMED = 4
+"""Joints in a message."""
 LARGEST_ERROR = 100.0
 """Millimetres a joint, mean; a context that the tokens show worse is refused. Held-out clips of dances have 74."""
 
@@ -36,8 +41,7 @@ def model_features(clip: MotionClip, layout: FeatureLayout) -> Float32:
     training = layout.skeleton
     if clip.skeleton.joint_names != training.joint_names or clip.skeleton.parents != training.parents:
         raise InvalidInput(
-            f"the motion has another skeleton than the model: {len(clip.skeleton)} joints, not the "
-            f"{len(training)} of {training.name}",
+            f"the motion has another skeleton than the model: {_difference(clip.skeleton, training)}",
             hint="Edit a generated motion, or one with the same joints.",
         )
     moving = resample(clip, layout.fps)
@@ -45,6 +49,21 @@ def model_features(clip: MotionClip, layout: FeatureLayout) -> Float32:
     joints = forward_kinematics(training, moving.rotations.astype(np.float64), root)
     # Features of a frame hold its way to the next one.
     return layout.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+
+
+def _difference(given: Skeleton, training: Skeleton) -> str:
+    """Return how a skeleton differs from that of a model."""
+    if len(given) != len(training):
+        return f"{len(given)} joints, not the {len(training)} of {training.name}"
+    unknown = [name for name in given.joint_names if name not in training.joint_names]
+    if not unknown:
+        return f"its joints are joined otherwise than those of {training.name}"
+    missing = [name for name in training.joint_names if name not in given.joint_names]
+    return f"{_named(unknown)} in place of {_named(missing)} of {training.name}"
+
+
+def _named(joints: Sequence[str]) -> str:
+    return ", ".join(joints[:MOST_NAMED]) + (", …" if len(joints) > MOST_NAMED else "")
 
 
 def context_error(features: Float32, tokenizer: MotionTokenizer, layout: FeatureLayout) -> float:

@@ -1,0 +1,127 @@
+"""Items with constraints, timelines and both through a server: request, text stage, model, results, pages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from marey.client import Client
+from marey.core.settings import Settings
+from marey.generation.handler import GeneratorHandler
+from marey.registry import get_model, model_names
+from tests.support.command import Command
+from tests.support.editing import clip_of
+from tests.support.live_api import LiveApi, write_bundle
+from tests.support.models import load, random_bundle
+from tests.support.runtime import Loop
+from tests.support.text_stage import read_texts
+
+MODEL = next(name for name in model_names() if get_model(name).keeps_frames)
+PATH = {"type": "root_path", "times": [0.0, 1.0, 2.0], "positions_xz": [[0.0, 0.0], [0.2, 0.8], [0.4, 1.6]]}
+TIMELINE = "0-1.5 a person walks; 1.5-3 a person bows"
+
+
+@pytest.fixture(scope="module")
+def api_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("api")
+    write_bundle(home / "models", model=MODEL)
+    return home
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A model of random weights in place of the bundle that the API knows."""
+    return load(random_bundle(MODEL, tmp_path_factory.mktemp("bundle") / "random"))
+
+
+@pytest.fixture
+def loop(api: LiveApi, generator: Any) -> Iterator[Loop]:
+    loop = Loop(api.engine, api.store, GeneratorHandler(MODEL, lambda *_, **__: generator, 8, Settings()))
+    yield loop
+    loop.close()
+
+
+@pytest.fixture
+def marey(api: LiveApi) -> Command:
+    return Command({"MAREY_SERVER": api.url, "MAREY_KEY": api.key})
+
+
+def made(api: LiveApi, loop: Loop, *items: dict[str, object], name: str | None = None) -> list[dict[str, Any]]:
+    """The items of a job, worked off."""
+    with api.http() as http:
+        answer = http.post("/v1/jobs", json={"items": list(items), "name": name})
+        assert answer.status_code == 202, answer.text
+        read_texts(api)
+        loop.run()
+        return http.get(f"/v1/jobs/{answer.json()['id']}/items").json()["items"]
+
+
+def test_a_motion_keeps_to_its_path(api: LiveApi, loop: Loop) -> None:
+    (item,) = made(api, loop, {"prompt": "a person walks", "seed": 3, "seconds": 3, "constraints": [PATH]})
+    assert item["state"] == "succeeded", item["error"]
+    assert item["constraints"] == [PATH]
+    clip = clip_of(api, item["motion"]["id"])
+    assert clip.manifest["constraints"] == [PATH]
+    (error,) = item["motion"]["quality"]["constraints"]
+    assert error["max_m"] <= 0.25
+    for time, (x, z) in zip(PATH["times"], PATH["positions_xz"], strict=True):
+        assert clip.root[round(time * 20), [0, 2]] == pytest.approx([x, z], abs=0.25)
+    with Client(api.url, api.key) as client:
+        (motion,) = client.motions.list(job=item["job"])
+        assert motion.quality is not None
+        assert motion.quality.constraints is not None
+        assert dict(motion.quality.constraints[0]) == error
+
+
+def test_a_timeline_keeps_to_its_path(api: LiveApi, loop: Loop) -> None:
+    both, alone = made(
+        api, loop, {"timeline": TIMELINE, "seed": 3, "constraints": [PATH]}, {"timeline": TIMELINE, "seed": 3}
+    )
+    assert (both["state"], alone["state"]) == ("succeeded", "succeeded"), (both["error"], alone["error"])
+    clip = clip_of(api, both["motion"]["id"])
+    assert clip.frames == 60
+    assert [row["prompt"] for row in clip.manifest["timeline"]["rows"]] == ["a person walks", "a person bows"]
+    assert clip.manifest["prompts"] == [[0, "a person walks"], [30, "a person bows"]]
+    assert both["motion"]["quality"]["constraints"][0]["max_m"] <= 0.25
+    assert alone["motion"]["quality"]["constraints"] is None
+
+
+def test_an_item_that_cannot_be_made_names_the_field(
+    api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client
+) -> None:
+    late = {**PATH, "times": [0.0, 1.0, 3.0]}
+    bad, good = made(api, loop, {"timeline": TIMELINE, "constraints": [late]}, {"timeline": TIMELINE}, name="late")
+    assert (bad["state"], good["state"]) == ("failed", "succeeded")
+    assert bad["error"]["where"] == "constraints.0.times.2"
+    shown = marey("jobs", "show", "late").ok().out
+    assert f"failed     0: {TIMELINE!r}: constraints.0.times.2: 3 s is beyond the clip" in shown
+    assert "Its last frame is at 2.95 s: end there" in shown
+    watched = marey("jobs", "watch", "late")
+    assert watched.code == 6
+
+
+def test_pages_of_timelines_and_of_edits_by_a_model(
+    api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client, tmp_path: Path
+) -> None:
+    (item,) = made(api, loop, {"timeline": TIMELINE, "seed": 3, "name": "hero"}, name="shots")
+    page = tmp_path / "shots.html"
+    marey("review", "shots", "-o", page).ok()
+    assert json.dumps(TIMELINE) in page.read_text()
+    bare = [{"op": "trim", "to": 1}, {"op": "extend", "seconds": 1}]
+    refused = http.post(f"/v1/motions/{item['motion']['id']}/edits", json={"ops": bare})
+    assert (refused.status_code, refused.json()["where"]) == (422, "ops.1.prompt")  # its last prompt may be cut off
+    op = {"op": "extend", "seconds": 1, "prompt": "a person sits down", "force": True}
+    answer = http.post(f"/v1/motions/{item['motion']['id']}/edits", json={"ops": [op], "name": "longer"})
+    assert answer.status_code == 202, answer.text
+    read_texts(api)
+    loop.run()
+    shown = marey("jobs", "show", "longer").ok().out
+    assert "kind       edit" in shown
+    assert "items      1: 1 succeeded" in shown
+    marey("review", "longer", "-o", tmp_path / "longer.html").ok()
+    assert f"{TIMELINE}, then a person sits down" in (tmp_path / "longer.html").read_text()
