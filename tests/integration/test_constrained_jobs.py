@@ -91,6 +91,24 @@ def test_a_timeline_keeps_to_its_path(api: LiveApi, loop: Loop) -> None:
     assert alone["motion"]["quality"]["constraints"] is None
 
 
+def test_a_fetched_manifest_is_submitted_again_with_its_constraints(
+    api: LiveApi, marey: Command, loop: Loop, tmp_path: Path
+) -> None:
+    rows = [{"timeline": TIMELINE, "constraints": [PATH]}, {"prompt": "a person walks", "constraints": [PATH]}]
+    first = made(api, loop, *({**row, "seed": 3} for row in rows), {"prompt": "a person bows"}, name="day 1")
+    marey("fetch", "day 1", "-o", tmp_path / "clips").ok()
+    again_job = marey("submit", "-f", tmp_path / "clips" / "manifest.csv").ok().out.strip()
+    with Client(api.url, api.key) as client:
+        again = [each.raw for each in client.jobs.items(again_job)]
+    told = ("prompt", "timeline", "constraints", "seed")
+    assert [[item[name] for name in told] for item in again] == [[item[name] for name in told] for item in first]
+    bad = tmp_path / "bad.csv"
+    bad.write_text("prompt,constraints\na person walks,path.json\n")
+    refused = marey("submit", "-f", bad)
+    assert refused.code == 2
+    assert "line 2: constraints: is not a list of constraints" in refused.err
+
+
 def test_an_item_that_cannot_be_made_names_the_field(
     api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import re
 import secrets
@@ -30,15 +31,16 @@ RAW_COLUMNS = (
 COLUMNS = (*RAW_COLUMNS, "seconds", "quality")
 """Of the file, whose cells are those of `csv_cells`. `npz` and `bvh` are paths of files from its folder; `comment` is
 the review's; `seconds` is the length that was asked for; `quality` is `ok` or what is wrong with the motion. Other
-formats have columns behind these: `OTHER`; then comes `TIMELINE`."""
+formats have columns behind these: `OTHER`; then come `OF_ITEMS`."""
 NUMBERS = frozenset({"index", "seed", "variant", "frames", "fps", "seconds"})
 Row = dict[str, str]
 FORMATS = ("npz", "bvh")
 """Formats that always have a column."""
 OTHER = re.compile(r"file:([a-z0-9]{1,16})")
 """The column of another format, where there is such a file."""
-TIMELINE = "timeline"
-"""The column of timelines, where there is one."""
+TIMELINE, CONSTRAINTS = "timeline", "constraints"
+OF_ITEMS = (TIMELINE, CONSTRAINTS)
+"""Columns of fields that few items have, where there is one: the text form of a timeline, and JSON."""
 
 
 def check_manifest(folder: Path, *, overwrite: bool) -> None:
@@ -73,6 +75,8 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     }
     if item.get("timeline"):
         values[TIMELINE] = timeline_text(item["timeline"])
+    if item.get("constraints"):
+        values[CONSTRAINTS] = json.dumps(item["constraints"], separators=(",", ":"))
     return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(values))}
 
 
@@ -149,20 +153,20 @@ def _known(path: Path, *, overwrite: bool) -> list[Row]:
 
 def _files(row: Row) -> list[str]:
     """Return the names of a line's files; names that are not plain are skipped, because the line may be forged."""
-    columns = (*FORMATS, *(name for name in _others(row) if name != TIMELINE))
+    columns = (*FORMATS, *(name for name in _others(row) if name not in OF_ITEMS))
     names = ((row[column], f".{extension_of(column.removeprefix('file:'))}") for column in columns)
     return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
 
 
 def is_column(name: str) -> bool:
     """Return True if a manifest may have this column."""
-    return name in (*COLUMNS, TIMELINE) or OTHER.fullmatch(name) is not None
+    return name in (*COLUMNS, *OF_ITEMS) or OTHER.fullmatch(name) is not None
 
 
 def _others(names: Iterable[str]) -> list[str]:
-    """Columns among these of formats other than `FORMATS`, in alphabetical order, and that of timelines."""
+    """Columns among these of formats other than `FORMATS`, in alphabetical order, and `OF_ITEMS`."""
     found = set(names)
-    return [*sorted(name for name in found if OTHER.fullmatch(name)), *sorted(found & {TIMELINE})]
+    return [*sorted(name for name in found if OTHER.fullmatch(name)), *(name for name in OF_ITEMS if name in found)]
 
 
 def _is_file(folder: Path, name: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import itertools
+import json
 import unicodedata
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -172,6 +173,8 @@ def _value(name: str, cell: str) -> object:
             return float(cell)
         if name == "settings":
             return read_settings(cell)
-    except (ValueError, InvalidInput):
+        if name == "constraints":
+            return json.loads(cell)
+    except (ValueError, RecursionError, InvalidInput):
         pass
     return cell if name == "prompt" else cell.strip(BLANK)

@@ -520,5 +520,5 @@ CHECKS: dict[str, Callable[[object], object]] = {
     "constraints": read_constraints,
 }
 """Check of each field's value, in the order of columns."""
-COLUMNS = tuple(name for name in CHECKS if name != "constraints")
-"""Of tables of prompts; a cell holds no list of objects."""
+COLUMNS = tuple(CHECKS)
+"""Of tables of prompts; a cell of `constraints` holds JSON."""

@@ -256,7 +256,7 @@ def test_a_model_that_keeps_no_frames_is_refused(generator: Generator, monkeypat
 def test_another_skeleton_is_refused(model: EditModel, clip: MotionClip) -> None:
     names = ("hips", *clip.skeleton.joint_names[1:])
     other = replace(clip, skeleton=replace(clip.skeleton, joint_names=names), features=clip.features[:0])
-    with pytest.raises(InvalidInput, match="another skeleton"):
+    with pytest.raises(InvalidInput, match="another skeleton than the model: hips in place of pelvis of humanml3d"):
         one(model, other, {"op": "extend", "seconds": 1})
 
 
