@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,14 @@ def test_the_last_frame_is_the_first_after_the_travel(walk):
     moved = rotate(about("Y", cycle["heading"]), closed.joints[0] - closed.root[0]) + closed.root[-1]
     np.testing.assert_allclose(moved, closed.joints[-1], atol=1e-4)
     assert (closed.contacts[0] == closed.contacts[-1]).all()
+
+
+def test_prompts_follow_the_frames_of_a_loop(walk):
+    told = {**walk.manifest, "prompt": "both", "prompts": [[0, "a person walks"], [40, "a person goes on"]]}
+    (loop,) = edit(replace(walk, manifest=told), [{"op": "loop"}])
+    first, last = loop.manifest["loop"]["source_frames"]
+    expected = [[0, "a person walks"], [40 - first, "a person goes on"]] if first < 40 <= last else None
+    assert loop.manifest["prompts"] == (expected or [[0, "a person walks" if last < 40 else "a person goes on"]])
 
 
 def test_a_walk_keeps_whole_gait_cycles(walk):
