@@ -13,7 +13,7 @@ from typing import Any
 
 from marey.core.characters import WHITESPACE, check_text
 from marey.core.errors import InvalidInput, TooLarge
-from marey.items.constraints import check_poses, read_constraints
+from marey.items.constraints import named_motions, read_constraints
 from marey.items.expected import read_expected
 from marey.items.item import CHECKS, Problem, Rows, checked, complete_timeline, read_fields
 from marey.items.timeline import timeline_text
@@ -118,7 +118,8 @@ def _expected(value: object) -> str:
 
 def _constraints(value: object) -> list[dict[str, Any]]:
     found = read_constraints(value)
-    check_poses(found)
+    for where, _ in named_motions(found):
+        raise InvalidInput("evaluations read no motions for poses: give `joint_rotations`", where=where)
     return found
 
 

@@ -99,7 +99,7 @@ def test_an_unknown_column_is_an_error_that_lists_the_known_ones(tmp_path: Path)
     found = problems(tmp_path, "p.csv", "prompt,duration\na person waves,3\n")
     assert found == [
         "line 1: 'duration' is not a known column; known columns are prompt, name, seconds, seed, variants, model, "
-        "tags, settings, variety, timeline"
+        "tags, settings, variety, timeline, constraints"
     ]
 
 
