@@ -104,7 +104,7 @@ def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:
                 return
     having = [each.name for each in OPERATIONS.values() if option in {p.option for p in each.parameters}]
     raise InvalidInput(
-        "stands before every operation that has it",
+        "belongs to no operation before it",
         where=option,
         hint=f"Write it after {' or '.join(f'--{name}' for name in having)}.",
     )

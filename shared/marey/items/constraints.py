@@ -95,6 +95,18 @@ def last_frame(constraints: Sequence[Mapping[str, Any]], fps: float, *, kind: st
     return max(named, default=None)
 
 
+def ended_with_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: float) -> list[dict[str, Any]]:
+    """Return constraints whose paths end with the clip where their last time is its length: a clip of 6 s has its last
+    frame a frame before 6 s."""
+    end = (frames - 1) / fps
+    found = [dict(each) for each in constraints]
+    for each in found:
+        times = each.get("times")
+        if times and end < times[-1] <= end + 1 / fps + 1e-6 and (len(times) == 1 or times[-2] < end):
+            each["times"] = [*times[:-1], end]
+    return found
+
+
 def check_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: float) -> None:
     """Check constraints against the clip they are for: its length, speeds at its rate, and one another.
 

@@ -55,7 +55,7 @@ def test_an_option_of_an_operation_acts_on_the_one_before_it(walk: Path):
     ops = load_npz(out).manifest["edited_from"]["ops"]
     assert [each.get("blend") for each in ops] == [0.5, 0.0, None]
     said = run(walk, "-o", walk.with_name("x.npz"), "--blend", "0.2", "--concat", walk, code=2)
-    assert "--blend: stands before every operation that has it" in said
+    assert "--blend: belongs to no operation before it" in said
 
 
 def test_pieces_are_numbered_and_fit_where_they_were(walk: Path):

@@ -130,6 +130,24 @@ def test_the_path_decides_the_length(generator: Any) -> None:
     assert asked.frames == FRAMES
 
 
+def test_a_clip_reaches_to_the_last_constraint(generator: Any) -> None:
+    short = replace(request(generator), frames=30)
+    pose = {**POSE, "frame": 89}
+    assert constrained_request(generator, short, read_constraints([line(), pose]), None, None).frames == 90
+    assert constrained_request(generator, short, read_constraints([pose]), None, None).frames == 90
+    longer = replace(request(generator), frames=100)
+    assert constrained_request(generator, longer, read_constraints([pose]), None, None).frames == 100
+
+
+def test_a_path_may_end_at_the_length_of_the_clip(generator: Any) -> None:
+    timed = {"type": "root_path", "times": [0, 1.5, 3], "positions_xz": [[0, 0], [0, 0.9], [0, 1.8]]}
+    (clip,) = make(generator, [timed], 0)
+    assert np.abs(in_given_space(clip)[-1, 0, [0, 2]] - [0, 1.8]).max() < 0.25
+    late = {**timed, "times": [0, 1.5, 3.1]}
+    with pytest.raises(InvalidInput, match="beyond the clip"):
+        make(generator, [late], 0)
+
+
 @pytest.mark.parametrize(
     ("constraint", "where", "message"),
     [

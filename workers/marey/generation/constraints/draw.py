@@ -20,7 +20,7 @@ from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.generation.shots.timelines import plan_timeline
-from marey.items.constraints import ROOT_PATH, check_clip, last_frame
+from marey.items.constraints import ROOT_PATH, check_clip, ended_with_clip, last_frame
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.clip import MotionClip
 from marey.motion.resample import frame_times
@@ -54,10 +54,12 @@ class _Drawn:
 def constrained_request(
     generator: Generator[Any], request: Request, constraints: Constraints, seconds: float | None, fps: float | None
 ) -> Request:
-    """Return a request with the length of a clip that its constraints fit: the one asked for, or else that of the path.
+    """Return a request with the length of a clip that its constraints fit: the one asked for, or else up to the last of
+    them if there is a path.
 
     Args:
-        seconds: asked for; None = the path, or else the model decides.
+        seconds: asked for; None = the constraints decide if there is a path, else the model, to the last of them at
+            least.
         fps: of the clip; None = the model's.
 
     Raises:
@@ -65,20 +67,30 @@ def constrained_request(
             in `where`.
     """
     rate, limits = fps or generator.layout.fps, generator.limits
-    last = last_frame(constraints, rate, kind=ROOT_PATH)
-    if last is not None and seconds is None and request.timeline is None:
-        frames = max(int(np.ceil(last / rate * limits.fps - 1e-6)) + 1, limits.min_frames)
-        if frames > limits.max_frames:
-            raise InvalidInput(
-                f"the path takes {frames / limits.fps:g} s; this bundle generates {limits.max_frames / limits.fps:g} s",
-                where="constraints",
-            )
-        request = replace(request, frames=frames)
     known = resolve_request(generator, request)
+    if seconds is None and request.timeline is None:
+        known = replace(known, frames=_reaching(known, constraints, limits, rate))
     frames = _frames(known, limits)
     if frames is not None:
-        asked_of(constraints, generator.layout.skeleton, *_checked(constraints, frames, limits.fps, rate))
+        asked, count = _checked(constraints, frames, limits.fps, rate)
+        asked_of(asked, generator.layout.skeleton, count, rate)
     return known
+
+
+def _reaching(known: Request, constraints: Constraints, limits: Limits, rate: float) -> int | None:
+    """Return the length in frames of the model that reaches to the last constraint; None = it decides later."""
+    last = last_frame(constraints, rate)
+    if last is None:
+        return known.frames
+    least = max(int(np.ceil(last / rate * limits.fps - 1e-6)) + 1, limits.min_frames)
+    if least > limits.max_frames:
+        raise InvalidInput(
+            f"they take {least / limits.fps:g} s; this bundle generates {limits.max_frames / limits.fps:g} s",
+            where="constraints",
+        )
+    if last_frame(constraints, rate, kind=ROOT_PATH) is not None:
+        return least
+    return None if known.frames is None else max(known.frames, least)
 
 
 def _frames(request: Request, limits: Limits) -> int | None:
@@ -88,11 +100,12 @@ def _frames(request: Request, limits: Limits) -> int | None:
     return request.frames
 
 
-def _checked(constraints: Constraints, frames: int, model_rate: float, rate: float) -> tuple[int, float]:
-    """Check constraints against a clip, and return its frames and their rate."""
+def _checked(constraints: Constraints, frames: int, model_rate: float, rate: float) -> tuple[Constraints, int]:
+    """Check constraints against a clip, and return them as they are for it, with its number of frames."""
     count = len(frame_times(frames, model_rate, rate))
+    constraints = ended_with_clip(constraints, count, rate)
     check_clip(constraints, count, rate)
-    return count, rate
+    return constraints, count
 
 
 def constrained_clips(
@@ -119,8 +132,9 @@ def constrained_clips(
     rows: list[_Drawn] = []
     for request, each in zip(requests, constraints, strict=True):
         known = resolve_request(generator, request)
-        count, _ = _checked(each, _frames(known, generator.limits) or generator.limits.max_frames, model_rate, rate)
-        asked = asked_of(each, skeleton, count, rate)
+        frames = _frames(known, generator.limits) or generator.limits.max_frames
+        own, count = _checked(each, frames, model_rate, rate)
+        asked = asked_of(own, skeleton, count, rate)
         rows.append(_Drawn(known, each, asked if request.timeline is None else replace(asked, retimed=False)))
     candidates = max(CANDIDATES, plan.candidates)
     scale = travel_scale(generator.layout.skeleton, skeleton)
