@@ -42,8 +42,7 @@ class StoredMotions:
             try:
                 yield replace(item, constraints=self._with_ids(item.constraints)) if item.constraints else item
             except InvalidInput as error:
-                message = f"{error.message}. {error.hint}" if error.hint else error.message
-                reader.add([Problem(reader.lines[-1], error.where, message)])
+                reader.add([Problem(reader.lines[-1], error.where, error.on_a_line)])
                 yield replace(item, constraints=None)
 
     def _with_ids(self, constraints: Constraints) -> Constraints:

@@ -24,7 +24,6 @@ class RowPoses:
         try:
             return {**values, "constraints": self._files.fill(values["constraints"])}, []
         except InvalidInput as error:
-            message = f"{error.message}. {error.hint}" if error.hint else error.message
             return {name: value for name, value in values.items() if name != "constraints"}, [
-                Problem(line, error.where, message)
+                Problem(line, error.where, error.on_a_line)
             ]

@@ -158,7 +158,7 @@ def _as_line(error: MareyError) -> str:
     """Return an error as one line."""
     if isinstance(error, InvalidItems):
         return f"{error.total} prompts cannot be made; the first: {error.problems[0]}"
-    return f"{error.message}. {error.hint}" if error.hint else error.message
+    return error.on_a_line
 
 
 def _first_problem(conn: sa.Connection, tenant: str, job: UUID) -> str | None:

@@ -32,6 +32,11 @@ class MareyError(Exception):
         self.hint = hint
         self.argument = argument
 
+    @property
+    def on_a_line(self) -> str:
+        """Return the message with its hint, for lists that say elsewhere what it is about."""
+        return f"{self.message}. {self.hint}" if self.hint else self.message
+
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
         return f"{text}\n  {self.hint}" if self.hint else text

@@ -142,9 +142,7 @@ def _check_prompts(prompts: tuple[EvaluationPrompt, ...], generator: GeneratorCa
         try:
             generator.check_timeline(prompt.timeline)
         except InvalidInput as error:
-            problems.append(
-                Problem(line, "timeline", f"{error.message}. {error.hint}" if error.hint else error.message)
-            )
+            problems.append(Problem(line, "timeline", error.on_a_line))
     if problems:
         raise InvalidItems(problems[:MAX_PROBLEMS], total=len(problems))
 

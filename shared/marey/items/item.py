@@ -264,7 +264,7 @@ def read_fields(
             values[name] = check(given[name])
         except InvalidInput as error:
             where = error.where if error.where and error.where.startswith(f"{name}.") else name
-            problems.append(Problem(line, where, f"{error.message}. {error.hint}" if error.hint else error.message))
+            problems.append(Problem(line, where, error.on_a_line))
     if given.get("prompt") is None and (given.get("timeline") is None or "timeline" not in checks):
         problems.append(Problem(line, "prompt", "is missing: say what the person does"))
     return values, problems

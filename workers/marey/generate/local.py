@@ -157,7 +157,7 @@ class LocalModel:
             except InvalidBundle:
                 raise
             except InvalidInput as error:
-                yield Problem(line, field, f"{error.message}. {error.hint}" if error.hint else error.message)
+                yield Problem(line, field, error.on_a_line)
 
 
 def load(

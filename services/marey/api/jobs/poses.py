@@ -150,4 +150,4 @@ def _npz(shared: Context, row: MotionRow) -> bytes:
 def _said(error: MareyError) -> str:
     if isinstance(error, NotFound):
         return "the motion was deleted, or its prompt is being erased: try again"
-    return f"{error.message}. {error.hint}" if error.hint else error.message
+    return error.on_a_line

@@ -200,7 +200,7 @@ def _problem(error: MareyError, line: int | None, field: str) -> Problem:
     if error.status >= 500:
         raise error
     place = error.where if error.where and error.where.startswith(f"{field}.") else field
-    return Problem(line, place, f"{error.message}. {error.hint}" if error.hint else error.message)
+    return Problem(line, place, error.on_a_line)
 
 
 def job_fields(values: Mapping[str, Any]) -> JobFields:

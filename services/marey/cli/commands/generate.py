@@ -214,8 +214,7 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
             except InvalidBundle:
                 raise
             except InvalidInput as error:
-                message = f"{error.message}. {error.hint}" if error.hint else error.message
-                problems.append(Problem(number, field, message))
+                problems.append(Problem(number, field, error.on_a_line))
     return reader.located(problems)
 
 
