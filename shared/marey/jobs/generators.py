@@ -7,6 +7,7 @@ import json
 import secrets
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
@@ -66,8 +67,18 @@ class GeneratorCapabilities:
 
     def text_key(self, item: Item) -> str:
         """Return the key of the features of an item's prompts."""
-        keys = [feature_key(prompt, self.text) for _, prompt in prompts_with_rows(item.prompt, item.timeline)]
-        return keys[0] if item.timeline is None else several_key(keys)
+        if item.timeline is None:
+            return feature_key(item.prompt, self.text)
+        return self.several_key(prompt for _, prompt in prompts_with_rows(item.prompt, item.timeline))
+
+    def several_key(self, prompts: Iterable[str]) -> str:
+        """Return the key of the features of several prompts of one item."""
+        return several_key(feature_key(prompt, self.text) for prompt in prompts)
+
+    @cached_property
+    def text_batch_key(self) -> str:
+        """Return the key that prompts share whose features are made together."""
+        return _sha256(self.text.model_dump_json())
 
     def scope_key(self, item: Item, scope: Scope | None) -> str | None:
         """Return the key of the encoder's verdict; None if the words decide."""
@@ -143,7 +154,7 @@ def new_items(
                 bundle=reference,
                 batch_key=batch_key,
                 text_key=text_key,
-                text_batch_key=_sha256(generator.text.model_dump_json()),
+                text_batch_key=generator.text_batch_key,
                 seed=seed + variant,
                 variant=variant,
                 settings=dict(values),

@@ -17,8 +17,6 @@ from marey.jobs.generators import GeneratorCapabilities
 from marey.jobs.types import prompts_of_ops
 from marey.motion.edits.steps import Step
 from marey.registry import find_model
-from marey.text.keys import feature_key
-from marey.text.several import several_key
 
 CUTS = frozenset({"trim", "split", "loop", "reverse"})
 """Operations after which another prompt of several may be the last."""
@@ -47,15 +45,15 @@ class EditGenerator:
         Raises:
             InvalidInput: an unknown setting, or a value out of range.
         """
-        bundle, text = self.capabilities.bundle, self.capabilities.text
+        bundle = self.capabilities.bundle
         settings = edit_settings(bundle, self.settings)
         ops = [step.as_json() for step in steps]
         return {
             "model": bundle.manifest.model,
             "bundle": bundle.reference,
             "batch_key": _sha256(f"edit\n{bundle.reference}\n{json.dumps(settings, sort_keys=True)}"),
-            "text_key": several_key([feature_key(prompt, text) for prompt in prompts_of_ops(ops)]),
-            "text_batch_key": _sha256(text.model_dump_json()),
+            "text_key": self.capabilities.several_key(prompts_of_ops(ops)),
+            "text_batch_key": self.capabilities.text_batch_key,
             "settings": settings,
         }
 
