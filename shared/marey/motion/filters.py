@@ -31,3 +31,8 @@ def smooth_above(values: Array, sigma: float) -> Array:
     padded = np.pad(values, radius, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1).max(axis=1)
     return smooth(highest[:, None], sigma)[:, 0]
+
+
+def smoothstep(share: Array) -> Array:
+    """Return 0 … 1 with no slope at both ends, for a share from 0 to 1."""
+    return share * share * (3 - 2 * share)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.filters import smooth, smooth_above
+from marey.motion.filters import smooth, smooth_above, smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, between, dot, length, normalize, rotate
 from marey.motion.skeleton import Skeleton
@@ -129,7 +129,7 @@ def soft_distance(leg: Array, distance: Array, fps: float) -> Array:
     off = np.clip(off_was + change, 0.0, np.minimum(l1, l2))
     smoothed = np.sqrt(l1**2 - off**2) + np.sqrt(l2**2 - off**2)
     straight = np.clip((was / np.maximum(l1 + l2, 1e-9) - 0.85) / 0.1, 0.0, 1.0)
-    return wanted + straight**2 * (3 - 2 * straight) * (smoothed - wanted)
+    return wanted + smoothstep(straight) * (smoothed - wanted)
 
 
 def soft_stretch(was: Array, distance: Array, reach: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
+from marey.motion.edits.prompt_frames import prompts_of
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import KEY, PromptMatch
@@ -19,19 +20,11 @@ from marey.text.graph import SemanticGraph
 def judged(clip: MotionClip) -> MotionClip:
     """Return the clip with a quality record in its manifest; without one on skeletons that are not measured."""
     about = clip.manifest
-    quality = quality_of(clip, expected_by_prompts(prompts_of(about)))
+    quality = quality_of(clip, expected_by_prompts([str(text) for _, text in prompts_of(clip)]))
     if quality is None:
         return clip
     record = quality.with_match(_match(clip)).model_dump(mode="json")
     return replace(clip, manifest={**about, KEY: record})
-
-
-def prompts_of(manifest: Mapping[str, Any]) -> Sequence[str]:
-    """Return the prompts in a manifest: several of a recorded stream or of joined motions, none of a captured one."""
-    several = manifest.get("prompts")
-    if several:
-        return [str(prompt) for _, prompt in several]
-    return [str(manifest["prompt"])] if manifest.get("prompt") else []
 
 
 def _match(clip: MotionClip) -> PromptMatch:

@@ -13,6 +13,7 @@ import numpy as np
 
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import heading_of, moved, posed
+from marey.motion.filters import smoothstep
 from marey.motion.rotations import Array, about, conjugate, from_rotvec, multiply, rotate, to_rotvec
 
 SAME_TURN, SAME_PLACE = 2e-3, 1e-3
@@ -101,8 +102,7 @@ def posed_like(clip: MotionClip, rotations: Array, root: Array) -> MotionClip:
 
 def _led_to(piece: MotionClip, after: MotionClip) -> MotionClip:
     """Return the piece with its way and turn changed bit by bit, so that it ends where the motion after begins."""
-    share = np.linspace(0.0, 1.0, piece.frames)
-    share = share * share * (3 - 2 * share)
+    share = smoothstep(np.linspace(0.0, 1.0, piece.frames))
     angle = heading_of(after, 0) - heading_of(piece, -1)
     angle = np.arctan2(np.sin(angle), np.cos(angle))
     rotations, root = piece.rotations.astype(np.float64), piece.root.astype(np.float64)

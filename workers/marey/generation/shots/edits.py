@@ -21,6 +21,7 @@ from marey.motion.edits.place import posed
 from marey.motion.edits.prompt_frames import prompts_of, resampled
 from marey.motion.edits.prompts import joined, with_own
 from marey.motion.edits.table import MOST_SEED
+from marey.motion.filters import smoothstep
 from marey.motion.rotations import Array, slerp
 from marey.motion.skeleton import Skeleton
 from marey.selector.records import match_of
@@ -183,8 +184,7 @@ def _weights(clip: MotionClip, first: int, last: int) -> Array:
     k = np.arange(count)
     rising = np.minimum(1.0, (k + 1) / (blend + 1)) if first else np.ones(count)
     falling = np.minimum(1.0, (count - k) / (blend + 1)) if last < clip.frames - 1 else np.ones(count)
-    share = np.minimum(rising, falling)
-    return share * share * (3 - 2 * share)
+    return smoothstep(np.minimum(rising, falling))
 
 
 def _with_own(operation: str, clip: MotionClip, own: str | None, prompts: Sequence[Sequence[Any]]) -> dict[str, Any]:
