@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from marey.generation.export import finish
+from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, NoControl, Request, S
 from marey.generation.shots.dispatch import generate_any
 from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
@@ -78,7 +79,7 @@ def best_clips(
     open_rows, number = list(range(len(draws))), 0
     while open_rows and number < plan.candidates:
         part = [draws[row].request(number) for row in open_rows]
-        watched = _CandidateControl(control or NoControl(), open_rows, number, plan.candidates)
+        watched = PassControl(control or NoControl(), open_rows, number, plan.candidates, parts=1)
         made = generate_any(generator, part, settings, control=watched)
         kept: list[int] = []
         for row, generated in zip(open_rows, made, strict=True):
@@ -165,21 +166,3 @@ class _Draw:
             candidates=self._candidates,
         )
         return replace(self.best, manifest={**self.best.manifest, KEY: selection.model_dump(mode="json")})
-
-
-class _CandidateControl:
-    """Control of one pass over candidates, as a part of all of them."""
-
-    def __init__(self, control: GenerationControl, rows: Sequence[int], number: int, candidates: int) -> None:
-        self._control = control
-        self._position = {row: position for position, row in enumerate(rows)}
-        self._number = number
-        self._candidates = candidates
-
-    def progress(self, done: int, total: int) -> None:
-        """Report a step of this candidate as a percent of it; the steps of candidates may differ in number."""
-        self._control.progress(100 * self._number + 100 * done // total, 100 * self._candidates)
-
-    def dropped(self) -> set[int]:
-        """Return the positions of dropped requests among those of this pass."""
-        return {self._position[row] for row in self._control.dropped() if row in self._position}

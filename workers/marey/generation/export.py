@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
-from marey.generation.software import software_of
+from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
@@ -24,14 +24,10 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
     streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
     return {
         **_reading(generator, request),
+        **origin_of(generator, settings),
         "model": bundle.manifest.model,
-        "bundle": bundle.reference,
-        "weights_sha256": bundle.weights_sha256,
         "random_weights": bundle.manifest.random,
-        "licence": bundle.manifest.licence,
         "seed": request.seed,
-        "settings": generator.describe_settings(settings),
-        "software": software_of(generator),
         **streamed,
     }
 

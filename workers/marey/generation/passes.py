@@ -10,7 +10,9 @@ from marey.generation.port import GenerationControl
 class PassControl:
     """Control of one pass over parts of requests, as a share of all parts."""
 
-    def __init__(self, control: GenerationControl, owners: Sequence[int], before: int, total: int) -> None:
+    def __init__(
+        self, control: GenerationControl, owners: Sequence[int], before: int, total: int, *, parts: int | None = None
+    ) -> None:
         """Create the control of a pass.
 
         Args:
@@ -18,15 +20,17 @@ class PassControl:
             owners: the request of each part of this pass.
             before: parts of earlier passes.
             total: parts of all passes.
+            parts: of this pass; None = as many as it has owners.
         """
         self._control = control
         self._owners = owners
         self._before = before
         self._total = total
+        self._parts = len(owners) if parts is None else parts
 
     def progress(self, done: int, total: int) -> None:
         """Report a step of this pass as a percent of its parts."""
-        share = len(self._owners) * 100 * done // total
+        share = self._parts * 100 * done // total
         self._control.progress(100 * self._before + share, 100 * self._total)
 
     def dropped(self) -> set[int]:

@@ -1,4 +1,4 @@
-"""The software behind a motion, for its manifest."""
+"""Bundle, settings and software behind a motion, for its manifest."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ from typing import Any
 
 import torch
 
-from marey.generation.port import Generator
+from marey.generation.port import Generator, S
+
+
+def origin_of(generator: Generator[S], settings: S) -> dict[str, Any]:
+    """Return what decides the motions of a generator beside their requests."""
+    bundle = generator.bundle
+    return {
+        "bundle": bundle.reference,
+        "weights_sha256": bundle.weights_sha256,
+        "licence": bundle.manifest.licence,
+        "settings": generator.describe_settings(settings),
+        "software": software_of(generator),
+    }
 
 
 def software_of(generator: Generator[Any]) -> dict[str, Any]:

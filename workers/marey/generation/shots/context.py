@@ -13,7 +13,7 @@ from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip
 from marey.motion.features import FeatureLayout
 from marey.motion.kinematics import facing, forward_kinematics
-from marey.motion.resample import resample
+from marey.motion.resample import frame_times, resample
 from marey.motion.rotations import Array, about, rotate
 from marey.motion.skeleton import Skeleton
 from marey.nn.motion_tokenizer import MotionTokenizer
@@ -89,7 +89,7 @@ def check_error(millimetres: float) -> None:
 
 def frames_at(clip: MotionClip, fps: float) -> int:
     """Return the number of frames of a clip at another rate."""
-    return int((clip.frames - 1) / clip.fps * fps + 1e-6) + 1
+    return len(frame_times(clip.frames, clip.fps, fps))
 
 
 def _at_root(features: Float32, layout: FeatureLayout) -> Array:

@@ -13,7 +13,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.port import GenerationControl, Generator, KeepingGenerator
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, FrameGap, Window, crossfaded, fill, most_frames, no_text
-from marey.generation.software import software_of
+from marey.generation.software import origin_of
 from marey.items.item import MAX_SEED
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
@@ -77,15 +77,7 @@ class EditModel:
     def record(self) -> dict[str, Any]:
         """Return what decided the frames since the last record, for the manifest."""
         error, self.errors = max(self.errors, default=0.0), []
-        bundle = self.generator.bundle
-        return {
-            "bundle": bundle.reference,
-            "weights_sha256": bundle.weights_sha256,
-            "licence": bundle.manifest.licence,
-            "settings": self.generator.describe_settings(self.settings),
-            "software": software_of(self.generator),
-            "context_error_mm": round(error, 1),
-        }
+        return {**origin_of(self.generator, self.settings), "context_error_mm": round(error, 1)}
 
     def generate(self, prompt: str, seed: int, frames: int, fps: float, body: MotionClip) -> MotionClip:
         """Generate a motion of a prompt alone, on the body of a clip: `frames` frames at `fps`."""
