@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from marey.core.errors import InvalidInput
 
@@ -52,3 +52,36 @@ def _grown(name: str, old: Tensor | None, new: Tensor) -> Tensor:
         f"{name} has the shape {tuple(new.shape)}, and {tuple(old.shape)} where it would grow from",
         hint="Only the number of blocks and the width of their hidden layers can grow.",
     )
+
+
+@torch.no_grad()
+def take(network: nn.Module, other: Mapping[str, Tensor], names: Mapping[str, str]) -> list[str]:
+    """Copy those weights of another network that fit into `network` in place; its own blocks write nothing at first.
+
+    Codebooks and statistics are not weights and stay as they are.
+
+    Args:
+        network: to be trained.
+        other: state dict of a trained network, of another model perhaps.
+        names: beginnings of names in `network`, and what `other` calls them.
+
+    Returns:
+        names of the weights that were copied; empty if none has a like of the same name and shape.
+    """
+    copied: list[str] = []
+    for name, weight in network.named_parameters():
+        value = other.get(_foreign(name, names))
+        if value is not None and value.shape == weight.shape:
+            weight.copy_(value)
+            copied.append(name)
+    for name, weight in network.named_parameters():
+        if copied and name not in copied and name.endswith(_WRITES):
+            weight.zero_()
+    return copied
+
+
+def _foreign(name: str, names: Mapping[str, str]) -> str:
+    for own, foreign in names.items():
+        if name.startswith(own):
+            return foreign + name.removeprefix(own)
+    return name

@@ -13,10 +13,10 @@ from torch import Tensor
 from marey.bundles import Bundle, DataSource, TextSpec
 from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
-from marey.data.licences import Terms, check_mix, tier_of
+from marey.data.licences import Terms, check_mix
 from marey.data.prepared import PreparedData
 from marey.training.parts import TrainedPart, save_part
-from marey.training.staging import TrainableConfig, TrainingRecipe
+from marey.training.staging import TrainableConfig, TrainingRecipe, bundle_terms
 from marey.training.texts import CaptionTexts
 
 C = TypeVar("C", bound=TrainableConfig)
@@ -73,7 +73,7 @@ def scatter(
         )
     manifest = bundle.manifest
     data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""
-    sources = tuple(Terms(d.name, d.name, d.licence, d.credit, "", tier_of(d.licence)) for d in manifest.data)
+    sources = bundle_terms(bundle)
     for name, state in states.items():
         state = dict(state)
         if "quantizer.sums" in state:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 import torch
@@ -133,7 +133,7 @@ class TokenData:
         """Return P."""
         return self.starts.shape[1]
 
-    def first_phases(self, count: int) -> TokenData:
+    def first_phases(self, count: int) -> Self:
         """Return the same clips at their first `count` phases, or at all if there are fewer."""
         return replace(self, starts=self.starts[:, :count], lengths=self.lengths[:, :count])
 

@@ -13,18 +13,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
+import structlog
 import torch
 from torch import nn
 
+from marey.bundles import Bundle
+from marey.bundles.eight_bit import restore
 from marey.core.errors import InvalidInput
-from marey.data.licences import Terms, check_mix
+from marey.data.licences import Terms, check_mix, tier_of
 from marey.data.prepared import PreparedData, read_manifest
 from marey.nn import distributed
-from marey.nn.growing import grow
+from marey.nn.growing import grow, take
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, TrainingStage, train
 from marey.training.optimisation import StageConfig
 from marey.training.parts import TrainedPart, load_part, load_sources, save_part
+
+log = structlog.get_logger()
 
 
 class TrainableConfig(Protocol):
@@ -49,6 +54,7 @@ class TrainOptions(Generic[C]):
     seed: int = 0
     resume: bool = False
     warm: bool = False  # start from the weights of the stage's finished part in `run`
+    origin: Bundle | None = None  # start from those weights of its part that fit, of another model perhaps
     device: str = "auto"
     threads: int = 0
     bf16: bool = True
@@ -90,6 +96,7 @@ class TrainingRecipe(Generic[C]):
         shares: shares of the stages in the minutes of a whole training.
         most_steps: upper limits of steps for stages that overfit beyond them.
         grows: for stages whose transformer may be larger than in the part of a warm start, its field.
+        names: beginnings of names of weights that bundles of other models call otherwise, and what they call them.
     """
 
     read: Callable[[Mapping[str, Any]], C]
@@ -97,6 +104,7 @@ class TrainingRecipe(Generic[C]):
     shares: Mapping[str, float]
     most_steps: Mapping[str, int] = field(default_factory=dict[str, int])
     grows: Mapping[str, str] = field(default_factory=dict[str, str])
+    names: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -134,12 +142,15 @@ class TrainingRecipe(Generic[C]):
         what is raised then.
 
         Raises:
-            InvalidInput: the licences of the data and of what it is trained upon exclude each other.
+            InvalidInput: the licences of the data and of what it is trained upon exclude each other; both `warm` and
+                `origin`; or nothing of `origin` fits.
         """
         ancestors(options, stage.name)
         if options.warm:
             part = self._part(stage.name, options.config, options.run, grows=self.grows.get(stage.name))
             stage.module.load_state_dict(grow(part.state, stage.module.state_dict()))
+        if options.origin is not None:
+            begin_from(options.origin, stage.name, stage.module, self.names)
         if options.recompute:
             set_recompute(stage.module)
         return train(stage, options.options(stage.name), options.config.to_dict())
@@ -161,12 +172,34 @@ def ancestors(options: TrainOptions[Any], name: str) -> tuple[Terms, ...]:
         InvalidInput: their licences exclude each other.
     """
     found = {(terms.name, terms.licence): terms for terms in read_manifest(options.prepared).terms}
+    if options.origin is not None:
+        found = {(terms.name, terms.licence): terms for terms in bundle_terms(options.origin)} | found
     for file in sorted(options.run.glob("*/part/part.json")):
         if file.parent.parent.name != name or options.warm:
             for terms in load_sources(file):
                 found.setdefault((terms.name, terms.licence), terms)
     check_mix(found.values(), where=str(options.run))
     return tuple(found.values())
+
+
+def bundle_terms(bundle: Bundle) -> tuple[Terms, ...]:
+    """Terms of the data behind a bundle."""
+    return tuple(Terms(d.name, d.name, d.licence, d.credit, "", tier_of(d.licence)) for d in bundle.manifest.data)
+
+
+def begin_from(origin: Bundle, part: str, network: nn.Module, names: Mapping[str, str]) -> None:
+    """Copy the weights of a bundle's part that fit by name and shape.
+
+    Raises:
+        InvalidInput: none fits.
+        InvalidBundle: no such part, or damaged.
+    """
+    where = f"{origin.path}: {part}"
+    stored = {name: torch.tensor(value) for name, value in restore(origin.tensors(part), where=where).items()}
+    copied = take(network, stored, names)
+    if not copied:
+        raise InvalidInput("holds no weight that fits this stage", where=where, hint="Take a bundle of equal widths.")
+    log.info("took weights of another bundle", bundle=origin.reference, tensors=len(copied))
 
 
 def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: dict[str, float], sha256: str) -> None:

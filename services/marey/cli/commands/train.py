@@ -55,6 +55,15 @@ Minutes = Annotated[
 Seed = Annotated[int, typer.Option("--seed", help="Seed of weights and batches.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Resume from the last checkpoint.")]
 Warm = Annotated[bool, typer.Option("--warm", help="Start from the weights of the stage's finished part.")]
+Origin = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="BUNDLE",
+        help="Start from those weights of a bundle's part that fit, of another model perhaps: a tokenizer's "
+        "convolutions, if widths are equal.",
+    ),
+]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
 Rate = Annotated[float | None, typer.Option("--learning-rate", help="Default: the configuration's.")]
@@ -111,6 +120,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         seed: Seed = 0,
         resume: Resume = False,
         warm: Warm = False,
+        origin: Origin = None,
         learning_rate: Rate = None,
         device: Device = "auto",
         threads: Threads = 0,
@@ -124,8 +134,8 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
 
         metrics = train_stage(
             training, stage, data, run, config=config, steps=steps, minutes=max_minutes, seed=seed, resume=resume,
-            warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16, choices=_given(choices),
-            micro_batch=_micro_batch(micro_batch), recompute=recompute,
+            warm=warm, origin=origin, rate=learning_rate, device=device, threads=threads, bf16=bf16,
+            choices=_given(choices), micro_batch=_micro_batch(micro_batch), recompute=recompute,
         )  # fmt: skip
         if as_json:
             console.result_json(metrics)

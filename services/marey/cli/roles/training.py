@@ -22,15 +22,18 @@ def train_stage(
     minutes: float | None,
     rate: float | None = None,
     choices: Mapping[str, str] | None = None,
+    origin: str | None = None,
     **options: Any,
 ) -> dict[str, float]:
     """Train one stage, and return its metrics.
 
     Args:
         choices: of the model's own options.
+        origin: name or path of a bundle whose weights are begun from.
         options: of `marey.training.staging.TrainOptions`.
     """
     try:
+        from marey.bundles import find_bundle
         from marey.training.config_file import open_config
         from marey.training.optimisation import with_learning_rate
         from marey.training.staging import TrainOptions, choose_budget
@@ -39,6 +42,7 @@ def train_stage(
     except ImportError as error:
         raise needs_extra("train", error) from error
     chosen = with_learning_rate(open_config(named_config, config, choices), name, rate)
+    options["origin"] = None if origin is None else find_bundle(origin)
     return train(name, TrainOptions(data, run, chosen, choose_budget(chosen, name, data, steps, minutes), **options))
 
 

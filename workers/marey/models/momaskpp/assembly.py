@@ -17,6 +17,13 @@ BUILT_FROM = {
     "refiner": ("layout", "features", "refiner"),
     "length": ("text", "max_frames", "length_hidden"),
 }
+NAMES = {
+    "encoder.in_proj": "encoder.enter",
+    "encoder.out_proj": "encoder.leave",
+    "decoder.in_proj": "decoder.enter",
+    "decoder.out_proj": "decoder.leave",
+}
+"""Convolutions that published checkpoints call so, and what other models here call the same ones."""
 SHARES = {"tokenizer": 0.42, "masked": 0.52, "refiner": 0.04, "length": 0.02}
 """Shares of the stages in the minutes of a whole training; those of stages that a configuration lacks are dealt out."""
 
@@ -27,7 +34,7 @@ def recipe_of(config: MoMaskPPConfig) -> TrainingRecipe[MoMaskPPConfig]:
     built_from = {name: fields for name, fields in BUILT_FROM.items() if not lacking.get(name)}
     total = sum(SHARES[name] for name in built_from)
     shares = {name: SHARES[name] / total for name in built_from}
-    return TrainingRecipe(MoMaskPPConfig.from_dict, built_from, shares, most_steps={"length": 1000})
+    return TrainingRecipe(MoMaskPPConfig.from_dict, built_from, shares, most_steps={"length": 1000}, names=NAMES)
 
 
 def assemble(

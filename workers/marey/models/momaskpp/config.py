@@ -6,10 +6,10 @@ the paper in heads, steps and guidance; their weights need them as they are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from marey.core.configs import ModelConfig, named
+from marey.core.configs import ADDED, Count, ModelConfig, named
 from marey.training.optimisation import StageConfig
 
 Layout = Literal["padded", "own"]
@@ -133,6 +133,10 @@ class MoMaskPPConfig(ModelConfig):
     perturbation: PerturbationConfig = PerturbationConfig()
     inference: InferenceConfig = InferenceConfig()
     windows: tuple[int, ...] = (196,)  # frames; the tokenizer's training windows, clips are whole where they fit
+    phases: Count = field(default=4, metadata=ADDED)
+    """Token grids of a training clip that the transformer learns, each a frame later than the one before."""
+    speeds: bool = field(default=True, metadata=ADDED)
+    """Whether the transformer also learns clips made slower or faster than captured."""
     train_tokenizer: StageConfig = StageConfig(batch=256, learning_rate=3e-4, weight_decay=0.0, clip=0.5, ema=0.0)
     train_masked: StageConfig = StageConfig(batch=64, ema=0.0)
     train_refiner: StageConfig = StageConfig(batch=256, clip=0.5, ema=0.0)
@@ -230,6 +234,15 @@ STARTER = MoMaskPPConfig(
     train_length=StageConfig(batch=256, learning_rate=1e-3, decay="cosine", ema=0.99),
 )
 
+OPEN = replace(
+    STARTER,
+    name="open",
+    tokenizer=replace(STARTER.tokenizer, codes=1024),
+    # As of the other models' `open`: most actions have one to five takes and must be known by heart.
+    phases=1,
+    speeds=False,
+)
+
 TINY = MoMaskPPConfig(
     name="tiny",
     tokenizer=TokenizerConfig(
@@ -249,7 +262,9 @@ TINY = MoMaskPPConfig(
     train_length=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),
 )
 
-CONFIGS: dict[str, MoMaskPPConfig] = {c.name: c for c in (PAPER, RELEASED_SNAPMOGEN, RELEASED_HUMANML3D, STARTER, TINY)}
+CONFIGS: dict[str, MoMaskPPConfig] = {
+    c.name: c for c in (PAPER, RELEASED_SNAPMOGEN, RELEASED_HUMANML3D, STARTER, OPEN, TINY)
+}
 
 
 def named_config(name: str) -> MoMaskPPConfig:

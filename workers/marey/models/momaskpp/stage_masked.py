@@ -62,15 +62,15 @@ class ScaleStage:
         """Train on these clips, tokens and captions."""
         self.config = config
         self.optimisation = config.train_masked
-        self.tokens, self.words = tokens, words
+        self.tokens, self.words = tokens.first_phases(config.phases), words
         self.scales = tokens.scales
         self.module = ScaleTransformer(config).to(tokens.tokens.device)
-        self.pairs = Pairs(clips, tokens, words.sentences, config.min_tokens)
+        self.pairs = Pairs(clips, self.tokens, words.sentences, config.min_tokens, speeds=config.speeds)
         mean, std = words.statistics(self.pairs.train.tolist())
         self.module.words.normalizer.mean.copy_(mean)
         self.module.words.normalizer.std.copy_(std)
         with torch.no_grad():
-            self.module.codes.bias.copy_(tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
+            self.module.codes.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
