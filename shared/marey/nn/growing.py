@@ -63,14 +63,14 @@ def take(network: nn.Module, other: Mapping[str, Tensor], names: Mapping[str, st
     Args:
         network: to be trained.
         other: state dict of a trained network, of another model perhaps.
-        names: beginnings of names in `network`, and what `other` calls them.
+        names: beginnings of names in `network`, and what `other` may call them.
 
     Returns:
         names of the weights that were copied; empty if none has a like of the same name and shape.
     """
     copied: list[str] = []
     for name, weight in network.named_parameters():
-        value = other.get(_foreign(name, names))
+        value = other.get(name, other.get(_foreign(name, names)))
         if value is not None and value.shape == weight.shape:
             weight.copy_(value)
             copied.append(name)

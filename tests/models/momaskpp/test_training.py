@@ -14,6 +14,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.generation.port import Request
 from marey.models.momaskpp.assembly import assemble, recipe_of, unpack
+from marey.models.momaskpp.bundle import random_bundle
 from marey.models.momaskpp.captions import INDEX, STATES, WordData
 from marey.models.momaskpp.config import PAPER, RELEASED_SNAPMOGEN, STARTER, TINY, MoMaskPPConfig, PerturbationConfig
 from marey.models.momaskpp.generate import Generator
@@ -23,6 +24,7 @@ from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage, has_posit
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import ScaleTokens, encode_clips
 from marey.models.momaskpp.train import train_stage
+from marey.nn.growing import take
 from marey.training.budget import Budget
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData
@@ -99,6 +101,39 @@ def test_all_stages_end_in_a_bundle_that_generates_and_trains_on(
         assemble(prepared.path, run, tmp_path / "x", replace(TINY, masked=replace(TINY.masked, layers=1)))
     with pytest.raises(InvalidInput, match="already has a stage tokenizer"):
         unpack(bundle, run)
+
+
+def test_a_stage_begins_from_the_weights_of_another_bundle_that_fit(prepared: PreparedData, tmp_path: Path) -> None:
+    """Their terms are recorded; what has no like there writes nothing at first."""
+    origin = random_bundle(tmp_path / "origin", replace(TINY, tokenizer=replace(TINY.tokenizer, codes=16)), seed=3)
+    resting = replace(TINY.train_tokenizer, learning_rate=1e-12, ema=0.0)
+    config = replace(TINY, train_tokenizer=resting)
+    train_stage("tokenizer", replace(options(prepared, tmp_path / "run", 1, config), origin=origin))
+    part = load_part(tmp_path / "run" / "tokenizer" / "part")
+    taken = origin.tensors("tokenizer")
+    assert np.allclose(part.state["decoder.out_proj.weight"], taken["decoder.out_proj.weight"], atol=1e-6)
+    assert part.state["quantizer.codebooks"].shape == (1, 32, 16)  # its own: theirs has 16 codes
+    assert part.sources[-1].name == "synthetic"
+
+    narrow = random_bundle(tmp_path / "narrow", replace(TINY, tokenizer=replace(TINY.tokenizer, width=16)))
+    with pytest.raises(InvalidInput, match="fits in less than half of this stage's weights"):
+        train_stage("tokenizer", replace(options(prepared, tmp_path / "no", 1, config), origin=narrow))
+
+
+def test_the_convolutions_of_other_models_are_found_by_their_names() -> None:
+    tokenizer = Tokenizer(TINY)
+    foreign = {
+        name.replace("in_proj", "enter").replace("out_proj", "leave"): torch.randn_like(value)
+        for name, value in tokenizer.named_parameters()
+        if "attention" not in name
+    }
+    copied = take(tokenizer, foreign, recipe_of(TINY).names)
+    assert torch.equal(tokenizer.encoder.in_proj.weight, foreign["encoder.enter.weight"])
+    assert torch.equal(tokenizer.decoder.out_proj.weight, foreign["decoder.leave.weight"])
+    assert not any("attention" in name for name in copied)
+    frames = torch.randn(1, 32, 8)
+    block, everywhere = tokenizer.encoder.attention[0], torch.ones(1, 8, dtype=torch.bool)
+    assert torch.equal(block(frames, everywhere, None), frames)
 
 
 def test_a_configuration_has_the_stages_of_its_parts(prepared: PreparedData, tmp_path: Path) -> None:

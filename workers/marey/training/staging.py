@@ -191,15 +191,18 @@ def begin_from(origin: Bundle, part: str, network: nn.Module, names: Mapping[str
     """Copy the weights of a bundle's part that fit by name and shape.
 
     Raises:
-        InvalidInput: none fits.
+        InvalidInput: they are less than half of the network's.
         InvalidBundle: no such part, or damaged.
     """
     where = f"{origin.path}: {part}"
     stored = {name: torch.tensor(value) for name, value in restore(origin.tensors(part), where=where).items()}
     copied = take(network, stored, names)
-    if not copied:
-        raise InvalidInput("holds no weight that fits this stage", where=where, hint="Take a bundle of equal widths.")
-    log.info("took weights of another bundle", bundle=origin.reference, tensors=len(copied))
+    sizes = {name: weight.numel() for name, weight in network.named_parameters()}
+    share = sum(sizes[name] for name in copied) / sum(sizes.values())
+    if share < 0.5:
+        hint = "Take a bundle of equal widths."
+        raise InvalidInput("fits in less than half of this stage's weights", where=where, hint=hint)
+    log.info("took weights of another bundle", bundle=origin.reference, share=round(share, 2))
 
 
 def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: dict[str, float], sha256: str) -> None:
