@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from marey.cli.main import app
@@ -57,15 +58,25 @@ def test_an_ablation_that_a_model_has_not_is_told_with_those_it_has(bundle: str,
 
 
 def test_actions_are_measured_by_their_held_out_prompts(bundle: str, tmp_path: Path) -> None:
+    picture = tmp_path / "bow.png"
     options = ["--action", "bow", "--seeds", "1", "--set", "steps=2", "-o", str(tmp_path), "--json"]
-    done = CliRunner().invoke(app, ["eval", "actions", bundle, *options])
+    done = CliRunner().invoke(app, ["eval", "actions", bundle, *options, "--picture", str(picture)])
     assert done.exit_code == 0, done.output
+    with Image.open(picture) as drawn:
+        assert drawn.width > 600  # a tile of the only action
     found = json.loads((tmp_path / "report.json").read_text())
     assert json.loads(done.stdout) == found
     (rate,) = found["actions"]
     assert (rate["action"], rate["authors"], rate["standing"]) == ("bow", 2, "unproven")
     assert len(found["trials"]) == rate["motions"] >= 10
     assert "| bow |" in (tmp_path / "report.md").read_text()
+
+
+def test_a_picture_of_actions_is_a_png(bundle: str, tmp_path: Path) -> None:
+    options = ["--action", "bow", "--seeds", "1", "--picture", str(tmp_path / "bow.jpg")]
+    done = CliRunner().invoke(app, ["eval", "actions", bundle, *options])
+    assert done.exit_code == InvalidInput.exit_code
+    assert "is a .png, not .jpg" in done.stderr
 
 
 def test_the_best_of_several_candidates_is_measured(bundle: str, monkeypatch: pytest.MonkeyPatch) -> None:

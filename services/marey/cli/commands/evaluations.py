@@ -363,6 +363,9 @@ def actions(
             "--record", metavar="DATA", help="Write the result into the bundle; DATA is the folder it was trained on."
         ),
     ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="PNG", help="Draw the first motion of each action.")
+    ] = None,
     threads: Threads = 0,
     output: ReportFolder = None,
     as_json: console.Json = False,
@@ -371,7 +374,7 @@ def actions(
     from marey.cli.roles.actions import measure_actions
 
     _measure(
-        lambda how: measure_actions(bundle, chosen or (), how, development=development, record=record),
+        lambda how: measure_actions(bundle, chosen or (), how, development=development, record=record, picture=picture),
         seeds,
         settings,
         threads,

@@ -14,7 +14,7 @@ from marey.registry import get_model, resolve
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.motion.clip import MotionClip
-    from marey.referee.adherence import ActionRate
+    from marey.referee.adherence import ActionRate, ActionTrial
     from marey.referee.prompts import ActionPrompt
     from marey.text.pipeline import TextPipeline
 
@@ -63,6 +63,7 @@ def measure_actions(
     *,
     development: bool = False,
     record: Path | None = None,
+    picture: Path | None = None,
 ) -> RefereeReport:
     """Generate the prompts of actions with a bundle, and let the referee judge the exported joints.
 
@@ -70,13 +71,18 @@ def measure_actions(
         actions: ids of the vocabulary; none = all.
         development: take the prompts by which settings are chosen, instead of the held-out ones.
         record: the prepared folder that the bundle was trained on; its manifest and card get the result.
+        picture: a PNG of the first motion of each action, whatever the referee says of it.
 
     Raises:
         NotFound, InvalidBundle: of the bundle.
         NotFound, InvalidFile: of the prepared folder.
         InvalidInput: no such action or setting; or a part of the actions or seeds, or what was measured by the
-            prompts for development, is to be recorded.
+            prompts for development, is to be recorded; or `picture` is not a writable PNG.
     """
+    if picture is not None:
+        from marey.viz.render import check_png
+
+        check_png(picture)
     run = _Run.of(bundle, options)
     from marey.referee.adherence import LEAST_SEEDS
 
@@ -90,13 +96,16 @@ def measure_actions(
     from marey.referee.prompts import action_prompts, development_prompts
 
     asked = _of_actions(development_prompts() if development else action_prompts(), actions)
-    trials = [
-        judge_trial(prompt, seed, Body(clip.joints, clip.fps))
-        for prompt, seed, clip in (run.motions(asked) if learning is None else learning.watched(run.motions(asked)))
-    ]
+    trials: list[ActionTrial] = []
+    firsts: dict[tuple[str, ...], tuple[MotionClip, ActionTrial]] = {}
+    for prompt, seed, clip in run.motions(asked) if learning is None else learning.watched(run.motions(asked)):
+        trials.append(judge_trial(prompt, seed, Body(clip.joints, clip.fps)))
+        firsts.setdefault(tuple(prompt.actions), (clip, trials[-1]))
     found = rates(trials)
     if learning is not None:
         learning.record(run.bundle, found)
+    if picture is not None:
+        _draw(list(firsts.values()), found, run.reference, picture)
     return run.report(markdown(run.reference, found), document(run.reference, run.settings, trials))
 
 
@@ -129,6 +138,29 @@ class _Learning:
         from marey.evaluator.standings import Learned, record, share_of_copies
 
         record(bundle, rates, Learned(self._takes, share_of_copies(self._distances)))
+
+
+def _draw(
+    motions: Sequence[tuple[MotionClip, ActionTrial]], found: Sequence[ActionRate], bundle: str, picture: Path
+) -> None:
+    """Draw a motion of each action, the best action first, with the share of its motions that the referee passes."""
+    from marey.viz.overview import draw_tile, overview
+    from marey.viz.paper import theme_named
+    from marey.viz.render import save_png
+
+    shares = {rate.action: rate.share for rate in found}
+    named = [("; ".join(trial.prompt.actions), clip, trial) for clip, trial in motions]
+    named.sort(key=lambda each: (-shares[each[0]], each[0]))
+    theme = theme_named("light")
+    tiles = (
+        draw_tile(
+            clip,
+            f"{action}, {shares[action]:.0%} (this one {'passes' if trial.passed else 'fails'}): {trial.prompt.text}",
+            theme=theme,
+        )
+        for action, clip, trial in named
+    )
+    save_png(overview(tiles, len(named), f"{bundle}: the first motion drawn of each action", theme=theme), picture)
 
 
 def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:
