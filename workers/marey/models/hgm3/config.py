@@ -89,6 +89,9 @@ class MiningConfig:
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
     level_shares: tuple[Weight, ...] = field(default=(1.0, 1.0, 1.0), metadata=ADDED)
     """Ours: how often each level of condition (motion, action, specific) is drawn, where one is drawn per sample."""
+    early: Share = field(default=0.0, metadata=ADDED)
+    """Ours: share of samples that are masked as in the first passes of decoding, whose tokens the prompt alone decides:
+    their τ is at most `EARLY`."""
     replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
     replace_mask: Share = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
 
