@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from marey.text.graph import SemanticGraph
 from marey.text.words import DIRECTIONS, NUMBERS, SIDES, bare, lemma
@@ -20,7 +20,7 @@ def changed_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
         before: of the prompt with its spelling corrected, so that a typo is no other verb.
         after: of the rewrite.
     """
-    for what, was, now in (("the verbs", _verbs(before), _verbs(after)), *_named(before, after)):
+    for what, was, now in (("the verbs", _verbs(before), _verbs(after)), *_named(before.words, after.words)):
         if was != now:
             return f"it changes {what}: {_list(was)} became {_list(now)}"
     return None
@@ -31,13 +31,24 @@ def lost_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
 
     A description tells in other verbs how the body moves, and names sides and directions that the prompt left open.
     """
-    for what, was, now in _named(before, after):
+    for what, was, now in _named(before.words, after.words):
         if lost := set(was) - set(now):
             return f"it loses {what}: {', '.join(sorted(lost))}"
     return None
 
 
-def _named(before: SemanticGraph, after: SemanticGraph) -> tuple[tuple[str, Counter[str], Counter[str]], ...]:
+def changed_details(before: str, after: str) -> str | None:
+    """Name a side, a direction or a count that a paraphrase says more or less often than the text; None if all agree.
+
+    A paraphrase may use other verbs, and join or split sentences.
+    """
+    for what, was, now in _named(before.split(), after.split()):
+        if was != now:
+            return f"it changes {what}: {_list(was)} became {_list(now)}"
+    return None
+
+
+def _named(before: Sequence[str], after: Sequence[str]) -> tuple[tuple[str, Counter[str], Counter[str]], ...]:
     """Sides, directions and counts before and after."""
     return (
         ("a side", _bag(before, SIDES), _bag(after, SIDES)),
@@ -51,13 +62,13 @@ def _verbs(graph: SemanticGraph) -> Counter[str]:
     return Counter(verb for verb in verbs if verb not in LIGHT_VERBS)
 
 
-def _bag(graph: SemanticGraph, table: Mapping[str, str]) -> Counter[str]:
-    return Counter(table[core] for word in graph.words if (core := bare(word)) in table)
+def _bag(words: Sequence[str], table: Mapping[str, str]) -> Counter[str]:
+    return Counter(table[core] for word in words if (core := bare(word)) in table)
 
 
-def _counts(graph: SemanticGraph) -> Counter[str]:
-    numbers = [NUMBERS[core] for word in graph.words if (core := bare(word)) in NUMBERS]
-    return Counter(numbers + [m[1] for word in graph.words if (m := _DIGITS.match(bare(word)))])
+def _counts(words: Sequence[str]) -> Counter[str]:
+    numbers = [NUMBERS[core] for word in words if (core := bare(word)) in NUMBERS]
+    return Counter(numbers + [m[1] for word in words if (m := _DIGITS.match(bare(word)))])
 
 
 def _list(bag: Counter[str]) -> str:

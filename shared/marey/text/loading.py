@@ -86,6 +86,7 @@ def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption
         return RulesRewriter(labeller, Speller.load())
     if name == "openai":
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
+        from marey.text.wordings import QUESTIONS
 
-        return OpenAIRewriter(Endpoint.of(settings()), wording)
+        return OpenAIRewriter(Endpoint.of(settings()), QUESTIONS[wording])
     raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai.")

@@ -23,7 +23,7 @@ from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.core.tls import trusting_context
 from marey.text.rewriters import NotRewritten, Rewrite
-from marey.text.wordings import QUESTIONS, Wording
+from marey.text.wordings import Question
 
 log = logging.getLogger(__name__)
 
@@ -71,9 +71,9 @@ class OpenAIRewriter:
 
     name = "openai"
 
-    def __init__(self, endpoint: Endpoint, wording: Wording = "caption") -> None:
+    def __init__(self, endpoint: Endpoint, question: Question) -> None:
         self._endpoint = endpoint
-        self._question = QUESTIONS[wording]
+        self._question = question
         secret = {} if endpoint.key is None else {"Authorization": f"Bearer {endpoint.key.get_secret_value()}"}
         self._client = httpx2.Client(
             headers=secret,

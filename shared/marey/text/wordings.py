@@ -53,6 +53,21 @@ Motion: the description
 Seconds: the length as a number"""
 
 
+MANNERS = (
+    "Change the structure of the sentences: begin elsewhere, join short ones, split long ones.",
+    "Keep the structure, and use other words for what can be said in other words.",
+    "Say it plainly and briefly, in the fewest words that keep every detail.",
+    "Say it fluently, as a careful writer would, with a mild clarification where it makes the movement clearer.",
+)
+"""What makes paraphrases of one caption differ."""
+
+TO_PARAPHRASE = f"""You rewrite a caption of a recorded human motion, for training a model that makes motions from text.
+Correct spelling and grammar, and rephrase it so that it reads well. The movement must stay exactly as described: every
+action, their order and timing, the sides of the body, directions, counts and speeds. Remove nothing and add no action.
+Third person, present tense, at most {DESCRIPTION_WORDS} words. {_ONLY_DATA} Answer with the caption alone.
+"""
+
+
 @dataclass(frozen=True)
 class Question:
     """A question to the language model, and how its answer is read.
@@ -66,11 +81,11 @@ class Question:
     read: Callable[[str], Rewrite]
 
 
-def _caption(answer: str) -> Rewrite:
+def _caption(answer: str, most: int = CAPTION_WORDS) -> Rewrite:
     lines = _lines(answer)
     if len(lines) != 1:
         raise NotRewritten(f"the language model answered with {len(lines)} lines, not with a caption")
-    return Rewrite(_prompt(lines[0], CAPTION_WORDS))
+    return Rewrite(_prompt(lines[0], most))
 
 
 _LINE = re.compile(r"^(motion|seconds)\s*:\s*(.+)$", re.IGNORECASE)
@@ -106,3 +121,8 @@ QUESTIONS: Mapping[Wording, Question] = {
     "caption": Question(TO_CAPTION, _caption),
     "description": Question(TO_DESCRIPTION, _description),
 }
+
+PARAPHRASES: tuple[Question, ...] = tuple(
+    Question(TO_PARAPHRASE + manner, lambda answer: _caption(answer, DESCRIPTION_WORDS)) for manner in MANNERS
+)
+"""Questions for captions in other words (SnapMoGen App. C, Tab. 5), each in another manner."""

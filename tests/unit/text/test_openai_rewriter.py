@@ -17,6 +17,7 @@ from marey.text.features import TextFeatures
 from marey.text.keys import as_served, feature_key
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
 from marey.text.rewriters import NotRewritten, Rewrite
+from marey.text.wordings import QUESTIONS
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.texts import shared_pipeline
 
@@ -37,7 +38,7 @@ def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def rewriter_of(model: LanguageModel, seconds: float = 30.0) -> OpenAIRewriter:
-    return OpenAIRewriter(Endpoint(model.url, "some-model", SecretStr(KEY), seconds))
+    return OpenAIRewriter(Endpoint(model.url, "some-model", SecretStr(KEY), seconds), QUESTIONS["caption"])
 
 
 def reason_of(rewriter: OpenAIRewriter, prompt: str = PROMPT) -> str:
@@ -62,7 +63,9 @@ DESCRIBED = "The person shuffles forward, the left foot dragging behind, with bo
 
 def rewrite_of(answer: str) -> Rewrite:
     with LanguageModel(lambda asked, before: CompletionReply(answer)) as model:
-        made = OpenAIRewriter(Endpoint(model.url, "some-model", None, 5.0), "description").rewrite("zombie walk")
+        made = OpenAIRewriter(Endpoint(model.url, "some-model", None, 5.0), QUESTIONS["description"]).rewrite(
+            "zombie walk"
+        )
         (asked,) = model.asked
         assert "about 60 words" in asked.question["messages"][0]["content"]
     return made
@@ -142,7 +145,7 @@ def test_an_endpoint_that_is_not_there_is_the_reason() -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{free.getsockname()[1]}/v1"
-    assert "cannot be reached" in reason_of(OpenAIRewriter(Endpoint(url, "m", None)))
+    assert "cannot be reached" in reason_of(OpenAIRewriter(Endpoint(url, "m", None), QUESTIONS["caption"]))
 
 
 @pytest.mark.parametrize(

@@ -164,6 +164,31 @@ def text(
 
 
 @app.command()
+def paraphrase(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder of captures with dataset.toml and index.csv.")
+    ],
+    times: Annotated[int, typer.Option("--times", help="Paraphrases of each caption, 1 to 4, in other manners.")] = 2,
+) -> None:
+    """Rephrase the captions of a set by a language model: captions-paraphrases.csv beside its index.
+
+    Captions leave this machine: MAREY_REWRITER_URL, MAREY_REWRITER_MODEL and MAREY_REWRITER_KEY name the model. Called
+    again, it goes on with clips that have none yet.
+    """
+    from marey.cli.roles import data
+
+    with console.bar() as bar:
+        task = bar.add_task("clips", total=None)
+        found = data.paraphrase_captions(
+            folder, times, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    for reason, count in sorted(found.refused.items(), key=lambda each: -each[1])[:10]:
+        console.say(f"{count} not used: {reason}")
+    console.say(f"{found.written} paraphrases written; clips that have some: {found.clips}")
+    console.result(str(found.path))
+
+
+@app.command()
 def segment(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Long captures, such as .bvh or .npz.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],

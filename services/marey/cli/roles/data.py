@@ -15,6 +15,7 @@ from marey.core.extras import needs_extra
 if TYPE_CHECKING:
     from marey.bundles import TextSpec
     from marey.data.pack import JointsPack
+    from marey.data.paraphrase import Paraphrased
     from marey.motion.units import Unit
 
 
@@ -218,6 +219,27 @@ def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, i
         folder
     )
     return sum(map(len, captions))
+
+
+def paraphrase_captions(folder: Path, times: int, progress: Callable[[int, int], None]) -> Paraphrased:
+    """Rephrase the captions of a set by the language model of the settings, each `times` times.
+
+    Raises:
+        InvalidInput: no language model is named, or more times than there are manners, or nothing to rephrase.
+        NotFound, InvalidFile: the folder is not a set.
+        Unreachable: the language model gives no usable answers.
+    """
+    try:
+        from marey.core.settings import settings
+        from marey.data.paraphrase import paraphrase
+        from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
+        from marey.text.wordings import PARAPHRASES
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    if not 1 <= times <= len(PARAPHRASES):
+        raise InvalidInput(f"is {times}; captions are rephrased 1 to {len(PARAPHRASES)} times", where="--times")
+    endpoint = Endpoint.of(settings())
+    return paraphrase(folder, [OpenAIRewriter(endpoint, question) for question in PARAPHRASES[:times]], progress)
 
 
 def _text_spec(choice: TextChoice) -> TextSpec:
