@@ -59,7 +59,7 @@ MANNERS = (
     "Say it plainly and briefly, in the fewest words that keep every detail.",
     "Say it fluently, as a careful writer would, with a mild clarification where it makes the movement clearer.",
 )
-"""What makes paraphrases of one caption differ."""
+"""Manners of paraphrasing, by which paraphrases of one caption differ."""
 
 TO_PARAPHRASE = f"""You rewrite a caption of a recorded human motion, for training a model that makes motions from text.
 Correct spelling and grammar, and rephrase it so that it reads well. The movement must stay exactly as described: every

@@ -136,7 +136,7 @@ class MoMaskPPConfig(ModelConfig):
     phases: Count = field(default=4, metadata=ADDED)
     """Token grids of a training clip that the transformer learns, each a frame later than the one before."""
     speeds: bool = field(default=True, metadata=ADDED)
-    """Whether the transformer also learns clips made slower or faster than captured."""
+    """True: the transformer also learns clips that were made slower or faster than captured."""
     train_tokenizer: StageConfig = StageConfig(batch=256, learning_rate=3e-4, weight_decay=0.0, clip=0.5, ema=0.0)
     train_masked: StageConfig = StageConfig(batch=64, ema=0.0)
     train_refiner: StageConfig = StageConfig(batch=256, clip=0.5, ema=0.0)
