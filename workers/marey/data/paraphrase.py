@@ -29,7 +29,7 @@ CLIPS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Paraphrased:
-    """What was done.
+    """Result of a call.
 
     Attributes:
         path: the file of captions.
