@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,21 @@ UNLABELLED = "motion"
 """Label of clips that are published with captions and no action: all of them are drawn equally often."""
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Shares of the draws for sequences of two and three actions; the rest goes to clips of one action."""
+
+
+@dataclass(frozen=True)
+class Draws:
+    """How often training draws clips of each kind.
+
+    Attributes:
+        power: of the number of clips of a class, to which its share is proportional: 1 = clips are drawn equally often,
+            0 = classes are, 0.5 = in between.
+        sequences: share of sequences of several actions, of which three actions take `SEQUENCE_SHARE`'s part.
+    """
+
+    power: float = 0.5
+    sequences: float = sum(SEQUENCE_SHARE.values())
+
 
 ACT_WEIGHT = {
     "walk": 3.0,
@@ -32,28 +48,28 @@ ACT_WEIGHT = {
 must alternate, and feet must not slide), and most prompts ask for one; there are few bows and walks backward."""
 
 
-def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
+def sampling_weights(clips: Sequence[Clip], draws: Draws = Draws()) -> NDArray[np.float64]:
     """Probability of each clip (N,), summing to 1.
 
-    The training split has 1,064 raised hands and one kick. Clips of one action have the weight count^-0.5 of their
-    class, distributed within the class by count^-0.5 of the style: a class with 100 times fewer clips is drawn 10 times
-    less often, not 100 times; some actions count more (`ACT_WEIGHT`). A class is an action in all data sets; a clip
+    The training split has 1,064 raised hands and one kick. A class has the weight count^`power`, distributed within it
+    by count^-0.5 of the style: with a power of 0.5 a class with 100 times fewer clips is drawn 10 times less often, not
+    100 times; some actions count more (`ACT_WEIGHT`). A class is an action in all data sets; a clip
     whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences have a fixed share
     (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights. Made clips are at most half of the
     draws of a class.
     """
     weights = np.zeros(len(clips))
     single = [k for k, clip in enumerate(clips) if len(clip.acts) == 1]
-    weights[single] = _by_class([clips[k] for k in single])
+    weights[single] = _by_class([clips[k] for k in single], draws.power)
     lengths = np.array([len(clip.acts) for clip in clips])
     for length, share in SEQUENCE_SHARE.items():
         chosen = lengths == length
-        weights[chosen] = share / max(int(chosen.sum()), 1)
+        weights[chosen] = draws.sequences * share / sum(SEQUENCE_SHARE.values()) / max(int(chosen.sum()), 1)
     weights[single] *= 1 - weights[lengths > 1].sum()
     return weights / weights.sum()
 
 
-def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
+def _by_class(clips: Sequence[Clip], power: float) -> NDArray[np.float64]:
     """Weights of clips that are not sequences, summing to 1."""
     classes = [classes_of(clip) for clip in clips]
     per_class, per_key = dict[str, float](), dict[tuple[str, str], float]()
@@ -68,7 +84,7 @@ def _by_class(clips: Sequence[Clip]) -> NDArray[np.float64]:
     shares: dict[str, dict[int, float]] = defaultdict(dict)
     for k, (clip, names) in enumerate(zip(clips, classes, strict=True)):
         for name in names:
-            shares[name][k] = per_class[name] ** 0.5 / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
+            shares[name][k] = per_class[name] ** power / styles[name] / per_key[name, clip.style] ** 0.5 / len(names)
     weights = np.zeros(len(clips))
     for name, of_class in shares.items():
         for k, share in _made_halved(of_class, clips).items():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.data.manifest import Clip
-from marey.data.sampling import sampling_weights
+from marey.data.sampling import Draws, sampling_weights
 from marey.training.motions import TokenData
 from marey.training.sentences import SentenceData
 
@@ -28,6 +28,7 @@ class Pairs:
         *,
         natural: bool = False,
         speeds: bool = True,
+        draws: Draws = Draws(),
     ) -> None:
         usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (captions.count > 0)
         if natural:
@@ -37,7 +38,7 @@ class Pairs:
         splits = np.array([c.split for c in clips])
         self.train = np.flatnonzero(usable & (splits == "train"))
         self.validation = np.flatnonzero(usable & (splits == "val"))
-        self.weights = sampling_weights([clips[int(i)] for i in self.train])
+        self.weights = sampling_weights([clips[int(i)] for i in self.train], draws)
 
     def draw(self, rng: np.random.Generator, batch: int) -> NDArray[np.int64]:
         """Draw training clips (B,)."""

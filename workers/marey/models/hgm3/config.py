@@ -135,6 +135,11 @@ class HGM3Config(ModelConfig):
     of a token. One is learned by heart in fewer steps."""
     speeds: bool = field(default=True, metadata=ADDED)
     """Ours: both transformers learn clips that `data prepare --speed` made slower or faster, too."""
+    class_power: Share = field(default=0.5, metadata=ADDED)
+    """Ours: how far actions with many clips are drawn more often by both transformers: 1 = as often as they have clips,
+    0 = all actions equally often."""
+    sequences: Share = field(default=0.46, metadata=ADDED)
+    """Ours: share of draws that are sequences of several actions."""
     residual_drop: Share = 0.2  # condition drop of the residual transformer
     length_hidden: tuple[Count, ...] = (512, 256, 128)  # widths of the length estimator (MoMask)
     mining: MiningConfig = MiningConfig()
@@ -226,6 +231,9 @@ OPEN = replace(
     # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
     phases=1,
     speeds=False,
+    # An action of one take was drawn 3,000 times in all, too seldom to be learned; a walk 80,000 times.
+    class_power=0.2,
+    sequences=0.3,
     residual=replace(STARTER.residual, layers=6, feedforward=768),
     # Decoding reads the whole condition from the first pass on; hard masks cost a third of a step.
     mining=replace(STARTER.mining, conditions="specific", mask="random"),

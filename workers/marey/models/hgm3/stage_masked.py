@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.data.manifest import Clip
+from marey.data.sampling import Draws
 from marey.models.hgm3.conditions import LEVELS, GraphBatch
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.data import CaptionData
@@ -83,7 +84,8 @@ class MaskedStage:
         self.optimisation = config.train_masked
         self.tokens, self.captions = tokens.first_phases(config.phases), captions
         self.module = MaskedModule(config).to(tokens.tokens.device)
-        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds)
+        draws = Draws(config.class_power, config.sequences)
+        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws)
         captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.masked.head.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.data.manifest import Clip
+from marey.data.sampling import Draws
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LengthEstimator, ResidualTransformer
@@ -58,7 +59,8 @@ class ResidualStage:
         self.tokens, self.captions = tokens.first_phases(config.phases), captions
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
-        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds)
+        draws = Draws(config.class_power, config.sequences)
+        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws)
         captions.standardise(self.module.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
