@@ -5,15 +5,26 @@ see docs/extending.md. Importing this package needs the standard library only.
 """
 
 from marey.exporters.exporter import Coordinates, Exporter
-from marey.exporters.registry import GROUP, check_options, exporter_named, exporter_of, exporters, extension_of
+from marey.exporters.registry import (
+    GROUP,
+    check_options,
+    exporter_for,
+    exporter_named,
+    exporter_of,
+    exporters,
+    extension_of,
+)
+from marey.exporters.rigged import write_rigged
 
 __all__ = [
     "GROUP",
     "Coordinates",
     "Exporter",
     "check_options",
+    "exporter_for",
     "exporter_named",
     "exporter_of",
     "exporters",
     "extension_of",
+    "write_rigged",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.prepare import in_rest_pose
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -20,10 +21,7 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.bvh_write import format_bvh
 
-    if coordinates.rest_pose != "t":
-        from marey.motion.rest_pose import change_rest_pose
-
-        clip = change_rest_pose(clip, coordinates.rest_pose)
+    clip = in_rest_pose(clip, coordinates)
     return format_bvh(clip, unit=coordinates.unit, up=coordinates.up, options=coordinates).encode()
 
 

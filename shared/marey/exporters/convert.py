@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.core.errors import Conflict, InvalidInput
 from marey.exporters.exporter import Coordinates, Exporter
-from marey.exporters.registry import check_options, exporter_named, exporters
+from marey.exporters.registry import check_options, exporter_for
 from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions, RestPose
 from marey.motion.files import read_limited, write_atomically
@@ -50,7 +50,7 @@ def convert(
         NotFound, InvalidFile, TooLarge: from reading.
     """
     source, target = Path(source), Path(target)
-    reader, writer = _exporter_for(source), _exporter_for(target)
+    reader, writer = exporter_for(source), exporter_for(target)
     check_options([writer], export)
     if target.exists() and not overwrite:
         raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
@@ -76,21 +76,8 @@ def read_motion(path: Path, coordinates: Coordinates) -> MotionClip:
         InvalidInput: a format that is unknown or write-only.
         NotFound, InvalidFile, TooLarge: from reading.
     """
-    clip = _decode(_exporter_for(path), path, coordinates)
+    clip = _decode(exporter_for(path), path, coordinates)
     return clip_from_bvh(clip, path.name) if isinstance(clip, BvhClip) else clip
-
-
-def _exporter_for(path: Path) -> Exporter[Any]:
-    """Return the exporter of a file.
-
-    Raises:
-        InvalidInput: there is none.
-    """
-    found = exporter_named(path.name)
-    if found is None:
-        known = ", ".join(f".{each.extension}" for each in exporters().values())
-        raise InvalidInput(f"`{path.suffix}` is not a known motion format", where=str(path), hint=f"Known: {known}.")
-    return found
 
 
 def _decode(reader: Exporter[Any], path: Path, coordinates: Coordinates) -> MotionClip | BvhClip:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.prepare import with_body
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -18,21 +19,10 @@ def encode(clip: MotionClip | BvhClip, coordinates: Coordinates) -> bytes:
     Raises:
         InvalidInput: see `marey.motion.io.fbx_write.write_fbx`; or the skeleton has no such rest pose.
     """
-    from marey.motion.clip import MotionClip
-    from marey.motion.io.convert import clip_from_bvh
     from marey.motion.io.fbx_write import format_fbx
 
-    if coordinates.rest_pose != "t":
-        from marey.motion.rest_pose import change_rest_pose
-
-        clip = change_rest_pose(clip, coordinates.rest_pose)
-    mesh = None
-    if coordinates.mesh:
-        from marey.viz.mannequin import mannequin
-
-        clip = clip if isinstance(clip, MotionClip) else clip_from_bvh(clip, "fbx")
-        mesh = mannequin(clip)
-    return format_fbx(clip, coordinates, mesh, unit=coordinates.unit, up=coordinates.up)
+    posed, body = with_body(clip, coordinates)
+    return format_fbx(posed, coordinates, body, unit=coordinates.unit, up=coordinates.up)
 
 
 def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.prepare import with_body
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -19,11 +20,8 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.glb_write import format_glb
 
-    if not coordinates.mesh:
-        return format_glb(clip, coordinates)
-    from marey.viz.mannequin import mannequin
-
-    return format_glb(clip, coordinates, mannequin(clip))
+    posed, body = with_body(clip, coordinates)
+    return format_glb(posed, coordinates, body)
 
 
 def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:

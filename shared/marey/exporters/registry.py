@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -85,6 +86,19 @@ def exporter_named(file_name: str) -> Exporter[Any] | None:
     name = file_name.lower()
     having = (each for each in exporters().values() if name.endswith(f".{each.extension}"))
     return max(having, key=lambda each: len(each.extension), default=None)
+
+
+def exporter_for(path: Path) -> Exporter[Any]:
+    """Return the exporter whose extension the name of a file has.
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    found = exporter_named(path.name)
+    if found is None:
+        known = ", ".join(f".{each.extension}" for each in exporters().values())
+        raise InvalidInput(f"`{path.suffix}` is not a known motion format", where=str(path), hint=f"Known: {known}.")
+    return found
 
 
 def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.prepare import with_body
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -19,16 +20,8 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     """
     from marey.motion.io.usd_write import format_usd
 
-    if coordinates.rest_pose != "t":
-        from marey.motion.rest_pose import change_rest_pose
-
-        clip = change_rest_pose(clip, coordinates.rest_pose)
-    mesh = None
-    if coordinates.mesh:
-        from marey.viz.mannequin import mannequin
-
-        mesh = mannequin(clip)
-    return format_usd(clip, coordinates, mesh, unit=coordinates.unit, up=coordinates.up)
+    posed, body = with_body(clip, coordinates)
+    return format_usd(posed, coordinates, body, unit=coordinates.unit, up=coordinates.up)
 
 
 def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
