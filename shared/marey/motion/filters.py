@@ -36,3 +36,8 @@ def smooth_above(values: Array, sigma: float) -> Array:
 def smoothstep(share: Array) -> Array:
     """Return 0 … 1 with no slope at both ends, for a share from 0 to 1."""
     return share * share * (3 - 2 * share)
+
+
+def smootherstep(share: Array) -> Array:
+    """Return 0 … 1 with no slope and no acceleration at both ends, for a share from 0 to 1."""
+    return share**3 * (share * (6 * share - 15) + 10)

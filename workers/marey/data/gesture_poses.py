@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import heading
 from marey.data.part import FPS
 from marey.data.splice import with_bones
+from marey.motion.filters import smootherstep
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 
@@ -44,9 +45,8 @@ _SWING_FROM = 0.7  # share of the rise after which a hand swings
 
 
 def eased(x: Array) -> Array:
-    """Ease 0 … 1, with zero speed and acceleration at both ends."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10 - 15 * x + 6 * x * x)
+    """Return 0 before x = 0, 1 after x = 1, without a jump in speed or acceleration."""
+    return smootherstep(np.clip(x, 0.0, 1.0))
 
 
 def envelope(frames: int, start: float, rise: float, hold: float, fall: float) -> Array:

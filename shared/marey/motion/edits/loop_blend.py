@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from marey.motion.clip import MotionClip
 from marey.motion.edits.joining import fade
 from marey.motion.edits.loop_search import Cycle
+from marey.motion.filters import smootherstep
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import foot_chain, two_bone_knee
 from marey.motion.pose import aim_bones
@@ -146,8 +147,7 @@ def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int) -> Close
 
 def _cross_faded(clip: MotionClip, travel: Travel, rotations: Array, root: Array, before: slice) -> tuple[Array, Array]:
     """Fade from the poses to those of the frames `before`, moved by the travel; feet keep to the paths of both."""
-    t = np.linspace(0.0, 1.0, len(root))
-    share = t**3 * (t * (6 * t - 15) + 10)
+    share = smootherstep(np.linspace(0.0, 1.0, len(root)))
     theirs, place = travel.turns(clip.rotations[before]), travel.places(clip.root[before].astype(np.float64))
     mixed = slerp(rotations, theirs, share[:, None])
     middle = root + share[:, None] * (place - root)

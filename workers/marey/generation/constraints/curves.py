@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.filters import smooth
+from marey.motion.filters import smooth, smootherstep
 from marey.motion.rotations import Array
 
 
@@ -45,8 +45,7 @@ def through(frames: Array, values: Array, at: Array) -> Array:
 
 def hump(t: Array) -> Array:
     """Return 1 at t = 0, 0 from |t| = 1 on, with continuous speed and acceleration between."""
-    s = 1 - np.minimum(np.abs(t), 1.0)
-    return s**3 * (s * (6 * s - 15) + 10)
+    return smootherstep(1 - np.minimum(np.abs(t), 1.0))
 
 
 def fades(frames: NDArray[np.intp], values: Array, spans: Array, count: int) -> Array:
