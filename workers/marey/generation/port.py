@@ -72,7 +72,11 @@ class Limits:
             return round(seconds * self.fps)
         if text is None or text.seconds is None:
             return None
-        return min(max(round(text.seconds * self.fps), self.min_frames), self.max_frames)
+        return self.within(round(text.seconds * self.fps))
+
+    def within(self, frames: int) -> int:
+        """Return a number of frames, brought into the range of the bundle."""
+        return min(max(frames, self.min_frames), self.max_frames)
 
     def check(self, request: Request) -> None:
         """Check that a request is within the limits.

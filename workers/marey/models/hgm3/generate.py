@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from marey.bundles import Bundle
-from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
+from marey.generation.base import GroupedGenerator
+from marey.generation.groups import RowWatcher
 from marey.generation.kept import write_kept
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.port import GenerationControl, Limits, Request, open_bundle
 from marey.models.hgm3.bundle import Networks, load_networks
 from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
 from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
 from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
-from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import draw_class
@@ -82,8 +80,10 @@ class Generated:
     decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
 
 
-class Generator:
+class Generator(GroupedGenerator[SamplingSettings, Generated]):
     """A loaded bundle. Not thread-safe; one per process."""
+
+    sampling = SamplingSettings
 
     def __init__(
         self,
@@ -94,23 +94,18 @@ class Generator:
         dtype: torch.dtype,
         batch_threads: BatchThreads,
     ) -> None:
-        self.bundle = bundle
-        self.batch_threads = batch_threads
-        self.config = config
-        self.networks = networks
-        self.tokenizer = networks.tokenizer
-        self.base: MaskedTransformer | SeparateTransformers = networks.masked
-        self.device = device
-        self.dtype = dtype
-        self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(
+        limits = Limits(
             config.min_frames,
             config.max_frames,
             config.fps,
             config.condition.text_width,
             keeps=config.tokenizer.frames_per_token,
         )
-        self.batch = MAX_ROWS
+        super().__init__(bundle, limits, config.inference, device, dtype, batch_threads)
+        self.config = config
+        self.networks = networks
+        self.tokenizer = networks.tokenizer
+        self.base: MaskedTransformer | SeparateTransformers = networks.masked
 
     @classmethod
     def load(
@@ -120,7 +115,7 @@ class Generator:
 
         Args:
             bundle: a verified bundle, or its name or path.
-            threads: of torch; 0 = torch's default.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
             threads: of torch; 0 leaves torch's own choice.
             dtype: of the transformers' matrices; None = bfloat16 where the device multiplies it fast, else float32.
 
@@ -164,51 +159,20 @@ class Generator:
         inference = settings.inference(self.config.inference)
         options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress)
         frames = [self.frames(request) for request in requests]
-        results: list[Generated | None] = [None] * len(requests)
-        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
-        steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
 
-        def make(rows: list[int]) -> None:
-            self._group(RowWatcher(steps, rows), requests, frames, inference, options, results)
+        def draw(watcher: RowWatcher) -> list[Generated]:
+            return self._group(watcher, requests, frames, inference, options)
 
-        with self.batch_threads.open():
-            self.batch_threads.map(make, groups)
-        return results
-
-    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
-        """Check an item's settings. Raises InvalidInput."""
-        settings = read_settings(SamplingSettings, values, InferenceConfig.__dataclass_fields__)
-        settings.inference(self.config.inference)
-        return settings
-
-    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
-        """Return all settings that decide how tokens are drawn."""
-        return asdict(settings.inference(self.config.inference))
-
-    def resolve_length(self, request: Request) -> Request:
-        """Return the request with a length; the estimator draws a missing one with the request's seed."""
-        return replace(request, frames=self.frames(request))
-
-    def frames(self, request: Request) -> int:
-        """Return the feature frames: as requested, or drawn by the length estimator. Raises InvalidInput if out of
-        range."""
-        self.limits.check(request)
-        return self._estimate(request) if request.frames is None else request.frames
-
-    def bucket(self, request: Request) -> int:
-        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
-        return self._bucket(self.frames(request))
+        return self._in_groups(frames, inference.steps + self.config.tokenizer.levels, control, draw)
 
     def _bucket(self, frames: int) -> int:
-        tokens = -(-frames // self.frames_per_token)
-        return -(-tokens // BUCKET) * BUCKET
+        return -(-self._tokens(frames) // BUCKET) * BUCKET
 
     def _estimate(self, request: Request) -> int:
         """Draw frames from the middle third of the estimated distribution (ours): seeds differ, without extremes."""
         sentence = torch.from_numpy(request.text.nodes[:1].astype(np.float32)).to(self.device)
         tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
-        frames = tokens * self.frames_per_token
-        return min(max(frames, self.config.min_frames), self.config.max_frames)
+        return self.limits.within(tokens * self.frames_per_token)
 
     def _group(
         self,
@@ -217,30 +181,23 @@ class Generator:
         frames: Sequence[int],
         inference: InferenceConfig,
         options: DecodeOptions,
-        results: list[Generated | None],
-    ) -> None:
+    ) -> list[Generated]:
         rows = watcher.rows
-        if not rows:
-            return
         items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
         items = decode_base(self.base, items, inference, options, watcher.step)
         items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
-        if not watcher.rows:
-            return
-        for position, row in enumerate(watcher.rows):
-            # one by one, at its own length: a convolution rounds differently in another batch, and files would differ
-            tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
-            features = self.networks.tokenizer.decode(tokens[None])[0, : frames[row]]
-            results[row] = Generated(
-                tokens.T.cpu().numpy().astype(np.int16),
-                features.cpu().numpy(),
-                tuple(items.decided[position].tolist()),
-            )
-        watcher.step()
+        return [self._generated(items, position, frames[row]) for position, row in enumerate(watcher.rows)]
+
+    def _generated(self, items: Items, position: int, frames: int) -> Generated:
+        """Decode one item alone, at its own length: a convolution rounds differently in another batch, and files would
+        differ."""
+        tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
+        features = self.networks.tokenizer.decode(tokens[None])[0, :frames]
+        decided = tuple(items.decided[position].tolist())
+        return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy(), decided)
 
     def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
-        lengths = [-(-f // self.frames_per_token) for f in frames]
-        bucket = -(-max(lengths) // BUCKET) * BUCKET
+        lengths, bucket = [self._tokens(count) for count in frames], self._bucket(max(frames))
         device, levels = self.device, self.config.tokenizer.levels
         # One by one, once a batch: a float32 product of few rows rounds differently with their number.
         graphs = [graph_batch([r.text], self.config.condition, device) for r in requests]

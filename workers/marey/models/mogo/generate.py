@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.base import SampledGenerator
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle
 from marey.models.mogo.bundle import load_networks
 from marey.models.mogo.config import InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
@@ -62,8 +62,10 @@ class Generated:
     features: NDArray[np.float32]  # (T, D), in the layout's own units
 
 
-class Generator:
+class Generator(SampledGenerator[SamplingSettings]):
     """A loaded bundle. Not thread-safe; one per process."""
+
+    sampling = SamplingSettings
 
     def __init__(
         self,
@@ -74,7 +76,7 @@ class Generator:
         dtype: torch.dtype,
     ) -> None:
         """Create a generator from its parts; most callers use `load`."""
-        self.bundle, self.config = bundle, config
+        self.bundle, self.config, self.inference = bundle, config, config.inference
         self.tokenizer, self.transformer = tokenizer, transformer
         self.device, self.dtype = transformer.head.weight.device, dtype
         self.layout: FeatureLayout = layout_of(bundle.manifest)
@@ -110,16 +112,6 @@ class Generator:
         if group not in self._packed:
             self._packed[group] = PackedModel(self.transformer, dtype=self.dtype, group=group)
         return self._packed[group]
-
-    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
-        """Check an item's settings. Raises InvalidInput."""
-        settings = read_settings(SamplingSettings, values, SamplingSettings.__dataclass_fields__)
-        settings.inference(self.config.inference)
-        return settings
-
-    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
-        """Return all settings that decide how tokens are drawn."""
-        return asdict(settings.inference(self.config.inference))
 
     def resolve_length(self, request: Request) -> Request:
         """Check the request and return it unchanged: an open length is decided while drawing."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -12,14 +11,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.bundles.body import layout_of
-from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.base import GroupedGenerator
+from marey.generation.groups import RowWatcher
+from marey.generation.port import GenerationControl, Limits, Request, open_bundle
 from marey.models.momask.bundle import Networks, load_networks
 from marey.models.momask.config import InferenceConfig, MoMaskConfig
 from marey.models.momask.decoding import LENGTH_STREAM, Items, decode_base, decode_residual
 from marey.models.momask.spec import SPEC
-from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import draw_class
@@ -61,8 +59,10 @@ class Generated:
     features: NDArray[np.float32]  # (Tf, D), in the layout's own units
 
 
-class Generator:
+class Generator(GroupedGenerator[SamplingSettings, Generated]):
     """A loaded bundle. Not thread-safe; one per process."""
+
+    sampling = SamplingSettings
 
     def __init__(
         self,
@@ -73,15 +73,10 @@ class Generator:
         dtype: torch.dtype,
         batch_threads: BatchThreads,
     ) -> None:
-        self.bundle = bundle
-        self.batch_threads = batch_threads
+        limits = Limits(config.min_frames, config.max_frames, config.fps, config.text_width)
+        super().__init__(bundle, limits, config.inference, device, dtype, batch_threads)
         self.config = config
         self.networks = networks
-        self.device = device
-        self.dtype = dtype
-        self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.text_width)
-        self.batch = MAX_ROWS
 
     @classmethod
     def load(
@@ -133,53 +128,19 @@ class Generator:
         """
         inference = (settings or SamplingSettings()).inference(self.config.inference)
         frames = [self.frames(request) for request in requests]
-        results: list[Generated | None] = [None] * len(requests)
-        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
-        steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
 
-        def make(rows: list[int]) -> None:
-            self._group(RowWatcher(steps, rows), requests, frames, inference, results)
+        def draw(watcher: RowWatcher) -> list[Generated]:
+            return self._group(watcher, requests, frames, inference)
 
-        with self.batch_threads.open():
-            self.batch_threads.map(make, groups)
-        return results
-
-    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
-        """Check an item's settings. Raises InvalidInput."""
-        settings = read_settings(SamplingSettings, values, InferenceConfig.__dataclass_fields__)
-        settings.inference(self.config.inference)
-        return settings
-
-    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
-        """Return all settings that decide how tokens are drawn."""
-        return asdict(settings.inference(self.config.inference))
-
-    def resolve_length(self, request: Request) -> Request:
-        """Return the request with a length; the estimator draws a missing one with the request's seed."""
-        return replace(request, frames=self.frames(request))
-
-    def frames(self, request: Request) -> int:
-        """Return the feature frames: as requested, or drawn by the length estimator. Raises InvalidInput if out of
-        range."""
-        self.limits.check(request)
-        return self._estimate(request) if request.frames is None else request.frames
-
-    def bucket(self, request: Request) -> int:
-        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
-        return self._bucket(self.frames(request))
+        return self._in_groups(frames, inference.steps + self.config.tokenizer.levels, control, draw)
 
     def _bucket(self, frames: int) -> int:
         return -(-self._tokens(frames) // BUCKET) * BUCKET
 
-    def _tokens(self, frames: int) -> int:
-        return -(-frames // self.frames_per_token)
-
-    @torch.inference_mode()
     def _estimate(self, request: Request) -> int:
         """Draw frames from the estimated distribution, as the public code does, and keep them within the limits."""
         tokens = draw_class(self.networks.length(self._sentence(request)), request.seed, LENGTH_STREAM)
-        frames = tokens * self.frames_per_token
-        return min(max(frames, self.config.min_frames), self.config.max_frames)
+        return self.limits.within(tokens * self.frames_per_token)
 
     def _sentence(self, request: Request) -> Tensor:
         """Return the sentence feature (1, W)."""
@@ -191,25 +152,22 @@ class Generator:
         requests: Sequence[Request],
         frames: Sequence[int],
         inference: InferenceConfig,
-        results: list[Generated | None],
-    ) -> None:
+    ) -> list[Generated]:
         rows = watcher.rows
-        if not rows:
-            return
         items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
         items = decode_base(self.networks.masked, items, inference, watcher.step)
         items = decode_residual(self.networks.residual, items, inference, watcher.step)
-        for position, row in enumerate(watcher.rows):
-            # one by one, at its own length: padding would change the motion's end (`Tokenizer`)
-            tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
-            features = self.networks.tokenizer.decode(tokens[None])[0, : frames[row]]
-            results[row] = Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
-        if watcher.rows:
-            watcher.step()
+        return [self._generated(items, position, frames[row]) for position, row in enumerate(watcher.rows)]
+
+    def _generated(self, items: Items, position: int, frames: int) -> Generated:
+        """Decode one item alone, at its own length: padding would change the motion's end (`Tokenizer`)."""
+        tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
+        features = self.networks.tokenizer.decode(tokens[None])[0, :frames]
+        return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
 
     def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
         lengths = [self._tokens(count) for count in frames]
-        device, bucket = self.device, max(self._bucket(count) for count in frames)
+        device, bucket = self.device, self._bucket(max(frames))
         masked, residual = self.networks.masked, self.networks.residual
         # One by one: a product of few rows rounds differently with their number.
         sentences = [self._sentence(request) for request in requests]

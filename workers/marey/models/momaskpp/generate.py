@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -12,17 +11,16 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.bundles.body import layout_of
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
+from marey.generation.base import GroupedGenerator
+from marey.generation.groups import RowWatcher
 from marey.generation.kept import bridged, whole_tokens
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
+from marey.generation.port import GenerationControl, Limits, Request, open_bundle
 from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
 from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, ScaleItems, bucket_of, decode
 from marey.models.momaskpp.model import ROOT_VELOCITY, RootRefiner, inputs_of
 from marey.models.momaskpp.words import WordReader, pad_states
-from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import draw_class, uniform
@@ -62,8 +60,10 @@ class Generated:
     features: NDArray[np.float32]  # (Tf, D), in the layout's own units
 
 
-class Generator:
+class Generator(GroupedGenerator[SamplingSettings, Generated]):
     """A loaded bundle. Not thread-safe; one per process."""
+
+    sampling = SamplingSettings
 
     def __init__(
         self,
@@ -74,19 +74,14 @@ class Generator:
         device: torch.device,
         batch_threads: BatchThreads,
     ) -> None:
-        self.bundle = bundle
+        limits = Limits(
+            config.min_frames, config.max_frames, config.fps, config.text.width, keeps=config.tokenizer.frames_per_token
+        )
+        super().__init__(bundle, limits, config.inference, device, torch.float32, batch_threads)
         self.config = config
         self.networks = networks
         self.tokenizer = networks.tokenizer
         self.reader = reader
-        self.device = device
-        self.dtype = torch.float32
-        self.batch_threads = batch_threads
-        self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(
-            config.min_frames, config.max_frames, config.fps, config.text.width, keeps=config.tokenizer.frames_per_token
-        )
-        self.batch = MAX_ROWS
         self.scales = networks.tokenizer.scales
 
     @classmethod
@@ -142,49 +137,17 @@ class Generator:
         inference = (settings or SamplingSettings()).inference(self.config.inference)
         frames = [self.frames(request) for request in requests]
         words = self.reader.states([request.text.rewritten for request in requests])
-        results: list[Generated | None] = [None] * len(requests)
-        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
-        steps = StepCounter(control or NoControl(), len(groups) * (inference.steps + 1))
 
-        def make(rows: list[int]) -> None:
-            watcher = RowWatcher(steps, rows)
-            if watcher.rows:
-                own = watcher.rows
-                items = self._items([requests[r] for r in own], [frames[r] for r in own], [words[r] for r in own])
-                items = decode(self.networks.masked, items, self.scales, inference, watcher.step)
-                for position, row in enumerate(watcher.rows):
-                    results[row] = self._generated(items, position, frames[row])
-                if watcher.rows:
-                    watcher.step()
+        def draw(watcher: RowWatcher) -> list[Generated]:
+            own = watcher.rows
+            items = self._items([requests[r] for r in own], [frames[r] for r in own], [words[r] for r in own])
+            items = decode(self.networks.masked, items, self.scales, inference, watcher.step)
+            return [self._generated(items, position, frames[row]) for position, row in enumerate(watcher.rows)]
 
-        with self.batch_threads.open():
-            self.batch_threads.map(make, groups)
-        return results
+        return self._in_groups(frames, inference.steps + 1, control, draw)
 
-    def settings(self, values: Mapping[str, Any]) -> SamplingSettings:
-        """Check an item's settings. Raises InvalidInput."""
-        settings = read_settings(SamplingSettings, values, InferenceConfig.__dataclass_fields__)
-        settings.inference(self.config.inference)
-        return settings
-
-    def describe_settings(self, settings: SamplingSettings) -> dict[str, Any]:
-        """Return all settings that decide how tokens are drawn."""
-        return asdict(settings.inference(self.config.inference))
-
-    def resolve_length(self, request: Request) -> Request:
-        """Return the request with a length; a missing one is drawn with the request's seed."""
-        return replace(request, frames=self.frames(request))
-
-    def frames(self, request: Request) -> int:
-        """Return the feature frames: as requested, drawn by the length estimator, or, where the bundle has none, one of
-        its `open_frames`.
-
-        Raises:
-            InvalidInput: as `Limits.check`.
-        """
-        self.limits.check(request)
-        if request.frames is not None:
-            return request.frames
+    def _estimate(self, request: Request) -> int:
+        """Return frames drawn by the length estimator, or, where the bundle has none, one of its `open_frames`."""
         if self.networks.length is None:
             seeds = torch.tensor([request.seed], device=self.device)
             draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
@@ -192,19 +155,11 @@ class Generator:
             return choices[min(int(draw * len(choices)), len(choices) - 1)]
         # From the middle third of the estimated distribution (ours): seeds differ, without extremes.
         sentence = torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
-        with torch.inference_mode():
-            tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
-        return min(max(tokens * self.frames_per_token, self.config.min_frames), self.config.max_frames)
-
-    def bucket(self, request: Request) -> int:
-        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
-        return self._bucket(self.frames(request))
+        tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
+        return self.limits.within(tokens * self.frames_per_token)
 
     def _bucket(self, frames: int) -> int:
         return bucket_of(self._tokens(frames), BUCKET, self.scales.longest)
-
-    def _tokens(self, frames: int) -> int:
-        return -(-frames // self.frames_per_token)
 
     def _items(
         self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]

@@ -1,0 +1,161 @@
+"""What the generators of Marey's models share: reading of settings, open lengths, and passes over groups of equal
+length. A model may have its own instead: `marey.generation.port.Generator` is all that others know of it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
+
+import torch
+
+from marey.bundles import Bundle
+from marey.bundles.body import layout_of
+from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, read_settings
+from marey.motion.features import FeatureLayout
+from marey.nn.batch_threads import BatchThreads
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+class Sampling(Protocol):
+    """A model's own sampling settings: a dataclass, in which None = the bundle's value."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def inference(self, default: Any) -> Any:
+        """Return the bundle's values with these changes.
+
+        Raises:
+            InvalidInput: a value out of range.
+        """
+        ...
+
+
+P = TypeVar("P", bound=Sampling)
+"""Sampling settings of a model."""
+G = TypeVar("G")
+"""What a model generates of one request."""
+
+
+class SampledGenerator(Generic[P]):
+    """A generator whose bundle holds a value of every setting.
+
+    Attributes:
+        sampling: the model's settings.
+        inference: the bundle's values of them, and of other numbers that no request changes.
+    """
+
+    sampling: type[P]
+    inference: DataclassInstance
+
+    def settings(self, values: Mapping[str, Any]) -> P:
+        """Check an item's settings: numbers that both the model's settings and the bundle's values have.
+
+        Raises:
+            InvalidInput: an unknown setting, or a value out of range.
+        """
+        own = {each.name for each in fields(self.sampling)}
+        known = [each.name for each in fields(self.inference) if each.name in own]
+        settings = read_settings(self.sampling, values, known)
+        settings.inference(self.inference)
+        return settings
+
+    def describe_settings(self, settings: P) -> dict[str, Any]:
+        """Return all settings that decide how tokens are drawn: the bundle's, with these changes."""
+        return asdict(settings.inference(self.inference))
+
+
+class GroupedGenerator(SampledGenerator[P], ABC, Generic[P, G]):
+    """A generator that knows lengths beforehand, and draws motions of one bucket of lengths in one pass."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        limits: Limits,
+        inference: DataclassInstance,
+        device: torch.device,
+        dtype: torch.dtype,
+        batch_threads: BatchThreads,
+    ) -> None:
+        self.bundle = bundle
+        self.layout: FeatureLayout = layout_of(bundle.manifest)
+        self.limits = limits
+        self.inference = inference
+        self.device = device
+        self.dtype = dtype
+        self.batch = MAX_ROWS
+        self.batch_threads = batch_threads
+
+    @property
+    @abstractmethod
+    def frames_per_token(self) -> int:
+        """Return N/n, the frames of a token."""
+
+    @abstractmethod
+    def _estimate(self, request: Request) -> int:
+        """Return the frames of a request that names no length, drawn with its seed."""
+
+    @abstractmethod
+    def _bucket(self, frames: int) -> int:
+        """Return the tokens of a length, rounded up to its bucket."""
+
+    def _tokens(self, frames: int) -> int:
+        """Return the tokens that a length takes."""
+        return -(-frames // self.frames_per_token)
+
+    def frames(self, request: Request) -> int:
+        """Return the feature frames: as requested, or drawn with the request's seed.
+
+        Raises:
+            InvalidInput: as `Limits.check`.
+        """
+        self.limits.check(request)
+        if request.frames is not None:
+            return request.frames
+        with torch.inference_mode():
+            return self._estimate(request)
+
+    def resolve_length(self, request: Request) -> Request:
+        """Return the request with a length; a missing one is drawn with the request's seed."""
+        return replace(request, frames=self.frames(request))
+
+    def bucket(self, request: Request) -> int:
+        """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
+        return self._bucket(self.frames(request))
+
+    def _in_groups(
+        self,
+        frames: Sequence[int],
+        steps: int,
+        control: GenerationControl | None,
+        draw: Callable[[RowWatcher], Sequence[G]],
+    ) -> list[G | None]:
+        """Draw motions in groups of one bucket, on the batch threads; None where `control` dropped one.
+
+        Args:
+            frames: of each motion.
+            steps: of a group, the last of which is counted after `draw`.
+            control: of the batch; None = it reports nothing and drops nothing.
+            draw: function that generates the rows of a group, and returns those that its watcher still has at the end.
+        """
+        results: list[G | None] = [None] * len(frames)
+        groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
+        counter = StepCounter(control or NoControl(), len(groups) * steps)
+
+        def make(rows: list[int]) -> None:
+            watcher = RowWatcher(counter, rows)
+            if not watcher.rows:
+                return
+            drawn = draw(watcher)
+            for row, motion in zip(watcher.rows, drawn, strict=True):
+                results[row] = motion
+            if watcher.rows:
+                watcher.step()
+
+        with self.batch_threads.open():
+            self.batch_threads.map(make, groups)
+        return results
