@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Collection, Mapping
 from enum import Enum, StrEnum
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from marey.cli.signatures import replace_parameter
 from marey.motion.export_options import ExportOptions
 
 
@@ -156,17 +156,7 @@ def with_export(
             export = ExportOptions(**{name: _plain(given.pop(name)) for name in chosen})
             command(*args, **given, export=export)
 
-        own = inspect.signature(command, eval_str=True)
-        options = [
-            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation)
-            for name, (annotation, default) in chosen.items()
-        ]
-        parameters = [
-            each
-            for parameter in own.parameters.values()
-            for each in (options if parameter.name == "export" else [parameter])
-        ]
-        run.__signature__ = own.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
+        replace_parameter(run, "export", chosen)
         return run
 
     return decorate

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from marey.cli.signatures import replace_parameter
 from marey.core.errors import InvalidInput
 from marey.motion.edits.operation import value_of_text
 from marey.motion.edits.table import OPERATIONS
@@ -35,21 +35,17 @@ class OperationsCommand(TyperCommand):
 
 def with_operations(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the options of all operations in place of its `**operations`."""
-    signature = inspect.signature(command, eval_str=True)
-    common = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-    options = [
-        inspect.Parameter(
-            option.strip("-").replace("-", "_") + "_",
-            inspect.Parameter.KEYWORD_ONLY,
-            default=None if metavar else False,
-            annotation=Annotated[
+    options: dict[str, tuple[Any, object]] = {
+        option.strip("-").replace("-", "_") + "_": (
+            Annotated[
                 list[str] | None if metavar else bool,
                 typer.Option(option, metavar=metavar or None, help=about, show_default=False),
             ],
+            None if metavar else False,
         )
         for option, (metavar, about) in _options().items()
-    ]
-    command.__signature__ = signature.replace(parameters=[*common, *options])  # pyright: ignore[reportFunctionMemberAccess]
+    }
+    replace_parameter(command, "operations", options)
     return command
 
 

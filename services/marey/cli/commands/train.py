@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, MutableMapping
 from enum import StrEnum
 from pathlib import Path
@@ -12,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from marey.cli import console
+from marey.cli.signatures import replace_parameter
 from marey.core.errors import InvalidInput
 from marey.registry import Training, trainings
 
@@ -212,22 +212,18 @@ def _given(choices: Mapping[str, StrEnum | None]) -> dict[str, str]:
 
 
 def _with_choices(command: Callable[..., None], training: Training) -> Callable[..., None]:
-    """Put the model's own options into the signature of a command, which typer reads."""
-    signature = inspect.signature(command, eval_str=True)
-    common = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-    own = [
-        inspect.Parameter(
-            choice.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=None,
-            annotation=Annotated[
+    """Give a command the model's own options in place of its `**choices`."""
+    own: dict[str, tuple[Any, object]] = {
+        choice.name: (
+            Annotated[
                 StrEnum(choice.name.title(), {value.upper(): value for value in choice.values}) | None,  # pyright: ignore[reportArgumentType]
                 typer.Option(f"--{choice.name}", help=choice.help),
             ],
+            None,
         )
         for choice in training.choices
-    ]
-    command.__signature__ = signature.replace(parameters=[*common, *own])  # pyright: ignore[reportFunctionMemberAccess]
+    }
+    replace_parameter(command, "choices", own)
     return command
 
 
