@@ -34,27 +34,15 @@ class SeveralTexts:
         return save({ENTRY: np.frombuffer(b"".join(parts), np.uint8)})
 
     @classmethod
-    def of_blob(cls, blob: bytes) -> tuple[TextFeatures, ...]:
-        """Return the features in a blob that must hold several.
+    def from_blob(cls, blob: bytes) -> SeveralTexts:
+        """Decode the output of `to_blob`.
 
         Raises:
-            InvalidFile: it holds something else.
-        """
-        several = cls.from_blob(blob)
-        if several is None:
-            raise InvalidFile("these are not the text features of several prompts", where=ENTRY, hint=HINT)
-        return several.texts
-
-    @classmethod
-    def from_blob(cls, blob: bytes) -> SeveralTexts | None:
-        """Decode the output of `to_blob`; None for any other safetensors.
-
-        Raises:
-            InvalidFile: damaged, or of another version.
+            InvalidFile: it holds something else, is damaged, or of another version.
         """
         arrays = parse_safetensors(blob, ENTRY)
         if ENTRY not in arrays:
-            return None
+            raise InvalidFile("these are not the text features of several prompts", where=ENTRY, hint=HINT)
         try:
             if arrays[ENTRY].dtype != np.uint8 or arrays[ENTRY].ndim != 1:
                 raise ValueError("it holds other than bytes")

@@ -123,12 +123,12 @@ def test_the_rows_of_a_timeline_are_read_one_by_one(handler: TextHandler) -> Non
     assert isinstance(first, TextDone)
     assert isinstance(second, TextDone)
     assert first.key == claimed[0].text_key
-    texts = SeveralTexts.of_blob(first.blob)
+    texts = SeveralTexts.from_blob(first.blob).texts
     assert [text.prompt for text in texts] == ["a person walks", "a person bows"]
     (alone,) = handler.run(batch(items("a person bows")), FakeControl())
     assert isinstance(alone, TextDone)
     assert texts[1].to_blob() == alone.blob
-    assert SeveralTexts.from_blob(second.blob) is None
+    assert TextFeatures.from_blob(second.blob).prompt == "someone kicks"
 
 
 def test_a_timeline_taken_with_other_weights_is_refused(handler: TextHandler) -> None:

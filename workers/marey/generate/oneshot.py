@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
-from marey.items.timeline import prompts_with_rows, timeline_rows
+from marey.items.timeline import prompts_with_rows
 from marey.registry import get_model, resolve
 from marey.vocabulary.scope import ActionLists, Scope, match_scope, scope_of_rows
 
@@ -80,26 +80,14 @@ class OneShot:
         return (scopes[0] if wanted.timeline is None else scope_of_rows(scopes)).as_json()
 
     def _requests(self, wanted: Sequence[Wanted]) -> list[Request]:
-        from marey.generation.candidates import split_settings
-        from marey.generation.constraints.draw import constrained_request
-        from marey.generation.port import Request
-        from marey.generation.shots.dispatch import resolve_request, timeline_request
+        from marey.generation.requests import request_of
 
         prompts = [[prompt for _, prompt in prompts_with_rows(each.prompt, each.timeline)] for each in wanted]
         features = iter(self._text.features([prompt for each in prompts for prompt in each]))
-        found: list[Request] = []
-        for each, of_item in zip(wanted, prompts, strict=True):
-            texts, scope = [next(features) for _ in of_item], self._scope(each)
-            if each.timeline is None:
-                frames = self._generator.limits.frames_of(each.seconds, texts[0])
-                request = Request(texts[0], each.seed, frames, scope=scope)
-            else:
-                request = timeline_request(timeline_rows(each.timeline), texts, each.seed, scope)
-            if each.constraints:
-                fps = split_settings(each.settings)[1].fps
-                request = constrained_request(self._generator, request, each.constraints, each.seconds, fps)
-            found.append(resolve_request(self._generator, request))
-        return found
+        return [
+            request_of(self._generator, each, [next(features) for _ in of_item], self._scope(each))
+            for each, of_item in zip(wanted, prompts, strict=True)
+        ]
 
     def editor(self, settings: Mapping[str, Any]) -> EditModel:
         """Return the model for operations that generate frames.

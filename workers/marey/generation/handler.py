@@ -14,13 +14,13 @@ from marey.core.settings import Settings
 from marey.editing.handler import edited
 from marey.exporters import exporters
 from marey.generation.candidates import best_clips, split_settings
-from marey.generation.constraints.draw import constrained_clips, constrained_request
+from marey.generation.constraints.draw import constrained_clips
 from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
-from marey.generation.shots.dispatch import bucket_of, generate_any, resolve_request, timeline_request
+from marey.generation.requests import request_of
+from marey.generation.shots.dispatch import bucket_of, generate_any
 from marey.generation.shots.editor import EditModel
-from marey.items.timeline import timeline_rows
 from marey.jobs import ClaimedItem
 from marey.runtime.editing import EditInput
 from marey.runtime.exporting import export_clip
@@ -80,10 +80,6 @@ class GeneratorHandler(Generic[S]):
         for item in batch.items:
             try:
                 request = self._request(item, batch.features[item.text_key])
-                if item.constraints:
-                    fps = split_settings(item.settings)[1].fps
-                    request = constrained_request(self.generator, request, item.constraints, item.seconds, fps)
-                request = resolve_request(self.generator, request)
                 self._requests[item.id] = request
                 buckets[bucket_of(self.generator, request)].append(item)
             except MareyError as error:
@@ -119,7 +115,7 @@ class GeneratorHandler(Generic[S]):
         (item,) = batch.items
         assert item.edits is not None  # all items of a claim are edits, or none is
         started = time.monotonic()
-        texts = {text.prompt: text for text in SeveralTexts.of_blob(batch.features[item.text_key])}
+        texts = {text.prompt: text for text in SeveralTexts.from_blob(batch.features[item.text_key]).texts}
         model = EditModel.of(self.generator, item.settings, texts.__getitem__, control=_Rows([item], control))
         try:
             export = edited(item.edits, given, model)
@@ -172,11 +168,10 @@ class GeneratorHandler(Generic[S]):
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
         if item.timeline is not None:
-            return timeline_request(timeline_rows(item.timeline), SeveralTexts.of_blob(blob), item.seed, item.scope)
+            return request_of(self.generator, item, SeveralTexts.from_blob(blob).texts, item.scope)
         recording = StreamRecording.from_blob(blob)
         text = TextFeatures.from_blob(blob) if recording is None else recording.text
-        frames = self.generator.limits.frames_of(item.seconds, text)
-        return Request(text, item.seed, frames, recording, item.scope)
+        return request_of(self.generator, item, [text], item.scope, recording)
 
 
 class _Rows:
