@@ -24,6 +24,7 @@ from marey.items.constraints import ROOT_PATH, check_clip, ended_with_clip, last
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.clip import MotionClip
 from marey.motion.resample import frame_times
+from marey.motion.skeleton import Skeleton
 from marey.quality.selection import KEY, Selection
 
 CANDIDATES = 8
@@ -70,10 +71,7 @@ def constrained_request(
     known = resolve_request(generator, request)
     if seconds is None and request.timeline is None:
         known = replace(known, frames=_reaching(known, constraints, limits, rate))
-    frames = _frames(known, limits)
-    if frames is not None:
-        asked, count = _checked(constraints, frames, limits.fps, rate)
-        asked_of(asked, generator.layout.skeleton, count, rate)
+    _asked(constraints, known, limits, generator.layout.skeleton, rate)
     return known
 
 
@@ -93,19 +91,24 @@ def _reaching(known: Request, constraints: Constraints, limits: Limits, rate: fl
     return None if known.frames is None else max(known.frames, least)
 
 
-def _frames(request: Request, limits: Limits) -> int | None:
-    """Return the length of a request in frames of the model; None = it decides."""
+def _asked(
+    constraints: Constraints, request: Request, limits: Limits, skeleton: Skeleton, rate: float
+) -> ConstraintSet:
+    """Check constraints against the clip of a request, the longest one if the model decides its length, and return them
+    as arrays.
+
+    Raises:
+        InvalidInput: constraints beyond the clip, of another skeleton, or that contradict one another.
+    """
     if request.timeline is not None:
-        return plan_timeline(request.timeline, request.seed, limits).frames
-    return request.frames
-
-
-def _checked(constraints: Constraints, frames: int, model_rate: float, rate: float) -> tuple[Constraints, int]:
-    """Check constraints against a clip, and return them as they are for it, with its number of frames."""
-    count = len(frame_times(frames, model_rate, rate))
+        frames = plan_timeline(request.timeline, request.seed, limits).frames
+    else:
+        frames = request.frames or limits.max_frames
+    count = len(frame_times(frames, limits.fps, rate))
     constraints = ended_with_clip(constraints, count, rate)
     check_clip(constraints, count, rate)
-    return constraints, count
+    asked = asked_of(constraints, skeleton, count, rate)
+    return asked if request.timeline is None else replace(asked, retimed=False)
 
 
 def constrained_clips(
@@ -120,22 +123,19 @@ def constrained_clips(
 ) -> list[MotionClip | None]:
     """Return a clip of each request that meets its constraints; None where `control` dropped the request.
 
-    Each faces +Z at the origin in frame 0; its `placement` leads to the space of the constraints. Its quality record
-    has the errors.
+    Requests have the length that `constrained_request` gave them. Each clip faces +Z at the origin in frame 0; its
+    `placement` leads to the space of the constraints. Its quality record has the errors.
 
     Raises:
         InvalidInput: constraints beyond a clip, of another skeleton, or that contradict each other; or as
             `Generator.generate`.
     """
     skeleton = (body or standard_body(generator.layout.skeleton)).skeleton
-    rate, model_rate = plan.fps or generator.layout.fps, generator.layout.fps
-    rows: list[_Drawn] = []
-    for request, each in zip(requests, constraints, strict=True):
-        known = resolve_request(generator, request)
-        frames = _frames(known, generator.limits) or generator.limits.max_frames
-        own, count = _checked(each, frames, model_rate, rate)
-        asked = asked_of(own, skeleton, count, rate)
-        rows.append(_Drawn(known, each, asked if request.timeline is None else replace(asked, retimed=False)))
+    rate = plan.fps or generator.layout.fps
+    rows = [
+        _Drawn(request, each, _asked(each, request, generator.limits, skeleton, rate))
+        for request, each in zip(requests, constraints, strict=True)
+    ]
     candidates = max(CANDIDATES, plan.candidates)
     scale = travel_scale(generator.layout.skeleton, skeleton)
     for number in range(candidates):
