@@ -132,9 +132,9 @@ def test_an_error_says_in_the_log_what_clients_are_not_told() -> None:
     assert "db-7:5432" in str(error)
 
 
-def test_a_worker_of_edits_has_no_model(engine: sa.Engine) -> None:
+def test_a_worker_that_generates_nothing_has_no_model(engine: sa.Engine) -> None:
     check = ModelCheck(engine)
-    for queue, bundle in (("edit", "edit"), ("text", "light")):
+    for queue, bundle in (("edit", "edit"), ("text", "light"), ("evaluator", "evaluator-starter@0")):
         with transaction(engine) as conn:
             beat(conn, WorkerHeartbeat(queue, queue, "host", 7, "cpu", bundle))
         with pytest.raises(Unreachable, match="no worker has its model loaded yet"):

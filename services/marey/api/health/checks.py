@@ -8,11 +8,11 @@ from marey.api.readiness import DependencyCheck
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
 from marey.db import check_revision, transaction
-from marey.jobs import EDIT_QUEUE, TEXT_QUEUE, list_schedulers, list_workers
+from marey.jobs import EDIT_QUEUE, EVALUATOR_QUEUE, TEXT_QUEUE, list_schedulers, list_workers
 from marey.runtime.queue import check_queue
 from marey.storage import AssetStore
 
-WITHOUT_MODEL = frozenset({TEXT_QUEUE, EDIT_QUEUE})
+WITHOUT_MODEL = frozenset({TEXT_QUEUE, EDIT_QUEUE, EVALUATOR_QUEUE})
 """Queues whose workers generate nothing."""
 
 
