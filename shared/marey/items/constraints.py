@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
+from marey.core.characters import check_text, is_printable
 from marey.core.errors import InvalidInput
 
 Constraint = dict[str, Any]
@@ -32,7 +33,7 @@ HIGHEST, LOWEST = 2.6, -0.1
 """Heights in metres that a body on the floor reaches."""
 FARTHEST = 1.2
 """Metres on the floor between a body on its path and what it reaches."""
-MAX_JOINTS = 200
+MAX_JOINTS, MAX_JOINT_NAME = 200, 100
 AGREE, NEAR_PATH = 0.03, 0.25
 """Metres: two targets of one joint at one frame are the same up to the first, and a root on a path up to the second."""
 UNIT = 0.02
@@ -298,19 +299,26 @@ def _motion(value: object, where: str) -> dict[str, Any]:
     name = given[named[0]]
     if not isinstance(name, str) or not 0 < len(name) <= 1024:
         raise InvalidInput("is not a name", where=f"{where}.{named[0]}")
+    check_text(name, where=f"{where}.{named[0]}")
     return {named[0]: name, "frame": _frame(given.get("frame"), f"{where}.frame")}
 
 
 def _rotations(value: object, where: str) -> dict[str, list[float]] | list[list[float]]:
     if isinstance(value, Mapping):
         given = cast("Mapping[object, object]", value)
-        if not 0 < len(given) <= MAX_JOINTS or not all(isinstance(name, str) for name in given):
+        if not 0 < len(given) <= MAX_JOINTS:
             raise InvalidInput(f"has {len(given)} joints; 1 to {MAX_JOINTS}", where=where)
-        return {str(name): _quaternion(turn, f"{where}.{str(name)[:40]}") for name, turn in given.items()}
+        return {_joint(name, where): _quaternion(turn, f"{where}.{str(name)[:40]}") for name, turn in given.items()}
     turns = _items(value, where, "quaternions [w, x, y, z] by the name of the joint, or a list of them")
     if not 0 < len(turns) <= MAX_JOINTS:
         raise InvalidInput(f"has {len(turns)} joints; 1 to {MAX_JOINTS}", where=where)
     return [_quaternion(turn, f"{where}.{k}") for k, turn in enumerate(turns)]
+
+
+def _joint(name: object, where: str) -> str:
+    if not isinstance(name, str) or not 0 < len(name) <= MAX_JOINT_NAME or not is_printable(name):
+        raise InvalidInput(f"{ascii(name)[:60]} is not the name of a joint", where=where)
+    return name
 
 
 def _quaternion(value: object, where: str) -> list[float]:

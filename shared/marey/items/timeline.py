@@ -25,7 +25,12 @@ SEPARATOR = ";"
 TIME_DIGITS = 3
 """Decimal places of times; more are rounded."""
 TIMELINE_HINT = "Choose a bundle of the default model, or submit each row as a prompt."
-_ROW = re.compile(r"\s*(\d+(?:\.\d+)?)\s*s?\s*[-–]\s*(\d+(?:\.\d+)?)\s*s?(?![\w.-])[\s:,]*(.*)", re.DOTALL)
+_ROW = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*s)?\s*[-–]\s*(\d+(?:\.\d+)?)(?:\s*s)?(?![\w.-])[\s:,]*(.*)", re.DOTALL)
+"""Its time grows with the length of the text, not with its square: no two parts share a stretch of spaces."""
+_BETWEEN = " :,"
+"""Characters between the times and the prompt, beside other whitespace."""
+_UNIT = re.compile(r"s(?![\w.-])")
+"""A prompt that would be read as the unit of the time before it."""
 _FORM = "write START-END and a prompt, as 0-3 a person walks; 3-5 a person waves"
 _FIELDS = ("start", "end", "prompt")
 
@@ -45,7 +50,8 @@ class TimelineRow:
     prompt: str
 
     def __str__(self) -> str:
-        return f"{self.times} {self.prompt}"
+        colon = ":" if _UNIT.match(self.prompt) else ""
+        return f"{self.times}{colon} {self.prompt}"
 
     @property
     def times(self) -> str:
@@ -165,16 +171,18 @@ def _time(number: int, name: str, value: object) -> float:
 
 
 def _row(number: int, start: float, end: float, prompt: str) -> TimelineRow:
-    if SEPARATOR in prompt:
-        raise InvalidInput(f"row {number}: the prompt holds {SEPARATOR!r}, which separates rows: use a comma")
-    if not prompt.strip():
+    if not prompt.strip(_BETWEEN):
         raise InvalidInput(f"row {number} has no prompt: {_FORM}")
     try:
-        text = check_prompt(prompt)
+        text = check_prompt(prompt).lstrip(_BETWEEN)
     except InvalidInput as error:
         raise InvalidInput(f"row {number}: {error.message}", hint=error.hint) from error
+    if SEPARATOR in text:  # a Greek question mark becomes one
+        raise InvalidInput(f"row {number}: the prompt holds {SEPARATOR!r}, which separates rows: use a comma")
     start, end = round(start, TIME_DIGITS), round(end, TIME_DIGITS)
-    if not (math.isfinite(start) and math.isfinite(end)) or start < 0:
+    if not math.isfinite(end):
+        raise InvalidInput(f"row {number} ends after {MAX_TIMELINE_SECONDS:g} s, the longest timeline")
+    if not math.isfinite(start) or start < 0:
         raise InvalidInput(f"row {number} begins at {start:g}; times count from 0")
     return TimelineRow(start + 0.0, end, text)
 

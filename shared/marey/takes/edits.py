@@ -26,8 +26,8 @@ from marey.jobs import (
     tables,
 )
 from marey.jobs.motions import get_motion
-from marey.motion.edits.editing import MOST_FRAMES
 from marey.motion.edits.licences import strictest
+from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import Step, pieces_of, read_steps
 from marey.takes.model_edits import EditGenerator, check_generator, with_prompts

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from marey.core.errors import Conflict
 from marey.db import transaction
 from marey.jobs import cancel, claim, list_items, tables
-from marey.motion.edits.editing import MOST_FRAMES
+from marey.motion.edits.operation import MOST_FRAMES
 from marey.takes import Erasure, NewEdit, collect_garbage, delete, erase, rewrite_files, submit_edit
 from marey.tenants import DEFAULT_TENANT, Quotas, create_key, create_tenant
 from tests.integration.takes.test_retention import SECRET, dump, objects

@@ -84,6 +84,7 @@ def test_any_json_is_read_or_refused_with_a_field(value: list[Any]) -> None:
     else:
         refused = "constraints"
         assert read_constraints(read) == read
+        assert "\0" not in json.dumps(read, ensure_ascii=False).encode().decode()  # what a database can hold
     assert refused.startswith("constraints")
 
 
@@ -114,6 +115,11 @@ def changed(base: dict[str, Any], **changes: Any) -> dict[str, Any]:
         ([POSE, POSE], "constraints.1.frame", "same frame 20"),
         ([changed(POSE, motion={"file": "x", "frame": 0})], "constraints.0", "either `motion` or"),
         ([changed(MOTION, motion={"file": "x", "id": "y", "frame": 0})], "constraints.0.motion", "not a frame of"),
+        ([changed(POSE, joint_rotations={"a\0": [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
+        ([changed(POSE, joint_rotations={"\ud800": [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
+        ([changed(POSE, joint_rotations={"a" * 101: [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
+        ([changed(POSE, joint_rotations={"": [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
+        ([changed(MOTION, motion={"file": "a\0b", "frame": 0})], "constraints.0.motion.file", "NUL"),
         ([POSE] * 65, "constraints", "65 constraints; at most 64"),
         ([changed(PATH, frames=[*range(2001)], positions_xz=[[0, 0]] * 2001)], "constraints.0.frames", "2,001 points"),
     ],

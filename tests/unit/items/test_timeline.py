@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import pytest
@@ -25,7 +26,9 @@ def timelines(draw: st.DrawFn) -> list[dict[str, Any]]:
         words = draw(
             st.text(st.characters(codec="ascii", exclude_characters=";", categories=("L", "P", "N")), max_size=20)
         )
-        rows.append({"start": at / 1000, "end": end / 1000, "prompt": f"walk {words}".strip()})
+        first = draw(st.sampled_from(("walk", "s", "S", "3", "-", "s-walk a", "5 s. walk")))
+        prompt = f"{first} {words}".strip()
+        rows.append({"start": at / 1000, "end": end / 1000, "prompt": prompt if prompt[0] == "w" else f"{prompt} it"})
         at = end + draw(st.sampled_from((0, 0, 500, 1234)))
     return draw(st.permutations(rows))
 
@@ -76,6 +79,9 @@ def test_times_are_read_in_any_way_that_they_are_written(text: str) -> None:
         ("0-3", "row 1 has no prompt"),
         ("0-3 走る", "row 1: the prompt has no English words"),
         ([{"start": 0, "end": 3, "prompt": "walk; wave"}], "row 1: the prompt holds ';'"),
+        ([{"start": 0, "end": 3, "prompt": "walk\u037e 3-5 wave"}], "row 1: the prompt holds ';'"),
+        ([{"start": 0, "end": 3, "prompt": " :, "}], "row 1 has no prompt"),
+        ("0-" + "9" * 400 + " walk", "row 1 ends after 60 s"),
         ([{"start": 0, "end": "3", "prompt": "walk"}], "row 1: end is not a number"),
         ([{"start": 0, "end": True, "prompt": "walk"}], "row 1: end is not a number"),
         ([{"start": -1, "end": 3, "prompt": "walk"}], "row 1 begins at -1"),
@@ -90,6 +96,19 @@ def test_problems_name_the_row(value: object, message: str) -> None:
     with pytest.raises(InvalidInput) as error:
         read_timeline(value)
     assert error.value.message.startswith(message)
+
+
+def test_what_stands_between_times_and_prompt_is_no_part_of_it() -> None:
+    assert read_timeline([{"start": 0, "end": 3, "prompt": ", : a person walks"}]) == [WALK]
+
+
+@pytest.mark.parametrize("text", ["0" + " " * 19_000, "0-3" + " " * 19_000 + "-", "0 s" + " " * 19_000, "1" * 19_000])
+def test_a_long_text_is_read_in_time_that_grows_with_its_length(text: str) -> None:
+    """Spaces that two parts of the pattern share made it grow with the square: ten seconds for this."""
+    started = time.process_time()
+    with pytest.raises(InvalidInput):
+        read_timeline(text)
+    assert time.process_time() - started < 1
 
 
 def test_an_item_with_a_timeline_has_its_text_as_the_prompt() -> None:

@@ -362,6 +362,12 @@ def test_unknown_sides_are_not_mirrored():
         ([{"op": "feet", "mode": "soft"}], "'soft' is not lock or free or raw"),
         ([{"op": "concat", "with": ["a"]}], "is not the name of a motion"),
         ([{"op": "mirror"}] * 33, "33 operations"),
+        ([{"op": "speed", "factor": 0.1}] * 5, r"ops.4 \(speed\): the result would have 4e\+06 frames"),
+        ([{"op": "speed", "factor": 0.1}] * 32, r"ops.31 \(speed\): the result would have 4e\+33 frames"),
+        ([{"op": "speed", "factor": 0.1}, {"op": "fps", "rate": 1}, {"op": "fps", "rate": 240}] * 5, "would have"),
+        ([{"op": "extend", "seconds": 1, "seed": float("inf")}], "inf is not a whole number"),
+        ([{"op": "extend", "seconds": 1, "seed": float("nan")}], "nan is not a whole number"),
+        ([{"op": "extend", "seconds": 1, "seed": 10**400}], "is not a whole number"),
     ],
 )
 def test_what_cannot_be_done_is_said(ops, said):

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip, load_npz
 from marey.motion.edits.licences import strictest
+from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import at_origin
 from marey.motion.edits.steps import Step, pieces_of, read_steps
 
@@ -20,7 +21,6 @@ CYCLE = "loop"
 """Key of the record of a loop in a motion's manifest."""
 OUTDATED = ("quality", "selection", "travel", "travel_per_second", "timeline", "constraints")
 """Keys of a manifest that describe the frames of the source."""
-MOST_FRAMES = 100_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,8 @@ REQUIRED: Any = object()
 """Default of a parameter that has to be given."""
 
 LONGEST_SENTENCE = 2000
+MOST_FRAMES = 100_000
+"""Of a motion, before and after each operation."""
 
 Reader = Callable[[Any], Any]
 """Checks a value of JSON and returns it; raises ValueError with what is allowed."""
@@ -58,7 +60,8 @@ def whole(low: int, high: int) -> Reader:
     """Return a reader of whole numbers between two bounds, both allowed."""
 
     def read(value: Any) -> int:
-        fits = not isinstance(value, bool) and isinstance(value, int | float) and value == int(value)
+        fits = isinstance(value, int) or (isinstance(value, float) and value.is_integer())
+        fits = fits and not isinstance(value, bool)
         if not fits or not low <= value <= high:
             raise ValueError(f"a whole number from {low} to {high}")
         return int(value)

@@ -9,6 +9,7 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
+from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import posed
 from marey.motion.edits.prompt_frames import with_prompts_at
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
@@ -19,12 +20,12 @@ def change_speed(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     """Play `factor` times as fast at the same frame rate: frames between those of the source are interpolated.
 
     Raises:
-        InvalidInput: the motion is an open loop.
+        InvalidInput: the motion is an open loop, or the result would have too many frames.
     """
     factor = values["factor"]
     if abs(factor - 1.0) < 1e-12:
         return clip
-    count = int((clip.frames - 1) / factor + 1e-6) + 1
+    count = _limited((clip.frames - 1) / factor) + 1
     times = np.minimum(np.arange(count) * factor, clip.frames - 1)
     manifest = dict(clip.manifest)
     if "loop" in manifest:
@@ -46,15 +47,24 @@ def change_rate(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     frame.
 
     Raises:
-        InvalidInput: a rate out of bounds, or the motion is an open loop.
+        InvalidInput: a rate out of bounds, the motion is an open loop, or the result would have too many frames.
     """
     rate = values["rate"]
     if rate == clip.fps:
         return clip
+    _limited((clip.frames - 1) * rate / clip.fps)
     times = frame_times(clip.frames, clip.fps, rate)
     if "loop" in clip.manifest:
         times = _whole(clip, (clip.frames - 1) * rate / clip.fps)
     return _at(clip, times, rate, clip.manifest)
+
+
+def _limited(intervals: float) -> int:
+    """Return the number of whole intervals between frames; nothing was computed yet for too many of them."""
+    count = int(intervals + 1e-6)
+    if count >= MOST_FRAMES:
+        raise InvalidInput(f"the result would have {count + 1:.4g} frames; the most is {MOST_FRAMES}")
+    return count
 
 
 def _whole(clip: MotionClip, intervals: float) -> Array:
