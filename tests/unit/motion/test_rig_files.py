@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import struct
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,8 @@ from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints
 from marey.motion.rigs.rename import renamed
+from marey.motion.rigs.rig import MAX_JOINTS
+from marey.motion.rigs.words import read_names
 from marey.motion.rotations import angle_between
 from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
 from tests.support.changed_rigs import Change
@@ -200,6 +203,19 @@ def _outside(document):
     document["skins"][0]["joints"].append(9999)
 
 
+def _far(document):
+    document["nodes"][40]["translation"] = [0, 1e7, 0]
+
+
+def _infinite(document):
+    for node in document["nodes"]:
+        node["translation"] = [1e308, 1e308, 0]
+
+
+def _long_name(document):
+    document["nodes"][40]["name"] = "left_" * 60
+
+
 @pytest.mark.parametrize(
     ("change", "kind", "message"),
     [
@@ -210,6 +226,9 @@ def _outside(document):
         (_giant, InvalidInput, "83.1 m long: the unit of the file is wrong"),
         (_many, TooLarge, "over the limit of 2000"),
         (_outside, InvalidFile, "not there"),
+        (_far, TooLarge, "1e\\+07 m from the origin"),
+        (_infinite, InvalidFile, "holds NaN or infinite numbers"),
+        (_long_name, TooLarge, "has 300 characters, over the limit of 256"),
         (lambda document: document.clear(), InvalidFile, "holds no skeleton"),
         (lambda document: document["nodes"][3].update(translation=["a"]), InvalidFile, "cannot be read"),
     ],
@@ -217,6 +236,45 @@ def _outside(document):
 def test_a_bad_rig_is_refused_with_one_clear_message(change, kind, message):
     with pytest.raises(kind, match=message):
         RigBody.of(parse_gltf_rig(_document(change), "hero.gltf"))
+
+
+def _json_rig(parents):
+    """A rig in JSON whose names say nothing, one joint over another."""
+    joints = [
+        {"name": f"j{joint}", "parent": None if parent < 0 else f"j{parent}", "position": [joint % 7, joint, 0]}
+        for joint, parent in enumerate(parents)
+    ]
+    return json.dumps({"format": "marey-rig", "version": 1, "unit": 0.01, "up": "y", "joints": joints}).encode()
+
+
+@pytest.mark.parametrize(
+    "parents",
+    [
+        range(-1, MAX_JOINTS - 1),
+        [-1] + [0] * (MAX_JOINTS - 1),
+        [-1] + [0 if joint % 3 == 0 else joint for joint in range(MAX_JOINTS - 1)],
+        [-1] + [max(joint // 2 * 2 - 1, 0) for joint in range(MAX_JOINTS - 1)],
+    ],
+    ids=["chain", "star", "short chains", "comb"],
+)
+def test_the_parts_of_the_largest_rigs_are_looked_for_in_seconds(parents):
+    """A chain of a hundred joints took ten seconds, one of a thousand hours."""
+    data = _json_rig(parents)
+    started = time.process_time()
+    with pytest.raises(InvalidInput, match="no joint found"):
+        RigBody.of(parse_json_rig(data, "x.json"))
+    assert time.process_time() - started < 10
+
+
+def test_too_many_joints_are_refused_before_they_are_read():
+    with pytest.raises(TooLarge, match="30000 joints"):
+        parse_json_rig(_json_rig([-1] * 30_000), "x.json")
+
+
+@pytest.mark.parametrize("prefix", ["aA1 ", "L_", "DEF-", "a."])
+def test_names_with_a_prefix_many_times_are_read(prefix):
+    names = [prefix * 1000 + name for name in ("Hips", "LeftLeg", "RightLeg")]
+    assert len(read_names(names)) == 3
 
 
 def test_a_rig_that_is_not_there(tmp_path):

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.documents import parse_json
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, TooLarge
 from marey.motion.io.glb_write import JSON, MAGIC, VERSION
-from marey.motion.rigs.make_rig import RigNode, make_rig
+from marey.motion.rigs.make_rig import RigNode, check_count, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import normalize, to_matrix
 
@@ -53,7 +53,7 @@ def _rig(text: bytes, whole: bytes, where: str) -> Rig:
     document = parse_json(text, where)
     try:
         nodes, extras = _nodes(cast("Mapping[str, Any]", document), where)
-    except InvalidFile:
+    except (InvalidFile, TooLarge):
         raise
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError) as error:
         raise InvalidFile(f"its nodes cannot be read: {error}", where=where) from None
@@ -81,6 +81,7 @@ def _nodes(document: Mapping[str, Any], where: str) -> tuple[list[RigNode], dict
     if not all(0 <= bone < len(nodes) for bone in bones):
         raise InvalidFile("a skin names a node that is not there", where=where)
     kept = _with_relatives(bones, parents, nodes)
+    check_count(len(kept), where)
     matrices = _global_matrices(kept, nodes, parents)
     place = {node: index for index, node in enumerate(kept)}
     found = [
@@ -154,7 +155,8 @@ def _global_matrices(
     while waiting:
         above = waiting.pop()
         for node in below.get(above, []):
-            matrices[node] = matrices[above] @ _matrix(nodes[node])
+            with np.errstate(over="ignore", invalid="ignore"):  # `make_rig` refuses such numbers
+                matrices[node] = matrices[above] @ _matrix(nodes[node])
             waiting.append(node)
     return matrices
 

@@ -17,8 +17,8 @@ from typing import Any, cast
 import numpy as np
 
 from marey.core.documents import parse_json
-from marey.core.errors import InvalidFile
-from marey.motion.rigs.make_rig import RigNode, make_rig
+from marey.core.errors import InvalidFile, TooLarge
+from marey.motion.rigs.make_rig import RigNode, check_count, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rotations import Array, conjugate, multiply, rotate, to_matrix
 from marey.motion.units import Z_TO_Y
@@ -37,7 +37,7 @@ def parse_json_rig(data: bytes, where: str = "json") -> Rig:
     document = parse_json(data, where)
     try:
         return _rig(cast("Mapping[str, Any]", document), where, hashlib.sha256(data).hexdigest())
-    except InvalidFile:
+    except (InvalidFile, TooLarge):
         raise
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError) as error:
         raise InvalidFile(f"is not a rig: {error!r}", where=where, hint=SHAPE) from None
@@ -50,6 +50,7 @@ def _rig(document: Mapping[str, Any], where: str, sha256: str) -> Rig:
     if up not in ("y", "z") or not 1e-6 <= unit <= 1e6:
         raise InvalidFile("its unit must be metres as a number, and its axis y or z", where=where, hint=SHAPE)
     joints: list[Mapping[str, Any]] = document["joints"]
+    check_count(len(joints), where)
     index = {str(joint["name"]): number for number, joint in enumerate(joints)}
     if len(index) < len(joints):
         raise InvalidFile("two joints have one name", where=where)

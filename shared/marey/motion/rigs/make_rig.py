@@ -14,6 +14,10 @@ from marey.motion.rigs.rig import MAX_JOINTS, Rig
 from marey.motion.rotations import from_matrix, multiply, rotate
 from marey.motion.units import Z_TO_Y, Up
 
+MAX_NAME = 256
+"""Characters of the name of a joint."""
+FARTHEST = 1e6
+"""Metres from the origin to a joint; of numbers beyond it nothing could be computed."""
 EVEN = 0.01
 """Relative difference of a node's three scales, and cosine between its axes, up to which it is neither stretched nor
 sheared; exporters round."""
@@ -62,18 +66,26 @@ def make_rig(
     Raises:
         InvalidFile: no bones, a circle of parents, numbers that are not finite, or a node that is stretched, sheared,
             mirrored or without size.
-        TooLarge: over `MAX_JOINTS`.
+        TooLarge: over `MAX_JOINTS`, a longer name than `MAX_NAME`, or a joint farther away than `FARTHEST`.
     """
     if not any(node.bone for node in nodes):
         raise InvalidFile("holds no skeleton", where=where, hint="Export the character with its bones.")
-    if len(nodes) > MAX_JOINTS:
-        raise TooLarge(f"{len(nodes)} joints, over the limit of {MAX_JOINTS}", where=where)
+    check_count(len(nodes), where)
+    longest = max((node.name for node in nodes), key=len)
+    if len(longest) > MAX_NAME:
+        message = f"the name {longest[:20]!r}… has {len(longest):,} characters, over the limit of {MAX_NAME}"
+        raise TooLarge(message, where=where)
     order = _parents_first(nodes, where)
     place = {node: joint for joint, node in enumerate(order)}
     matrices = np.array([nodes[node].matrix for node in order], np.float64)
     names, repeated = _unique([nodes[node].name for node in order])
     sizes, axes = _split(matrices, names, where)
     orientations, positions = from_matrix(axes), matrices[:, :3, 3] * unit
+    far = np.abs(positions).max(axis=1)
+    if not (far <= FARTHEST).all():
+        joint = int(np.argmax(~(far <= FARTHEST)))
+        message = f"the node {names[joint]!r} is {far[joint]:.3g} m from the origin, over the limit of {FARTHEST:g}"
+        raise TooLarge(message, where=where)
     if up == "z":
         orientations, positions = multiply(Z_TO_Y, orientations), rotate(Z_TO_Y, positions)
     tips = np.array([nodes[node].tip or (np.nan,) * 3 for node in order], np.float64)
@@ -93,6 +105,16 @@ def make_rig(
         extras={**(extras or {}), "order": order},
         notes=(*notes, *repeated),
     )
+
+
+def check_count(joints: int, where: str) -> None:
+    """Check the number of joints; readers do it before they compute anything of each.
+
+    Raises:
+        TooLarge: over `MAX_JOINTS`.
+    """
+    if joints > MAX_JOINTS:
+        raise TooLarge(f"{joints} joints, over the limit of {MAX_JOINTS}", where=where)
 
 
 def _parents_first(nodes: Sequence[RigNode], where: str) -> list[int]:

@@ -6,7 +6,7 @@ The body stands upright in the rest pose and the toes point forward.
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Iterator, Set
 from itertools import combinations
 
 import numpy as np
@@ -16,24 +16,57 @@ from marey.motion.rigs.rig import Rig
 
 SHORT = 0.5
 """Length of a first bone relative to the next one, below which it is a hip or collar joint and no limb bone."""
+LIMB = 4
+"""Joints of a limb, with the one that it hangs on, at least."""
 ALIKE = 0.1
 """Relative difference in length of two chains that are a pair."""
 
 
+class _Tree:
+    """The joints of a rig that carry the body, with the longest way below each; each is computed once."""
+
+    def __init__(self, rig: Rig, controls: Set[int]) -> None:
+        self.rig = rig
+        self.children = [[child for child in below if child not in controls] for below in rig.children]
+        self.bones = [
+            float(np.linalg.norm(offset)) if parent >= 0 else 0.0
+            for offset, parent in zip(rig.offsets, rig.parents, strict=True)
+        ]
+        count = len(rig)
+        self.next = [-1] * count
+        """The child with the longest way below it, -1 at an end."""
+        self.joints = [1] * count
+        """Number of joints of the chain that begins here."""
+        ways = [0.0] * count
+        for joint in range(count - 1, -1, -1):  # children come after their parents
+            if below := self.children[joint]:
+                self.next[joint] = longest = max(below, key=lambda child: ways[child] + self.bones[child])
+                ways[joint] = ways[longest] + self.bones[longest]
+                self.joints[joint] = self.joints[longest] + 1
+
+    def chain(self, joint: int) -> list[int]:
+        """Return the joints from one down to the farthest end."""
+        chain: list[int] = []
+        while joint >= 0:
+            chain.append(joint)
+            joint = self.next[joint]
+        return chain
+
+    def length(self, joint: int) -> float:
+        """Return the length of a chain with the bone that leads to it, metres."""
+        return sum(self.bones[each] for each in self.chain(joint))
+
+
 def parts_by_shape(rig: Rig, controls: Set[int]) -> dict[str, int]:
     """Return the joints of the limbs and of the head; empty if there are no two pairs of limbs."""
-    chains = {joint: _chain(rig, joint, controls) for joint in range(len(rig)) if joint not in controls}
-    pairs: list[tuple[float, list[int], list[int]]] = []
-    for joint, children in enumerate(rig.children):
-        for a, b in combinations([child for child in children if child in chains], 2):
-            pairs += _pair(rig, [joint, *chains[a]], [joint, *chains[b]])
-    pairs.sort(key=lambda pair: -pair[0])
+    tree = _Tree(rig, controls)
+    pairs = sorted(_pairs(tree), key=lambda pair: -pair[0])
     if len(pairs) < 2:
         return {}
-    two = sorted(pairs[:2], key=lambda pair: min(rig.positions[pair[1] + pair[2], 1]))
-    legs, arms = two[0][1:], two[1][1:]
+    limbs = [[[joint, *tree.chain(child)] for child in pair] for _, joint, *pair in pairs[:2]]
+    legs, arms = sorted(limbs, key=lambda pair: min(rig.positions[pair[0] + pair[1], 1]))
     found: dict[str, int] = {}
-    forward = sum((_forward(rig, leg) for leg in legs), np.zeros(3))
+    forward = sum((_forward(tree, leg) for leg in legs), np.zeros(3))
     for names, limbs in (
         (("upper_leg", "lower_leg", "foot", "toes"), legs),
         (("upper_arm", "lower_arm", "hand"), arms),
@@ -42,60 +75,42 @@ def parts_by_shape(rig: Rig, controls: Set[int]) -> dict[str, int]:
         middle = np.mean([rig.positions[limb[1]] for limb in limbs], axis=0)
         for limb in limbs:
             side = int((rig.positions[limb[1]] - middle) @ left < 0)
-            bones = _without_short(rig, limb)
+            bones = _without_short(tree, limb)
             found.update({sided(side, part): joint for part, joint in zip(names, bones, strict=False)})
-    head = _head(rig, [arm[1] for arm in arms], chains)
+    head = _head(tree, [arm[1] for arm in arms], controls)
     return found if head is None else {**found, "head": head}
 
 
-def _chain(rig: Rig, joint: int, controls: Set[int]) -> list[int]:
-    """Return the joints from one down to the farthest end, along the child with the longest way below it."""
-    chain = [joint]
-    while True:
-        below = [child for child in rig.children[chain[-1]] if child not in controls]
-        if not below:
-            return chain
-        chain.append(max(below, key=lambda child: _way(rig, child, controls) + _bone(rig, child)))
+def _pairs(tree: _Tree) -> Iterator[tuple[float, int, int, int]]:
+    """Yield the mean length of two chains that mirror each other and are long enough for limbs, the joint that they
+    hang on, and the first joint of each."""
+    for joint, children in enumerate(tree.children):
+        limbs = [child for child in children if tree.joints[child] >= LIMB - 1]
+        long = {child: tree.length(child) for child in limbs} if len(limbs) > 1 else {}
+        for a, b in combinations(long, 2):
+            alike = abs(long[a] - long[b]) <= ALIKE * max(long[a], long[b], 1e-9)
+            if alike and tree.joints[a] == tree.joints[b]:
+                yield (long[a] + long[b]) / 2, joint, a, b
 
 
-def _way(rig: Rig, joint: int, controls: Set[int]) -> float:
-    waiting, longest = [(joint, 0.0)], 0.0
-    while waiting:
-        at, way = waiting.pop()
-        longest = max(longest, way)
-        waiting += [(child, way + _bone(rig, child)) for child in rig.children[at] if child not in controls]
-    return longest
-
-
-def _bone(rig: Rig, joint: int) -> float:
-    return float(np.linalg.norm(rig.offsets[joint])) if rig.parents[joint] >= 0 else 0.0
-
-
-def _pair(rig: Rig, a: list[int], b: list[int]) -> list[tuple[float, list[int], list[int]]]:
-    """Return two chains with their length if they mirror each other and are long enough for limbs."""
-    lengths = [sum(_bone(rig, joint) for joint in chain[1:]) for chain in (a, b)]
-    alike = abs(lengths[0] - lengths[1]) <= ALIKE * max(*lengths, 1e-9) and len(a) == len(b)
-    return [(sum(lengths) / 2, a, b)] if alike and len(a) >= 4 else []
-
-
-def _without_short(rig: Rig, limb: list[int]) -> list[int]:
+def _without_short(tree: _Tree, limb: list[int]) -> list[int]:
     """Return the joints of a limb from the beginning of its first long bone on."""
     joints = limb[1:]
-    while len(joints) > 3 and _bone(rig, joints[1]) < SHORT * _bone(rig, joints[2]):
+    while len(joints) > 3 and tree.bones[joints[1]] < SHORT * tree.bones[joints[2]]:
         joints = joints[1:]
     return joints
 
 
-def _forward(rig: Rig, leg: list[int]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _forward(tree: _Tree, leg: list[int]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the direction in the floor plane from the ankle to the end of the foot."""
-    bones = _without_short(rig, leg)
-    way = rig.positions[bones[-1]] - rig.positions[bones[min(2, len(bones) - 1)]]
+    bones, places = _without_short(tree, leg), tree.rig.positions
+    way = places[bones[-1]] - places[bones[min(2, len(bones) - 1)]]
     return way * np.array([1.0, 0.0, 1.0])
 
 
-def _head(rig: Rig, arms: list[int], chains: dict[int, list[int]]) -> int | None:
+def _head(tree: _Tree, arms: list[int], controls: Set[int]) -> int | None:
     """Return the joint above the neck: the second of the chain that rises between the arms."""
-    chest = rig.parents[arms[0]]
-    rising = [child for child in rig.children[chest] if child in chains and child not in arms]
-    rising = [child for child in rising if rig.positions[chains[child][-1], 1] > rig.positions[chest, 1]]
-    return chains[rising[0]][min(1, len(chains[rising[0]]) - 1)] if rising else None
+    chest, heights = tree.rig.parents[arms[0]], tree.rig.positions[:, 1]
+    chains = [tree.chain(child) for child in tree.children[chest] if child not in arms and child not in controls]
+    rising = next((chain for chain in chains if heights[chain[-1]] > heights[chest]), None)
+    return None if rising is None else rising[min(1, len(rising) - 1)]

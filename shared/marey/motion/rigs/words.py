@@ -15,6 +15,8 @@ _KINDS = frozenset(
     {"bind", "jnt", "joint", "bone", "def", "b", "base", "bip", "bip01", "bip001", "cc", "c", "j", "mixamorig"}
 )
 """Words that say what a node is, not where."""
+_HEAD = re.compile(r".{2,12}?[_\-. ](?=.*[A-Za-z])")
+"""A beginning of a name that more words follow."""
 _LETTER = re.compile(r"([lr])(?=[A-Z][a-z])|([lr])(?=[a-z])")
 CONTROL = frozenset(
     [
@@ -67,11 +69,12 @@ def read_names(names: Sequence[str]) -> list[NameWord]:
 
 def _without_prefix(names: list[str]) -> list[str]:
     """Return names without the beginning that most of them share, such as `CC_Base_` or `DEF-`."""
-    heads = Counter(found.group() for name in names if (found := re.match(r".{2,12}?[_\-. ](?=.*[A-Za-z])", name)))
-    for head, count in heads.most_common(1):
-        if count > 0.6 * len(names) and head.strip("_-. ").lower() not in _SIDES:
-            return _without_prefix([name.removeprefix(head) for name in names])
-    return names
+    while True:
+        heads = Counter(found.group() for name in names if (found := _HEAD.match(name)))
+        head, count = heads.most_common(1)[0] if heads else ("", 0)
+        if count <= 0.6 * len(names) or head.strip("_-. ").lower() in _SIDES:
+            return names
+        names = [name.removeprefix(head) for name in names]
 
 
 def _read(name: str, known: set[str]) -> NameWord:
