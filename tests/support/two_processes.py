@@ -1,27 +1,66 @@
-"""Work of the two processes in `tests/models/hgm3/test_two_processes.py`, each started by torchrun.
+"""Training of a tiny model by two processes, which torchrun starts on a CPU (gloo).
 
-torchrun --nproc-per-node=2 -m tests.support.two_processes FOLDER
+torchrun --nproc-per-node=2 -m tests.support.two_processes FOLDER MODEL
 """
 
 from __future__ import annotations
 
+import faulthandler
+import os
 import shutil
+import signal
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import torch
 import torch.distributed as dist
+from safetensors.torch import load_file
 
-from marey.models.hgm3.config import TINY, HGM3Config
-from marey.models.hgm3.train import train_stage
 from marey.nn import distributed
 from marey.nn.quantizer import ResidualQuantizer
-from marey.training import loop
+from marey.registry import Training, find_model, resolve
+from marey.training import loop, staging
 from marey.training.budget import Budget
+from marey.training.checkpoint import TrainingState, save_checkpoint
 from marey.training.staging import TrainOptions
+from tests.support.prepared import write_prepared
 
-STEPS = 6
+ROOT = Path(__file__).parents[2]
+STEPS = 4
+DEADLINE = 150
+"""Seconds after which a process that hangs says where, and ends."""
+
+
+def check_two_processes(folder: Path, model: str) -> set[str]:
+    """Train every stage of a model by two processes, and its tokenizer once more from half of its steps.
+
+    Returns:
+        The stages that have finished.
+    """
+    write_prepared(folder / "prepared")
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", "-m",
+               "tests.support.two_processes", str(folder), model]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment, start_new_session=True
+    ) as process:
+        try:
+            _, errors = process.communicate(timeout=DEADLINE + 20)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)  # the two processes too
+            raise
+    assert process.returncode == 0, errors[-3000:]
+    whole, resumed = (
+        load_file(folder / run / "tokenizer" / "part" / "weights.safetensors") for run in ("run", "again")
+    )
+    assert all((whole[name] == resumed[name]).all() for name in whole)
+    return {path.parent.parent.name for path in (folder / "run").glob("*/part/part.json")}
 
 
 def quantize_with_an_empty_process(first: int) -> None:
@@ -42,43 +81,57 @@ def check_equal(mine: torch.Tensor) -> None:
     assert torch.equal(mine, other), "the processes differ"
 
 
-def resume_exactly(options: TrainOptions[HGM3Config]) -> None:
+@contextmanager
+def checkpoint_at(step: int, copy: Path) -> Iterator[None]:
+    """Save a checkpoint after every step, and copy that of one step."""
+
+    def saving(stage: loop.TrainingStage, options: loop.RunOptions, config: dict[str, Any]) -> dict[str, float]:
+        metrics = loop.train(stage, replace(options, checkpoint_minutes=0.0), config)
+        for value in stage.module.state_dict().values():
+            check_equal(value)
+        return metrics
+
+    def copying(folder: Path, state: TrainingState, *rest: Any) -> None:
+        save_checkpoint(folder, state, *rest)
+        if state.step == step:
+            shutil.copytree(folder, copy)
+
+    with patch.object(staging, "train", saving), patch.object(loop, "save_checkpoint", copying):
+        yield
+
+
+def resume_exactly(training: Training, options: TrainOptions[Any]) -> None:
     """A tokenizer that is stopped at half of its steps and resumed is the one that is trained at once."""
-    saved: list[Path] = []
-    save = loop.save_checkpoint
-
-    def copying(folder: Path, state, *rest) -> None:
-        save(folder, state, *rest)
-        if state.step == STEPS // 2:
-            saved.append(shutil.copytree(folder, options.run.parent / "half"))
-
-    loop.save_checkpoint = copying
-    minutes = loop.RunOptions.checkpoint_minutes
-    loop.RunOptions.checkpoint_minutes = 0.0
-    try:
+    train_stage = resolve(training.train)
+    half = options.run.parent / "half"
+    with checkpoint_at(STEPS // 2, half):
         train_stage("tokenizer", options)
-    finally:
-        loop.save_checkpoint, loop.RunOptions.checkpoint_minutes = save, minutes
     again = replace(options, run=options.run.parent / "again", resume=True)
     if distributed.rank() == 0:
-        shutil.copytree(options.run.parent / "half", again.run / "tokenizer" / "checkpoint")
+        shutil.copytree(half, again.run / "tokenizer" / "checkpoint")
     distributed.barrier()
     train_stage("tokenizer", again)
 
 
-def main(folder: Path) -> None:
-    """Run all of it."""
+def main(folder: Path, model: str) -> None:
+    """Run all of it in one of the processes."""
+    faulthandler.dump_traceback_later(DEADLINE, exit=True)
     torch.set_num_threads(1)
     loop.start_process_group()
     for first in (0, 1):
         quantize_with_an_empty_process(first)
+    spec = find_model(model)
+    assert spec is not None
+    assert spec.training is not None
     options = TrainOptions(
-        folder / "prepared", folder / "run", TINY, Budget(steps=STEPS), device="cpu", bf16=False, quiet=True
-    )
-    resume_exactly(options)
-    train_stage("all", replace(options, budget=Budget(steps=2, minutes=10)))
+        folder / "prepared", folder / "run", resolve(spec.training.config)("tiny"), Budget(steps=STEPS),
+        device="cpu", bf16=False, quiet=True,
+    )  # fmt: skip
+    resume_exactly(spec.training, options)
+    resolve(spec.training.train)("all", replace(options, budget=Budget(steps=2, minutes=10)))
     dist.destroy_process_group()
+    faulthandler.cancel_dump_traceback_later()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2])
