@@ -19,7 +19,7 @@ from marey.models.hgm3.decoding import DecodeOptions, Items
 from marey.models.hgm3.generate import Generator
 from marey.models.hgm3.model import MaskedTransformer
 from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage
-from marey.models.hgm3.stage_residual import ResidualSample, ResidualStage
+from marey.models.hgm3.stage_residual import ResidualSample, ResidualStage, piece_losses
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
 from marey.training.budget import Budget
@@ -150,7 +150,7 @@ def test_the_residual_input_holds_nothing_of_the_level_it_predicts(prepared: Pre
         below[..., level - 1] = (below[..., level - 1] + 1) % TINY.tokenizer.codes
         inputs.clear()
         for given in (codes, above, below):
-            stage._piece(ResidualSample(given, lengths, sentences, levels, dropped))
+            piece_losses(stage.module, ResidualSample(given, lengths, sentences, levels, dropped))
         assert torch.equal(inputs[0], inputs[1])
         assert not torch.equal(inputs[0], inputs[2])
 
@@ -279,7 +279,7 @@ def test_the_first_code_is_a_target_like_any_other(prepared: PreparedData) -> No
     stage.module.masked.head.bias.data.fill_(-50).index_fill_(0, torch.tensor([0]), 50.0)
     sample = drawn_sample(stage)
     valid = sample.tokens >= 0
-    losses, masked, right, _ = stage._piece(replace(sample, tokens=torch.where(valid, 0, -1)), 0.0)
+    losses, masked, right, _ = stage.piece(replace(sample, tokens=torch.where(valid, 0, -1)), 0.0)
     assert masked.any()
     assert right[masked].all()
     assert float(losses[masked].detach().max()) < 1e-3

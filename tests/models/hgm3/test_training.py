@@ -20,6 +20,7 @@ from marey.models.hgm3.assembly import RECIPE, assemble, unpack
 from marey.models.hgm3.config import TINY, HGM3Config, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.generate import Generator
+from marey.models.hgm3.memory import masked_memory, residual_memory
 from marey.models.hgm3.stage_masked import EARLY, MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
@@ -29,9 +30,10 @@ from marey.training.budget import Budget
 from marey.training.loop import RunOptions, StepContext, train
 from marey.training.motions import MotionData, TokenData
 from marey.training.parts import load_part
-from marey.training.staging import TrainOptions
+from marey.training.staging import MemoryOf, TrainOptions
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage
+from tests.support.device_memory import device_with_room_for
 from tests.support.prepared import farthest_move, text_features
 
 CPU = torch.device("cpu")
@@ -98,6 +100,19 @@ def test_training_all_stages_again_after_a_kill_does_only_what_is_left(prepared:
     assert {name.split("/")[0] for name in train_stage("all", whole)} == {"length"}
     with pytest.raises(InvalidInput, match="minutes"):
         train_stage("all", options(prepared, tmp_path, 2))
+
+
+@pytest.mark.parametrize(("stage", "memory"), [("masked", masked_memory), ("residual", residual_memory)])
+def test_auto_splits_batches_by_the_memory_of_the_device(
+    stage: str, memory: MemoryOf[HGM3Config], prepared: PreparedData, run: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(run / "tokenizer", tmp_path / "tokenizer")
+    auto = replace(options(prepared, tmp_path, 1), micro_batch="auto")
+    with device_with_room_for(3, memory(TINY, bf16=False)) as chosen:
+        train_stage(stage, auto)
+    assert chosen == [3]
+    with pytest.raises(InvalidInput, match="auto is for stages whose memory is estimated"):
+        train_stage("length", auto)
 
 
 def test_a_bundle_of_another_configuration_is_refused(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
@@ -220,7 +235,7 @@ def test_gradient_of_the_predictor_never_reaches_the_graph(prepared: PreparedDat
     stage = masked_stage(prepared)
     sample = next(iter([stage.sample(stage.pairs.draw(np.random.default_rng(0), 4), np.random.default_rng(0))]))
     stage.module.zero_grad()
-    _losses, _masked, _, ranking = stage._piece(sample, 0.0)
+    _losses, _masked, _, ranking = stage.piece(sample, 0.0)
     ranking.sum().backward()
     assert all(p.grad is None for p in stage.module.masked.parameters())
     assert any(p.grad is not None for p in stage.module.predictor.parameters())
@@ -229,7 +244,7 @@ def test_gradient_of_the_predictor_never_reaches_the_graph(prepared: PreparedDat
 def test_reconstruction_trains_the_graph_and_not_the_predictor(prepared: PreparedData) -> None:
     stage = masked_stage(prepared)
     sample = stage.sample(stage.pairs.draw(np.random.default_rng(0), 8), np.random.default_rng(0))
-    losses, masked, _, _ = stage._piece(sample.at_level(2), 0.0)
+    losses, masked, _, _ = stage.piece(sample.at_level(2), 0.0)
     (losses * masked).sum().backward()
     assert stage.module.masked.text.graph.project.weight.grad is not None
     assert all(p.grad is None for p in stage.module.predictor.parameters())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from marey.training.motions import MotionData, TokenData
 from marey.training.sentences import SentenceData
 from marey.training.staging import set_recompute
 from marey.training.texts import CaptionTexts
+from tests.support.allocator import peak_of_steps
 
 PLAIN = replace(
     TINY,
@@ -94,22 +96,20 @@ def small(layers: int, width: int) -> MOGOConfig:
 
 
 def measured(config: MOGOConfig, samples: int, *, recompute: bool) -> int:
-    """Largest number of bytes in use during a step of two parts, as torch's allocator counts them."""
-    torch.manual_seed(0)
-    with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CPU], profile_memory=True) as profile:
+    """Largest number of bytes in use during a step of two parts."""
+
+    def build() -> RQHCTransformer:
         model = RQHCTransformer(config).train()
         model.trunk.recompute = recompute
-        optimizer = torch.optim.AdamW(model.parameters(), fused=True)
+        return model
+
+    def parts(model: torch.nn.Module) -> Iterator[torch.Tensor]:
+        assert isinstance(model, RQHCTransformer)
         for _ in range(2):
-            for _ in range(2):
-                sums, _ = piece_losses(model, longest_samples(config, samples), 1.0)
-                sums.loss(1.0).backward()
-                del sums
-            optimizer.step()
-            optimizer.zero_grad(set_to_none=True)
-    events = profile.profiler.kineto_results.events()  # type: ignore[union-attr]
-    changes = sorted((each.start_ns(), each.nbytes()) for each in events if each.name() == "[memory]")
-    return max(np.cumsum([change for _, change in changes]))
+            yield piece_losses(model, longest_samples(config, samples), 1.0)[0].loss(1.0)
+
+    torch.manual_seed(0)
+    return peak_of_steps(build, parts)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_amounts_grow_with_layers_and_samples_alone() -> None:
 
 
 def test_as_many_samples_as_fit_are_chosen() -> None:
-    model = MemoryModel("transformer", 64, 10, GIB, 0, {"float32": Amount(0, 0, 0, GIB / 10)}, 0, GIB / 100)
+    model = MemoryModel("transformer", 64, 10, GIB, GIB, 0, {"float32": Amount(0, 0, 0, GIB / 10)}, 0, GIB / 100)
     assert model.fit(24 * GIB / 0.92).samples == 20
     assert model.fit(1000 * GIB).samples == 64
     assert model.estimate(20, recompute=True).total < model.estimate(20).total

@@ -14,6 +14,7 @@ from marey.data.prepared import PreparedData
 from marey.models.mogo import steers
 from marey.models.mogo.assembly import assemble, unpack
 from marey.models.mogo.config import TINY, MOGOConfig
+from marey.models.mogo.memory import memory_model
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.rollouts import Rollouts
 from marey.models.mogo.samples import MIN_FRAMES, Samples, TokenSpan
@@ -28,6 +29,7 @@ from marey.training.parts import load_part
 from marey.training.sentences import SentenceData
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
+from tests.support.device_memory import device_with_room_for
 from tests.support.prepared import farthest_move
 
 CPU = torch.device("cpu")
@@ -62,6 +64,24 @@ def test_both_stages_train_and_leave_their_parts(prepared: PreparedData, tmp_pat
     assert MOGOConfig.from_dict(load_part(tmp_path / "transformer" / "part").config) == TINY
     with pytest.raises(InvalidInput, match="Known: tokenizer, transformer, all"):
         train_stage("masked", options(prepared, tmp_path, 1))
+
+
+def test_auto_splits_batches_by_the_memory_of_the_device(prepared: PreparedData, tmp_path: Path) -> None:
+    plain = replace(TINY, ahead=(), depth=replace(TINY.depth, share=1.0))
+    given = replace(options(prepared, tmp_path, 1), config=plain)
+    train_stage("tokenizer", given)
+    with device_with_room_for(3, memory_model(plain, bf16=False)) as chosen:
+        train_stage("transformer", replace(given, micro_batch="auto"))
+    assert chosen == [3]
+
+
+def test_validation_keeps_every_prompt(stage: TransformerStage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The share of dropped prompts is of training alone."""
+    stage.module.eval()
+    kept = stage.validate()
+    dropped = replace(TINY, condition=replace(TINY.condition, drop=1.0))
+    monkeypatch.setattr(stage.module, "config", dropped)
+    assert stage.validate() == kept
 
 
 def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,9 @@ from marey.models.momaskpp.bundle import random_bundle
 from marey.models.momaskpp.captions import INDEX, STATES, WordData
 from marey.models.momaskpp.config import PAPER, RELEASED_SNAPMOGEN, STARTER, TINY, MoMaskPPConfig, PerturbationConfig
 from marey.models.momaskpp.generate import Generator
+from marey.models.momaskpp.memory import memory_model
 from marey.models.momaskpp.scales import Scales
-from marey.models.momaskpp.stage_masked import ScaleSample, ScaleStage, choose_masks
+from marey.models.momaskpp.stage_masked import ScaleStage, choose_masks
 from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage, has_positions, tokenizer_loss
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import ScaleTokens, encode_clips
@@ -30,6 +32,7 @@ from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.parts import load_part
 from marey.training.staging import TrainOptions
+from tests.support.device_memory import device_with_room_for
 from tests.support.prepared import farthest_move, text_features, write_prepared
 
 CPU = torch.device("cpu")
@@ -136,6 +139,16 @@ def test_the_convolutions_of_other_models_are_found_by_their_names() -> None:
     assert torch.equal(block(frames, everywhere, None), frames)
 
 
+def test_auto_splits_batches_by_the_memory_of_the_device(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
+    shutil.copytree(run / "tokenizer", tmp_path / "tokenizer")
+    auto = replace(options(prepared, tmp_path, 1), micro_batch="auto")
+    with device_with_room_for(3, memory_model(TINY, bf16=False)) as chosen:
+        train_stage("masked", auto)
+    assert chosen == [3]
+    with pytest.raises(InvalidInput, match="auto is for stages whose memory is estimated"):
+        train_stage("length", auto)
+
+
 def test_a_configuration_has_the_stages_of_its_parts(prepared: PreparedData, tmp_path: Path) -> None:
     assert recipe_of(TINY).stages == STAGES
     assert recipe_of(PAPER).stages == ("tokenizer", "masked")
@@ -227,7 +240,8 @@ def test_tokens_are_replaced_in_the_published_shares(stage: ScaleStage) -> None:
     sample = next(iter(stage.samples(np.arange(4).repeat(64), np.random.default_rng(0))))
     half = torch.arange(sample.tokens.shape[1])[None] % 2 == 0
     masked = half.expand_as(sample.tokens) & (sample.tokens >= 0)
-    sample = ScaleSample(sample.tokens, sample.positions, sample.lengths, sample.text, masked, sample.dropped)
+    sample = replace(sample, masked=masked)
+    stage.module.train()
     shown, valid = stage.shown(sample), sample.tokens >= 0
     hidden = (shown == stage.module.mask_token)[masked].float().mean()
     assert float(hidden) == pytest.approx(0.9 * 0.88, abs=0.03)
@@ -252,6 +266,47 @@ def test_only_masked_tokens_are_predicted_and_the_loss_falls(prepared: PreparedD
         optimizer.step()
         losses.append(float(logs["loss"]))
     assert np.mean(losses[-5:]) < np.mean(losses[:5]) - 0.2
+
+
+def test_validation_keeps_every_condition(prepared: PreparedData, words: WordData) -> None:
+    """The share of dropped conditions is of training alone."""
+    stage = masked_stage(prepared, words)
+    stage.module.eval()
+    kept = stage.validate()
+    stage.config = replace(TINY, text=replace(TINY.text, drop=1.0))
+    assert stage.validate() == kept
+    sample = next(stage.samples(stage.pairs.train, np.random.default_rng(0)))
+    assert sample.dropped.all()  # that share would change it
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_gradients_of_parts_add_up_to_those_of_the_batch(prepared: PreparedData, words: WordData, size: int) -> None:
+    plain = replace(
+        TINY,
+        masked=replace(TINY.masked, dropout=0.0),
+        text=replace(TINY.text, noise=0.0),
+        perturbation=PerturbationConfig(0.0, 1.0, 0.0),
+        train_masked=replace(TINY.train_masked, batch=7),
+    )
+    stage = masked_stage(prepared, words, plain)
+    stage.module.train()
+
+    def gradients(parts: bool) -> tuple[dict[str, torch.Tensor], float]:
+        stage.module.zero_grad()
+        losses = stage.parts(context(), size) if parts else [stage.loss(context())]
+        total = 0.0
+        for loss, logs in losses:
+            loss.backward()
+            total += float(logs["loss"])
+        return {
+            name: each.grad.clone() for name, each in stage.module.named_parameters() if each.grad is not None
+        }, total
+
+    (whole, loss), (added, same) = gradients(parts=False), gradients(parts=True)
+    assert same == pytest.approx(loss, rel=1e-5)
+    assert whole.keys() == added.keys()
+    for name, wanted in whole.items():
+        torch.testing.assert_close(added[name], wanted, atol=1e-6, rtol=1e-4, msg=name)
 
 
 def test_samples_without_condition_read_no_caption(stage: ScaleStage) -> None:

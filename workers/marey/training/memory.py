@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from marey.core.errors import InvalidInput
+from marey.training.optimisation import StageConfig
 
 GIB = 2**30
 ROOM = 0.92
@@ -33,7 +34,7 @@ class SavedBytes:
 
     Attributes:
         by_dtype: of all tensors, those of equal storage once; weights and buffers are left out.
-        largest: of the largest tensor.
+        largest: of the largest tensor that is no weight in another number type.
     """
 
     by_dtype: Mapping[str, int]
@@ -48,6 +49,7 @@ class SavedBytes:
 def count_saved(forward: Callable[[], object], module: nn.Module) -> SavedBytes:
     """Run a forward pass, and count what it saves (`torch.autograd.graph.saved_tensors_hooks`)."""
     own = {tensor.untyped_storage().data_ptr() for tensor in (*module.parameters(), *module.buffers())}
+    weights = {tuple(sorted(tensor.shape)) for tensor in module.parameters()}
     kept: dict[int, Tensor] = {}  # they are held, so that no place is used twice
 
     def pack(tensor: Tensor) -> Tensor:
@@ -62,7 +64,8 @@ def count_saved(forward: Callable[[], object], module: nn.Module) -> SavedBytes:
     for tensor in kept.values():
         sizes[str(tensor.dtype).removeprefix("torch.")] += tensor.untyped_storage().nbytes()
     del result
-    return SavedBytes(sizes, max((tensor.untyped_storage().nbytes() for tensor in kept.values()), default=0))
+    made = (tensor for tensor in kept.values() if tuple(sorted(tensor.shape)) not in weights)
+    return SavedBytes(sizes, max((tensor.untyped_storage().nbytes() for tensor in made), default=0))
 
 
 @dataclass(frozen=True)
@@ -114,21 +117,64 @@ class MemoryModel:
         stage: its name.
         batch: samples of a step.
         layers: L.
-        weights: bytes of the trained weights and buffers.
+        weights: bytes of weights and buffers.
+        trained: bytes of the weights that are trained, as many again as gradients and twice as many in AdamW.
         average: bytes of their moving average, 0 without one.
         saved: what the forward pass saves, by number type.
         largest: bytes of the largest saved tensor of one sample.
-        carried: bytes between two layers, of one sample; all that is kept of a layer that is computed again.
+        carried: bytes between two layers, of one sample; all that is kept of a layer that is computed again. None
+            where layers cannot be computed again.
     """
 
     stage: str
     batch: int
     layers: int
     weights: int
+    trained: int
     average: int
     saved: Mapping[str, Amount]
     largest: float
-    carried: float
+    carried: float | None = None
+
+    @classmethod
+    def counted(
+        cls,
+        stage: str,
+        optimisation: StageConfig,
+        module: nn.Module,
+        count: Callable[[int, int], SavedBytes],
+        *,
+        layers: int,
+        carried: float | None = None,
+        batch: int | None = None,
+    ) -> MemoryModel:
+        """Count what a stage saves, and add up its weights.
+
+        Args:
+            stage: its name.
+            optimisation: of the stage.
+            module: all its networks; may be on the device `meta`.
+            count: what is saved by (layers, samples), at one and two of each.
+            layers: L.
+            carried: see the class.
+            batch: samples of a step, if they are not those of `optimisation`.
+        """
+        found = {(deep, many): count(deep, many) for deep in (1, 2) for many in (1, 2)}
+        names = sorted({name for each in found.values() for name in each.by_dtype})
+        trained = sum(_bytes(each) for each in module.parameters() if each.requires_grad)
+        return cls(
+            stage=stage,
+            batch=batch or optimisation.batch,
+            layers=layers,
+            weights=sum(_bytes(each) for each in (*module.parameters(), *module.buffers())),
+            trained=trained,
+            average=trained if optimisation.ema else 0,
+            saved={
+                name: Amount.of(lambda deep, many, name=name: found[deep, many].by_dtype.get(name, 0)) for name in names
+            },
+            largest=found[1, 2].largest - found[1, 1].largest,
+            carried=carried,
+        )
 
     def estimate(self, samples: int, *, recompute: bool = False) -> MemoryEstimate:
         """Estimate the largest use of memory with so many samples a pass.
@@ -136,12 +182,17 @@ class MemoryModel:
         Args:
             samples: of a forward and backward pass.
             recompute: layers are computed again in the backward pass.
+
+        Raises:
+            InvalidInput: they cannot be.
         """
-        parts: dict[str, float] = {"weights": self.weights, "gradients": self.weights, "AdamW": 2 * self.weights}
+        if recompute and self.carried is None:
+            raise InvalidInput(f"{self.stage} cannot compute layers again", where="--recompute")
+        parts: dict[str, float] = {"weights": self.weights, "gradients": self.trained, "AdamW": 2 * self.trained}
         if self.average:
             parts["average of the weights"] = self.average
         working = WORKING * samples * self.largest
-        if not recompute:
+        if not recompute or self.carried is None:
             for name, amount in self.saved.items():
                 parts[f"saved for the backward pass, {name}"] = amount.at(self.layers, samples)
             return MemoryEstimate(samples, recompute, {**parts, "working memory": working})
@@ -155,7 +206,7 @@ class MemoryModel:
         """Return the estimate with the most samples a pass, at most a batch, that fits so many bytes.
 
         Raises:
-            InvalidInput: not even one sample fits.
+            InvalidInput: not even one sample fits, or layers cannot be computed again.
         """
         fitting: Iterable[MemoryEstimate] = (
             found
@@ -168,9 +219,17 @@ class MemoryModel:
             raise InvalidInput(
                 f"{self.stage} needs {least:.1f} GiB for one sample; there are {memory / GIB:.1f}",
                 where="--micro-batch",
-                hint="Give --recompute, or choose a smaller configuration." if not recompute else None,
+                hint=self._hint(recompute),
             )
         return found
+
+    def _hint(self, recompute: bool) -> str:
+        again = "give --recompute, or " if self.carried is not None and not recompute else ""
+        return f"{again}choose a smaller configuration.".capitalize()
+
+
+def _bytes(tensor: Tensor) -> int:
+    return tensor.numel() * tensor.element_size()
 
 
 def device_memory(device: torch.device) -> int:

@@ -23,9 +23,11 @@ from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix, tier_of
 from marey.data.prepared import PreparedData, read_manifest
 from marey.nn import distributed
+from marey.nn.devices import choose_device, fast_bf16
 from marey.nn.growing import grow, take
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, TrainingStage, train
+from marey.training.memory import MemoryModel, device_memory
 from marey.training.optimisation import StageConfig
 from marey.training.parts import TrainedPart, load_part, load_sources, save_part
 
@@ -41,6 +43,15 @@ class TrainableConfig(Protocol):
 
 
 C = TypeVar("C", bound=TrainableConfig)
+Contra = TypeVar("Contra", contravariant=True)
+
+
+class MemoryOf(Protocol[Contra]):
+    """Counts the memory of a stage."""
+
+    def __call__(self, config: Contra, *, bf16: bool) -> MemoryModel:
+        """Return its memory at any number of samples; with `bf16`, matrices are in bfloat16."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -65,12 +76,27 @@ class TrainOptions(Generic[C]):
     def options(self, stage: str) -> RunOptions:
         """Return the loop's options for a stage."""
         if self.micro_batch == "auto":
-            hint = "Name a number, and one stage at a time."
+            hint = "Name a number, or give auto to the stages of transformers alone."
             raise InvalidInput("auto is for stages whose memory is estimated", where="--micro-batch", hint=hint)
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet,
             micro_batch=self.micro_batch,
         )  # fmt: skip
+
+
+def fit_micro_batch(options: TrainOptions[C], memory: MemoryOf[C]) -> TrainOptions[C]:
+    """Return the options with a number of samples a pass in place of `auto`: as many as fit the device's memory.
+
+    Raises:
+        InvalidInput: not even one fits.
+    """
+    if options.micro_batch != "auto":
+        return options
+    device = choose_device(options.device)
+    model = memory(options.config, bf16=options.bf16 and fast_bf16(device))
+    samples = model.fit(device_memory(device), recompute=options.recompute).samples
+    log.info("samples of a pass", stage=model.stage, samples=samples, batch=model.batch)
+    return dataclasses.replace(options, micro_batch=samples)
 
 
 def choose_budget(config: object, stage: str, prepared: Path, steps: int | None, minutes: float | None) -> Budget:

@@ -74,16 +74,71 @@ class MaskedModule(nn.Module):
         self.teacher = copy.deepcopy(self.predictor).requires_grad_(False)
 
 
-class MaskedStage:
+class MaskedObjective:
+    """Losses of F and G on samples."""
+
+    def __init__(self, config: HGM3Config, module: MaskedModule) -> None:
+        self.config, self.module = config, module
+
+    def masks(self, sample: MaskedSample, nodes: Tensor, alpha: float) -> Tensor:
+        """Return the tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at
+        random."""
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        counts = mask_counts(sample.progress, sample.lengths)
+        if alpha == 0:
+            return easy_to_hard_mask(torch.zeros_like(sample.noise), sample.noise, valid, counts, 0.0)
+        teacher = self.module.teacher.eval()
+        with torch.no_grad():
+            difficulty = self._predict(teacher, sample, nodes, valid)
+        return easy_to_hard_mask(difficulty, sample.noise, valid, counts, alpha)
+
+    def piece(self, sample: MaskedSample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return ℓ (B, n), mask (B, n), correct predictions (B, n), ranking loss (B,)."""
+        model = self.module.masked
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        nodes = model.text(sample.graphs)  # C, (B, S, W)
+        masked = self.masks(sample, nodes.detach(), alpha)
+        targets = sample.tokens.clamp(min=0)
+        condition = model.condition(nodes, sample.dropped)
+        visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
+        logits = model(self._shown(targets, masked), valid, condition, visible, masked)
+        losses = token_losses(logits, targets)
+        return losses, masked, hits(logits.detach(), targets), self._ranking(sample, nodes.detach(), losses, masked)
+
+    def _ranking(self, sample: MaskedSample, nodes: Tensor, losses: Tensor, masked: Tensor) -> Tensor:
+        """Return G's loss (B,): zero with random masks, which do not ask it; it took a third of a step."""
+        if self.config.mining.mask == "random":
+            return losses.new_zeros(len(losses))
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        return ranking_loss(self._predict(self.module.predictor, sample, nodes, valid), losses, masked)
+
+    def _predict(self, predictor: LossPredictor, sample: MaskedSample, nodes: Tensor, valid: Tensor) -> Tensor:
+        condition = predictor.condition(nodes, sample.dropped)
+        visible = predictor.condition.visible(sample.graphs.present, sample.level, sample.dropped)
+        return predictor(sample.tokens.clamp(min=0), valid, condition, visible)
+
+    def _shown(self, targets: Tensor, masked: Tensor) -> Tensor:
+        """Replace masked tokens by [MASK] (eq. 3), or sometimes by another token (MoMask)."""
+        mining, codes = self.config.mining, self.config.tokenizer.codes
+        shown = targets.masked_fill(masked, self.module.masked.mask_token)
+        if mining.replace_random == 0 and mining.replace_mask == 1:
+            return shown
+        draw = torch.rand_like(targets, dtype=torch.float32)
+        foreign = masked & (draw < mining.replace_random)
+        rest = masked & ~foreign & (torch.rand_like(draw) >= mining.replace_mask)
+        shown = torch.where(foreign, torch.randint_like(targets, codes), shown)
+        return torch.where(rest, targets, shown)
+
+
+class MaskedStage(MaskedObjective):
     """Training stage of F and G."""
 
     name = "masked"
 
     def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
-        self.config = config
+        super().__init__(config, MaskedModule(config).to(tokens.tokens.device))
         self.optimisation = config.train_masked
         self.tokens, self.captions = tokens.first_phases(config.phases), captions
-        self.module = MaskedModule(config).to(tokens.tokens.device)
         draws = Draws(config.class_power, config.sequences)
         self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws)
         captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
@@ -105,7 +160,7 @@ class MaskedStage:
         counted = sample.noise.new_zeros(())
         correct = sample.noise.new_zeros(())
         for piece in (p for s in samples for p in _pieces(s)):
-            losses, masked, right, ranking = self._piece(piece, alpha)
+            losses, masked, right, ranking = self.piece(piece, alpha)
             rec = rec + (losses * masked).sum()
             pred = pred + ranking.sum() / (self.optimisation.batch * len(samples))
             counted = counted + masked.sum()
@@ -128,7 +183,7 @@ class MaskedStage:
         samples = self._conditioned(sample)
         asked = len(samples) * mask_counts(sample.progress, sample.lengths).sum()
         for piece in (p for s in samples for p in _pieces(s, size)):
-            losses, masked, right, ranking = self._piece(piece, alpha)
+            losses, masked, right, ranking = self.piece(piece, alpha)
             rec = (losses * masked).sum() / asked
             pred = ranking.sum() / (self.optimisation.batch * len(samples))
             accuracy = (right * masked).sum() / asked
@@ -182,55 +237,6 @@ class MaskedStage:
         shares = np.array(self.config.mining.level_shares)
         return rng.choice(LEVELS, size=count, p=shares / shares.sum())
 
-    def masks(self, sample: MaskedSample, nodes: Tensor, alpha: float) -> Tensor:
-        """Return the tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at
-        random."""
-        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
-        counts = mask_counts(sample.progress, sample.lengths)
-        if alpha == 0:
-            return easy_to_hard_mask(torch.zeros_like(sample.noise), sample.noise, valid, counts, 0.0)
-        teacher = self.module.teacher.eval()
-        with torch.no_grad():
-            difficulty = self._predict(teacher, sample, nodes, valid)
-        return easy_to_hard_mask(difficulty, sample.noise, valid, counts, alpha)
-
-    def _piece(self, sample: MaskedSample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return ℓ (B, n), mask (B, n), correct predictions (B, n), ranking loss (B,)."""
-        model = self.module.masked
-        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
-        nodes = model.text(sample.graphs)  # C, (B, S, W)
-        masked = self.masks(sample, nodes.detach(), alpha)
-        targets = sample.tokens.clamp(min=0)
-        condition = model.condition(nodes, sample.dropped)
-        visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
-        logits = model(self._shown(targets, masked), valid, condition, visible, masked)
-        losses = token_losses(logits, targets)
-        return losses, masked, hits(logits.detach(), targets), self._ranking(sample, nodes.detach(), losses, masked)
-
-    def _ranking(self, sample: MaskedSample, nodes: Tensor, losses: Tensor, masked: Tensor) -> Tensor:
-        """Return G's loss (B,): zero with random masks, which do not ask it; it took a third of a step."""
-        if self.config.mining.mask == "random":
-            return losses.new_zeros(len(losses))
-        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
-        return ranking_loss(self._predict(self.module.predictor, sample, nodes, valid), losses, masked)
-
-    def _predict(self, predictor: LossPredictor, sample: MaskedSample, nodes: Tensor, valid: Tensor) -> Tensor:
-        condition = predictor.condition(nodes, sample.dropped)
-        visible = predictor.condition.visible(sample.graphs.present, sample.level, sample.dropped)
-        return predictor(sample.tokens.clamp(min=0), valid, condition, visible)
-
-    def _shown(self, targets: Tensor, masked: Tensor) -> Tensor:
-        """Replace masked tokens by [MASK] (eq. 3), or sometimes by another token (MoMask)."""
-        mining, codes = self.config.mining, self.config.tokenizer.codes
-        shown = targets.masked_fill(masked, self.module.masked.mask_token)
-        if mining.replace_random == 0 and mining.replace_mask == 1:
-            return shown
-        draw = torch.rand_like(targets, dtype=torch.float32)
-        foreign = masked & (draw < mining.replace_random)
-        rest = masked & ~foreign & (torch.rand_like(draw) >= mining.replace_mask)
-        shown = torch.where(foreign, torch.randint_like(targets, codes), shown)
-        return torch.where(rest, targets, shown)
-
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
         """Return cross-entropy and accuracy of random masks on validation clips, per level of condition."""
@@ -241,7 +247,7 @@ class MaskedStage:
             sample = self.sample(clips, rng, drop=False)
             for level in range(LEVELS):
                 for piece in _pieces(sample.at_level(level)):
-                    losses, masked, right, ranking = self._piece(piece, 0.0)
+                    losses, masked, right, ranking = self.piece(piece, 0.0)
                     totals[level] += [
                         float((losses * masked).sum()),
                         float((right * masked).sum()),

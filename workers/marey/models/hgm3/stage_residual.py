@@ -83,7 +83,7 @@ class ResidualStage:
         drawn = self._draw(clips, context.rng, None)
         total = drawn.lengths.sum()
         for piece in drawn.pieces(size):
-            losses, right, _ = self._piece(piece)
+            losses, right, _ = piece_losses(self.module, piece)
             yield losses.sum() / total, {"loss": losses.sum().detach() / total, "accuracy": right.sum() / total}
 
     def after_step(self, context: StepContext) -> None:
@@ -107,7 +107,7 @@ class ResidualStage:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Return summed loss, correct answers and tokens (B,) of a batch; `level` None = one drawn per sample, some of
         which lose their condition."""
-        pieces = [self._piece(piece) for piece in self._draw(clips, rng, level).pieces(None)]
+        pieces = [piece_losses(self.module, piece) for piece in self._draw(clips, rng, level).pieces(None)]
         losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))
         return losses, right, counts
 
@@ -122,16 +122,17 @@ class ResidualStage:
         dropped = torch.from_numpy(rng.random(len(clips)) < drop).to(device)
         return ResidualSample(tokens, lengths, sentences, levels, dropped)
 
-    def _piece(self, sample: ResidualSample) -> tuple[Tensor, Tensor, Tensor]:
-        tokens, levels = sample.tokens, sample.levels
-        model = self.module
-        valid = frame_mask(sample.lengths, tokens.shape[1])
-        below = [model.embed(tokens[..., v], v) * (levels > v)[:, None, None].float() for v in range(model.levels - 1)]
-        logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sample.sentences, sample.dropped))
-        targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
-        losses = token_losses(logits, targets) * valid
-        right = hits(logits.detach(), targets) * valid
-        return losses.sum(1), right.sum(1), valid.sum(1).float()
+
+def piece_losses(model: ResidualTransformer, sample: ResidualSample) -> tuple[Tensor, Tensor, Tensor]:
+    """Return summed loss, correct answers and tokens (B,) of a part of a batch."""
+    tokens, levels = sample.tokens, sample.levels
+    valid = frame_mask(sample.lengths, tokens.shape[1])
+    below = [model.embed(tokens[..., v], v) * (levels > v)[:, None, None].float() for v in range(model.levels - 1)]
+    logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sample.sentences, sample.dropped))
+    targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
+    losses = token_losses(logits, targets) * valid
+    right = hits(logits.detach(), targets) * valid
+    return losses.sum(1), right.sum(1), valid.sum(1).float()
 
 
 def length_stage(config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> LengthStage:

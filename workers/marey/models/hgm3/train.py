@@ -9,6 +9,7 @@ import torch
 from marey.models.hgm3.assembly import RECIPE
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.data import CaptionData, check_texts
+from marey.models.hgm3.memory import masked_memory, residual_memory
 from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.stage_residual import ResidualStage, length_stage
 from marey.models.hgm3.tokenizer import Tokenizer
@@ -16,7 +17,7 @@ from marey.nn.devices import choose_device
 from marey.training.drawn import load_drawn
 from marey.training.loop import start_process_group
 from marey.training.motions import MotionData, check_layout, load_tokens
-from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.staging import TrainOptions, finish, fit_micro_batch, train_all, use_threads
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage
 
@@ -49,11 +50,13 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     clips = data.prepared.clips
     data = dataclasses.replace(data, features=data.features[:0])  # only the tokens are needed: release the memory
     if name == "masked":
+        options = fit_micro_batch(options, masked_memory)
         drawn = load_drawn(options.run, tokenizer, data.prepared)
         if drawn is not None:
             clips, tokens, captions = drawn.extend(clips, tokens, captions)
         stage = MaskedStage(options.config, clips, tokens, captions)
     elif name == "residual":
+        options = fit_micro_batch(options, residual_memory)
         stage = ResidualStage(options.config, clips, tokens, captions, codebooks)
     else:
         stage = length_stage(options.config, clips, tokens, captions)

@@ -10,7 +10,7 @@ from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.model import RQHCTransformer, lanes
 from marey.models.mogo.samples import SequenceSample
 from marey.models.mogo.stage_transformer import piece_losses
-from marey.training.memory import Amount, MemoryModel, SavedBytes, count_saved, matrices
+from marey.training.memory import MemoryModel, SavedBytes, count_saved, matrices
 
 PROMPTS = 2
 """Prompts of a training sample."""
@@ -36,23 +36,15 @@ def memory_model(config: MOGOConfig, *, bf16: bool = True) -> MemoryModel:
         config: of the bundle.
         bf16: matrices are in bfloat16.
     """
-    found = {(layers, count): _saved(config, layers, count, bf16) for layers in (1, 2) for count in (1, 2)}
-    names = sorted({name for each in found.values() for name in each.by_dtype})
     with torch.device("meta"):
         module = RQHCTransformer(config)
-    weights = sum(each.numel() * each.element_size() for each in (*module.parameters(), *module.buffers()))
     rows = lanes(config) * (PROMPTS + config.max_frames)
-    return MemoryModel(
-        stage="transformer",
-        batch=config.train_transformer.batch,
+    return MemoryModel.counted(
+        "transformer",
+        config.train_transformer,
+        module,
+        lambda layers, count: _saved(config, layers, count, bf16),
         layers=config.transformer.layers,
-        weights=weights,
-        average=weights if config.train_transformer.ema else 0,
-        saved={
-            name: Amount.of(lambda layers, count, name=name: found[layers, count].by_dtype.get(name, 0))
-            for name in names
-        },
-        largest=found[1, 2].largest - found[1, 1].largest,
         carried=rows * config.transformer.width * (2 if bf16 else 4),
     )
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 
@@ -17,13 +15,12 @@ from marey.models.mogo.samples import MIN_FRAMES
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.steers import Steers, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
-from marey.nn.devices import choose_device, fast_bf16
+from marey.nn.devices import choose_device
 from marey.training.loop import start_process_group
-from marey.training.memory import device_memory
 from marey.training.motions import MotionData, check_layout, load_tokens
 from marey.training.pairs import Pairs
 from marey.training.sentences import SentenceData
-from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.staging import TrainOptions, finish, fit_micro_batch, train_all, use_threads
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage
 
@@ -54,19 +51,11 @@ def _train_tokenizer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
 
 
 def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
-    if options.micro_batch == "auto":
-        options = replace(options, micro_batch=_fitting(options))
+    options = fit_micro_batch(options, memory_model)
     stage, sha256 = transformer_stage(options)
     metrics = RECIPE.train(stage, options)
     finish(stage.module, options, stage.name, metrics, sha256)
     return metrics
-
-
-def _fitting(options: TrainOptions[MOGOConfig]) -> int:
-    """Return the samples of a pass that fit the device's memory."""
-    device = choose_device(options.device)
-    model = memory_model(options.config, bf16=options.bf16 and fast_bf16(device))
-    return model.fit(device_memory(device), recompute=options.recompute).samples
 
 
 def transformer_stage(

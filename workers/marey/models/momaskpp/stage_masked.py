@@ -29,7 +29,7 @@ class ScaleSample:
 
     tokens: Tensor  # (B, S), NO_TOKEN where a clip has none
     positions: Tensor  # (S,) in the row of all scales
-    lengths: Tensor  # (B,) of the full scale
+    valid: Tensor  # (B, S) bool, tokens that exist
     text: TextStates
     masked: Tensor  # (B, S) bool, tokens to predict
     dropped: Tensor  # (B,) bool: without condition
@@ -83,38 +83,55 @@ class ScaleStage:
         loss = losses / count.clamp(min=1)
         return loss, {"loss": loss.detach(), "accuracy": right / count.clamp(min=1)}
 
+    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
+        """Yield the losses of parts of one batch; see `SplitStage`."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        samples = list(self.samples(clips, context.rng, size=size))
+        asked = torch.stack([sample.masked.sum() for sample in samples]).sum().clamp(min=1)
+        for sample in samples:
+            losses, right, _ = masked_losses(self.module, sample, self.shown(sample))
+            loss = losses / asked
+            yield loss, {"loss": loss.detach(), "accuracy": right / asked}
+
     def after_step(self, context: StepContext) -> None:
         """Do nothing: the stage has no state to update."""
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
-        """Return cross-entropy and accuracy of random masks on validation clips."""
+        """Return cross-entropy and accuracy of random masks on validation clips, all of which keep their captions."""
         rng = np.random.default_rng(0)
         totals = torch.zeros(3)
         for clips in self.pairs.validation_batches(self.optimisation.batch):
-            totals += torch.stack([value.float().cpu() for value in self._batch(clips, rng)])
+            totals += torch.stack([value.float().cpu() for value in self._batch(clips, rng, drop=False)])
         return {"loss": float(totals[0] / totals[2]), "accuracy": float(totals[1] / totals[2])}
 
-    def samples(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Iterator[ScaleSample]:
-        """Draw phase, caption, τ, masks and drop of each clip, in pieces of similar lengths."""
+    def samples(
+        self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True, size: int | None = None
+    ) -> Iterator[ScaleSample]:
+        """Draw phase, caption, τ, masks and drop of each clip, in pieces of similar lengths; with `drop` False, all
+        keep their condition. `size` as in `pieces_of`."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.rows(torch.from_numpy(clips).to(device), phases)
         captions = self.words.sentences.choose(clips, rng)
         progress = torch.from_numpy(rng.random(len(clips), np.float32)).to(device)
         noise = torch.from_numpy(rng.random(tuple(tokens.shape), np.float32)).to(device)
-        dropped = torch.from_numpy(rng.random(len(clips)) < self.config.text.drop).to(device)
+        dropped = torch.from_numpy(rng.random(len(clips)) < self.config.text.drop * drop).to(device)
         padded = self.config.perturbation.padded_counts
         masked = choose_masks(self.scales, lengths, progress, noise, padded=padded)
-        for rows in pieces_of(lengths):
+        for rows in pieces_of(lengths, size):
             columns = bucket_positions(self.scales, int(lengths[rows].max())).to(device)
             text = self.words.words(captions[rows])
-            own = tokens[rows][:, columns], columns, lengths[rows], text, masked[rows][:, columns], dropped[rows]
+            there = self.scales.valid(lengths[rows])[:, columns]
+            own = tokens[rows][:, columns], columns, there, text, masked[rows][:, columns], dropped[rows]
             yield ScaleSample(*own)
 
     def shown(self, sample: ScaleSample) -> Tensor:
-        """Return what the transformer sees of the tokens (B, S): masked ones as [MASK], and some of all replaced."""
+        """Return what the transformer sees of the tokens (B, S): masked ones as [MASK]; in training some of all are
+        replaced."""
         p, codes = self.config.perturbation, self.config.tokenizer.codes
+        if not self.module.training:
+            return sample.tokens.masked_fill(sample.masked, self.module.mask_token)
         targets = sample.tokens.clamp(min=0)
         draw, second = torch.rand(2, *targets.shape, device=targets.device)
         foreign = torch.where(sample.masked, draw < p.replace_random, draw < p.perturb)
@@ -122,18 +139,21 @@ class ScaleStage:
         shown = torch.where(foreign, torch.randint_like(targets, codes), targets)
         return shown.masked_fill(hidden, self.module.mask_token)
 
-    def _batch(self, clips: NDArray[np.int64], rng: np.random.Generator) -> tuple[Tensor, Tensor, Tensor]:
+    def _batch(
+        self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """Return summed loss, correct answers and masked tokens of a batch."""
-        found = [self._piece(sample) for sample in self.samples(clips, rng)]
+        samples = self.samples(clips, rng, drop=drop)
+        found = [masked_losses(self.module, sample, self.shown(sample)) for sample in samples]
         losses, right, counts = zip(*found, strict=True)
         return torch.stack(losses).sum(), torch.stack(right).sum(), torch.stack(counts).sum()
 
-    def _piece(self, sample: ScaleSample) -> tuple[Tensor, Tensor, Tensor]:
-        model = self.module
-        valid = self.scales.valid(sample.lengths)[:, sample.positions]
-        words = model.words(sample.text.states, sample.dropped)
-        shown = self.shown(sample) if model.training else sample.tokens.masked_fill(sample.masked, model.mask_token)
-        logits = model(shown, sample.positions, valid, words, sample.text.present)
-        losses = token_losses(logits, sample.tokens) * sample.masked
-        right = (logits.argmax(-1) == sample.tokens) & sample.masked
-        return losses.sum(), right.sum(), sample.masked.sum()
+
+def masked_losses(model: ScaleTransformer, sample: ScaleSample, shown: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Return summed loss, correct answers and masked tokens of a part of a batch, of which the model is `shown` the
+    tokens (B, S)."""
+    words = model.words(sample.text.states, sample.dropped)
+    logits = model(shown, sample.positions, sample.valid, words, sample.text.present)
+    losses = token_losses(logits, sample.tokens) * sample.masked
+    right = (logits.argmax(-1) == sample.tokens) & sample.masked
+    return losses.sum(), right.sum(), sample.masked.sum()

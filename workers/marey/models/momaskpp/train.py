@@ -7,6 +7,7 @@ import torch
 from marey.models.momaskpp.assembly import recipe_of
 from marey.models.momaskpp.captions import WordData
 from marey.models.momaskpp.config import MoMaskPPConfig
+from marey.models.momaskpp.memory import memory_model
 from marey.models.momaskpp.stage_masked import ScaleStage
 from marey.models.momaskpp.stage_refiner import RefinerStage, length_stage
 from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage
@@ -15,7 +16,7 @@ from marey.models.momaskpp.tokens import load_scale_tokens
 from marey.nn.devices import choose_device
 from marey.training.loop import TrainingStage, start_process_group
 from marey.training.motions import MotionData, check_layout
-from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.staging import TrainOptions, finish, fit_micro_batch, train_all, use_threads
 
 
 def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, float]:
@@ -33,6 +34,8 @@ def train_stage(name: str, options: TrainOptions[MoMaskPPConfig]) -> dict[str, f
     use_threads(options.threads)
     data = MotionData.load(options.prepared, choose_device(options.device))
     check_layout(options.config, data.prepared)
+    if name == "masked":
+        options = fit_micro_batch(options, memory_model)
     torch.manual_seed(options.seed)
     stage = _stage(name, options, data)
     metrics = recipe.train(stage, options)

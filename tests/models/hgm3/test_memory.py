@@ -1,0 +1,75 @@
+"""The estimates of memory against what training uses, and `auto` samples of a pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+import torch
+
+from marey.core.errors import InvalidInput
+from marey.models.hgm3.config import PAPER, STARTER, HGM3Config, TransformerConfig
+from marey.models.hgm3.memory import longest_masked, longest_residual, masked_memory, memory_model, residual_memory
+from marey.models.hgm3.model import ResidualTransformer
+from marey.models.hgm3.stage_masked import MaskedModule, MaskedObjective
+from marey.models.hgm3.stage_residual import piece_losses
+from marey.training.memory import MemoryEstimate
+from tests.support.allocator import peak_of_steps
+
+
+def small(layers: int, width: int) -> HGM3Config:
+    """The published networks, made small."""
+    network = TransformerConfig(layers=layers, heads=4, width=width, feedforward=3 * width)
+    return replace(
+        PAPER,
+        tokenizer=replace(PAPER.tokenizer, levels=3, codes=300),
+        condition=replace(PAPER.condition, text_width=96),
+        masked=network,
+        predictor=replace(network, layers=2),
+        residual=network,
+    )
+
+
+def measured_masked(config: HGM3Config, samples: int) -> int:
+    def parts(module: torch.nn.Module) -> Iterator[torch.Tensor]:
+        assert isinstance(module, MaskedModule)
+        for _ in range(2):
+            losses, masked, _, ranking = MaskedObjective(config, module).piece(longest_masked(config, samples), 0.5)
+            yield (losses * masked).sum() / masked.sum() + ranking.mean()
+            del losses, ranking
+
+    return peak_of_steps(lambda: MaskedModule(config).train(), parts)
+
+
+def measured_residual(config: HGM3Config, samples: int) -> int:
+    def parts(module: torch.nn.Module) -> Iterator[torch.Tensor]:
+        assert isinstance(module, ResidualTransformer)
+        for _ in range(2):
+            yield piece_losses(module, longest_residual(config, samples))[0].sum()
+
+    return peak_of_steps(lambda: ResidualTransformer(config).train(), parts)
+
+
+def check(estimate: MemoryEstimate, found: int) -> None:
+    assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
+
+
+@pytest.mark.parametrize(("layers", "width", "samples"), [(3, 64, 12), (5, 96, 6)])
+def test_the_estimates_are_within_a_tenth_of_what_is_used(layers: int, width: int, samples: int) -> None:
+    config = small(layers, width)
+    torch.manual_seed(0)
+    check(masked_memory(config, bf16=False).estimate(samples), measured_masked(config, samples))
+    check(residual_memory(config, bf16=False).estimate(samples), measured_residual(config, samples))
+
+
+def test_the_stage_that_needs_most_is_shown_with_all_conditions_of_a_step() -> None:
+    config = small(2, 32)
+    found = memory_model(config)
+    assert (found.stage, found.batch) == ("masked", 3 * 256)
+    assert masked_memory(replace(config, mining=replace(config.mining, conditions="motion"))).batch == 256
+    assert masked_memory(replace(config, mining=STARTER.mining)).batch == 256
+    wide = replace(config, residual=replace(config.residual, width=256, layers=8), mining=STARTER.mining)
+    assert memory_model(wide).stage == "residual"
+    with pytest.raises(InvalidInput, match="masked cannot compute layers again"):
+        found.fit(1e12, recompute=True)
