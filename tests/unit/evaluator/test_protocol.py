@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from marey.bundles import Bundle
 from marey.cli.main import app
+from marey.cli.roles.tokenizers import tokenizer_of
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.data.prepared import PreparedData
 from marey.data.t2m_folder import HUMANML3D_SET, prepare_t2m
@@ -25,6 +26,7 @@ from marey.evaluator.protocol import Judge, ProtocolOptions, Subject, run_protoc
 from marey.evaluator.protocol.metrics import METRICS
 from marey.evaluator.protocol.report import document_of, markdown_of, published_rows
 from marey.evaluator.protocol.samples import draw_samples
+from marey.evaluator.reconstruction import rebuilt
 from marey.evaluator.t2m_import import import_t2m
 from marey.generation.port import Generated, Generator
 from marey.importing import ImportRequest
@@ -69,7 +71,8 @@ def judge(t2m: Bundle, data: PreparedData) -> Judge:
 def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     bundle = random_bundle(tmp_path_factory.mktemp("generator") / "random-tiny")
     generator = HGM3.load(bundle, device="cpu", dtype=torch.float32)
-    return Subject(generator, shared_pipeline(), {"steps": 2, "motion_steps": 0, "action_steps": 0})
+    settings = {"steps": 2, "motion_steps": 0, "action_steps": 0}
+    return Subject(generator, shared_pipeline(), settings, tokenizer_of(bundle))
 
 
 def test_each_clip_is_drawn_once_with_one_of_its_captions_at_a_multiple_of_four_frames(data: PreparedData) -> None:
@@ -115,6 +118,7 @@ def test_every_repeat_generates_the_captions_anew_at_the_lengths_of_their_clips(
     rows = found["repeats"][0][judge.evaluator.name]
     assert set(rows["generated"]) == set(METRICS)
     assert set(rows["real"]) == set(METRICS) - {"fid", "mmodality"}
+    assert set(rows["reconstructed"]) == set(METRICS) - {"mmodality"}
     assert rows["generated"]["fid"] > 0 < rows["generated"]["mmodality"]
     assert found["repeats"][1] != found["repeats"][0]
 
@@ -131,6 +135,31 @@ def test_numbers_are_those_of_the_metrics_on_the_evaluators_embeddings(
     assert real["mm_dist"] == pytest.approx(float(np.linalg.norm(text - motion, axis=1).mean()), rel=1e-5)
     assert 0 <= real["r1"] <= real["r2"] <= real["r3"] <= 1
     assert "generated" not in found["repeats"][0][judge.evaluator.name]
+
+
+def test_the_tokenizer_alone_has_a_row(data: PreparedData, judge: Judge, subject: Subject, tmp_path: Path) -> None:
+    found = run_protocol(data, subject, [judge], tmp_path / "whole", SIZES)
+    rows = found["repeats"][1][judge.evaluator.name]
+    drawing = np.random.default_rng(np.random.SeedSequence([0, 1]).spawn(2)[0])
+    motions = [sample.motion for sample in draw_samples(data, "test", 4, drawing)]
+    assert subject.tokenizer is not None
+    through = [rebuilt(subject.tokenizer, [motion])[0] for motion in motions]
+    assert [len(motion) for motion in through] == [len(motion) for motion in motions]
+    real, made = judge.evaluator.embed_motion(motions), judge.evaluator.embed_motion(through)
+    assert rows["reconstructed"]["fid"] == pytest.approx(fid(real, made).value, rel=1e-3)
+    name = f"{subject.generator.bundle.reference}, tokenizer alone"
+    (row,) = [row for row in document_of(found)["rows"] if row["name"] == name]
+    values = [each[judge.evaluator.name]["reconstructed"]["fid"] for each in found["repeats"]]
+    assert row["values"]["fid"] == [pytest.approx(np.mean(values)), pytest.approx(1.96 * np.std(values) / 2**0.5)]
+    assert f"| {name} | measured here |" in markdown_of(found)
+    assert "| MOGO, tokenizer alone | MOGO Tab. 1 | - | - | - | 0.013 ± 0.001 |" in markdown_of(found)
+
+    without = run_protocol(data, replace(subject, tokenizer=None), [judge], tmp_path / "without", SIZES)
+    assert "reconstructed" not in without["repeats"][0][judge.evaluator.name]
+    for kind in ("real", "generated"):
+        assert without["repeats"][0][judge.evaluator.name][kind] == found["repeats"][0][judge.evaluator.name][kind]
+    with pytest.raises(InvalidInput, match="of another generator, evaluator, data or options"):
+        run_protocol(data, subject, [judge], tmp_path / "without", SIZES)
 
 
 def test_a_run_goes_on_where_it_stopped_and_refuses_a_folder_of_another(

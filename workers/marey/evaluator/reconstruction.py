@@ -154,12 +154,11 @@ def reconstruct(
 
 @torch.inference_mode()
 def rebuilt(tokenizer: MotionTokenizer, clips: Sequence[Features]) -> list[Features]:
-    """Encode and decode clips (T, D), T a multiple of the frames of a token."""
-    rate = tokenizer.frames_per_token
-    lengths = torch.tensor([len(clip) for clip in clips])
-    batch = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(clip) for clip in clips], batch_first=True)
-    tokens = tokenizer.encode(batch, lengths)
-    output = tokenizer.decode(tokens.clamp(min=0), lengths // rate).float().numpy()
+    """Encode and decode clips (T, D), T a multiple of the frames of a token, on the tokenizer's device."""
+    rate, device = tokenizer.frames_per_token, tokenizer.mean.device
+    lengths = torch.tensor([len(clip) for clip in clips], device=device)
+    batch = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(clip) for clip in clips], batch_first=True).to(device)
+    output = tokenizer.decode(tokenizer.encode(batch, lengths), lengths // rate).float().cpu().numpy()
     return [np.array(output[row, : len(clip)]) for row, clip in enumerate(clips)]
 
 

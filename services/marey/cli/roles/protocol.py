@@ -96,10 +96,15 @@ def _subject(request: ProtocolRequest) -> Subject | None:
         return None
     from marey.bundles import choose_bundle
     from marey.bundles.limits import check_settings
+    from marey.cli.roles.tokenizers import tokenizer_of
     from marey.evaluator.protocol import Subject
+    from marey.nn.devices import choose_device
     from marey.training.adherence import pipeline_of
 
     found = choose_bundle(request.bundle)
     spec = get_model(found.manifest.model, where=request.bundle)
     generator = resolve(spec.load)(found, device=request.device, threads=request.threads)
-    return Subject(generator, pipeline_of(generator), check_settings(found, request.settings))
+    tokenizer = tokenizer_of(found)
+    if tokenizer is not None:
+        tokenizer.to(choose_device(request.device))
+    return Subject(generator, pipeline_of(generator), check_settings(found, request.settings), tokenizer)

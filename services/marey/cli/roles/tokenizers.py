@@ -12,6 +12,7 @@ from marey.core.extras import needs_extra
 from marey.registry import find_model, model_names, resolve
 
 if TYPE_CHECKING:
+    from marey.bundles import Bundle
     from marey.nn.motion_tokenizer import MotionTokenizer
 
 
@@ -58,11 +59,8 @@ def reconstruct(
 
 def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
     """Exact name, licence (None = of a run, which has none yet) and tokenizer, in evaluation mode."""
-    import torch
-
     from marey.bundles import choose_bundle
     from marey.core.hashing import sha256_of
-    from marey.nn.bundling import fill
     from marey.training.parts import load_part
 
     folder = Path(generator) / "tokenizer" / "part"
@@ -73,13 +71,25 @@ def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
         sha256 = sha256_of(folder / "weights.safetensors")[:12]
         return f"{Path(generator).resolve().name}@{sha256}", None, tokenizer.eval()
     found = choose_bundle(generator)
-    spec = find_model(found.manifest.model)
-    if spec is None or spec.tokenizer is None:
+    tokenizer = tokenizer_of(found)
+    if tokenizer is None:
         raise InvalidInput(f"{found.manifest.name!r} has no tokenizer", where=str(found.path))
-    tokenizer = resolve(spec.tokenizer)(found.manifest.parameters)
-    fill(tokenizer, found, "tokenizer")
-    tokenizer.set_statistics(*map(torch.from_numpy, found.statistics()))
     return found.reference, found.manifest.licence, tokenizer
+
+
+def tokenizer_of(bundle: Bundle) -> MotionTokenizer | None:
+    """The tokenizer of a generator's bundle, in evaluation mode on the CPU; None where its model has none."""
+    import torch
+
+    from marey.nn.bundling import fill
+
+    spec = find_model(bundle.manifest.model)
+    if spec is None or spec.tokenizer is None:
+        return None
+    tokenizer = resolve(spec.tokenizer)(bundle.manifest.parameters)
+    fill(tokenizer, bundle, "tokenizer")
+    tokenizer.set_statistics(*map(torch.from_numpy, bundle.statistics()))
+    return tokenizer
 
 
 def _tokenizer_of_run(parameters: Mapping[str, Any], folder: Path) -> MotionTokenizer:

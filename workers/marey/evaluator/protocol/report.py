@@ -63,7 +63,8 @@ def published_rows() -> tuple[TableRow, ...]:
 def measured_rows(found: Mapping[str, Any]) -> tuple[TableRow, ...]:
     """Return the rows of a run (`run_protocol`), evaluator by evaluator, with intervals over its repeats."""
     repeats: Sequence[Mapping[str, Any]] = found["repeats"]
-    names = {"real": REAL_NAME, "generated": found["generator"]}
+    generator = found["generator"]
+    names = {"real": REAL_NAME, "reconstructed": f"{generator}, tokenizer alone", "generated": generator}
     rows: list[TableRow] = []
     for evaluator in found["evaluators"]:
         for kind in repeats[0][evaluator]:

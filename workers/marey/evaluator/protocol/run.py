@@ -19,13 +19,15 @@ from marey.data.prepared import PreparedData
 from marey.evaluator.port import Evaluator
 from marey.evaluator.protocol.metrics import METRICS, measure, measure_variety
 from marey.evaluator.protocol.samples import Sample, draw_samples
+from marey.evaluator.reconstruction import BATCH, rebuilt
 from marey.generation.port import Generator, Request
 from marey.items.item import MAX_SEED
 from marey.motion.files import write_atomically
+from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.text.features import TextFeatures
 from marey.text.pipeline import TextPipeline
 
-REAL, GENERATED = "real", "generated"
+REAL, RECONSTRUCTED, GENERATED = "real", "reconstructed", "generated"
 Rows = dict[str, dict[str, dict[str, float]]]
 """Metrics by evaluator and row of one repeat."""
 Motions = list[NDArray[np.float32]]
@@ -62,11 +64,12 @@ class Judge:
 
 @dataclass
 class Subject:
-    """A generator with what reads its prompts."""
+    """A generator with what reads its prompts, and its tokenizer, in evaluation mode; None = it has none."""
 
     generator: Generator[Any]
     pipeline: TextPipeline
     settings: Mapping[str, float]
+    tokenizer: MotionTokenizer | None = None
     _read: dict[str, TextFeatures] = field(default_factory=dict[str, TextFeatures])
 
     def generate(self, asked: Sequence[tuple[str, int, int]]) -> Iterator[NDArray[np.float32]]:
@@ -79,6 +82,15 @@ class Subject:
             for made in self.generator.generate(requests, settings):
                 assert made is not None  # no rows are dropped here
                 yield made.features
+
+    def reconstruct(self, motions: Sequence[NDArray[np.float32]]) -> Motions:
+        """Return motions (T, D) through the tokenizer alone, T cut to whole tokens; none without one."""
+        if self.tokenizer is None:
+            return []
+        rate = self.tokenizer.frames_per_token
+        whole = [motion[: len(motion) - len(motion) % rate] for motion in motions]
+        parts = (whole[low : low + BATCH] for low in range(0, len(whole), BATCH))
+        return [made for part in parts for made in rebuilt(self.tokenizer, part)]
 
     def _parse(self, captions: Sequence[str]) -> None:
         new = [caption for caption in dict.fromkeys(captions) if caption not in self._read]
@@ -113,8 +125,16 @@ class _Run:
             if subject is None or generator is None
             else generator.describe_settings(generator.settings(subject.settings)),
             "evaluators": [judge.evaluator.name for judge in self.judges],
+            "rows": self._rows,
             "options": {name: value for name, value in asdict(self.options).items() if name != "repeats"},
         }
+
+    @property
+    def _rows(self) -> list[str]:
+        subject = self.subject
+        if subject is None:
+            return [REAL]
+        return [REAL, GENERATED] if subject.tokenizer is None else [REAL, RECONSTRUCTED, GENERATED]
 
     @property
     def key(self) -> str:
@@ -142,19 +162,24 @@ class _Run:
             np.random.default_rng(child) for child in np.random.SeedSequence([options.seed, number]).spawn(2)
         )
         samples = draw_samples(self.data, options.split, options.pool, drawing)
+        motions = [sample.motion for sample in samples]
         made, many = self._generate(samples, drawing, progress)
+        through = [] if self.subject is None else self.subject.reconstruct(motions)
         rows: Rows = {}
         for judge in self.judges:
             evaluator, state = judge.evaluator, pooling.bit_generator.state
             text = evaluator.embed_text([sample.caption for sample in samples])
-            real = evaluator.embed_motion([sample.motion for sample in samples])
+            real = evaluator.embed_motion(motions)
             common = {"pool": options.pool, "distance": evaluator.distance}
-            rows[evaluator.name] = {REAL: measure(text, real, None, **common, rng=pooling)}
-            if made:
-                pooling.bit_generator.state = state  # the same pools
-                found = measure(text, evaluator.embed_motion(made), real, **common, rng=pooling)
+            found = {REAL: measure(text, real, None, **common, rng=pooling)}
+            for name, others in ((RECONSTRUCTED, through), (GENERATED, made)):
+                if others:
+                    pooling.bit_generator.state = state  # the same pools
+                    found[name] = measure(text, evaluator.embed_motion(others), real, **common, rng=pooling)
+            if many:
                 variety = measure_variety(evaluator.embed_motion(many), options.many, options.pairs, pooling)
-                rows[evaluator.name][GENERATED] = found | {"mmodality": variety}
+                found[GENERATED]["mmodality"] = variety
+            rows[evaluator.name] = found
         return rows
 
     def _generate(
