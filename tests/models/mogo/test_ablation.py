@@ -9,19 +9,26 @@ from pathlib import Path
 import pytest
 import torch
 
+from marey.bundles import find_bundle
+from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
 from marey.models.mogo import ablation
 from marey.models.mogo.ablation import (
+    CODEBOOKS,
+    LEVELS,
     SCALES,
+    SCALING,
     VARIANTS,
     LevelToken,
+    ablate_levels,
     ablate_tokenizer,
     train_tokenizer,
     train_transformer,
 )
 from marey.models.mogo.assembly import assemble
-from marey.models.mogo.config import TINY
+from marey.models.mogo.config import PAPER, TINY, MOGOConfig
 from marey.models.mogo.train import train_stage
+from marey.training import ablation as shared
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
@@ -81,6 +88,35 @@ def test_an_ablation_goes_on_where_it_stopped(
     assert trained == [*SCALES.values()][:2] + [*SCALES.values()][1:]
     assert shown.count("|\n") >= len(SCALES)
     assert ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1) == shown
+
+
+def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
+    prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    two = evaluation_prompts()[:2]
+    monkeypatch.setattr(ablation, "evaluation_prompts", lambda: two)
+    monkeypatch.setattr(shared, "evaluation_prompts", lambda: two)
+    monkeypatch.setattr(ablation, "LEVELS", {name: LEVELS[name] for name in ("1 levels", "2 levels")})
+    arguments = (prepared.path, str(options.run / "bundle"), tmp_path)
+    shown = ablate_levels(*arguments, steps=1, batch=4, seeds=1, threads=1)
+    head, _, *rows = shown.splitlines()
+    assert {"local_mm", "error_mm", "validation loss", "foot skate"} <= {cell.strip() for cell in head.split("|")}
+    assert [row.split(" | ")[0] for row in rows] == ["| 1 levels", "| 2 levels"]
+    for number, levels in enumerate((1, 2)):
+        made = find_bundle(str(tmp_path / f"levels-{number}-0" / "bundle"))
+        wanted = replace(TINY.tokenizer, levels=levels)
+        assert MOGOConfig.from_dict(made.manifest.parameters).tokenizer == wanted
+    assert ablate_levels(*arguments, steps=1, batch=4, seeds=1, threads=1) == shown
+
+
+def test_the_sizes_of_the_papers_tables() -> None:
+    assert [each["levels"] for each in LEVELS.values()] == [1, 2, 3, 4, 5, 6, 7]
+    sizes = [(each["codes"], each["code_width"]) for each in CODEBOOKS.values()]
+    assert sizes == [(512, 512), (1024, 1024), (2048, 512), (4096, 256), (8192, 128)]
+    rows = [(each["codes"], each["code_width"], each["scale"]) for each in SCALING.values()]
+    assert rows == [(*size, scale) for scale in ("elementwise", "none") for size in sizes[2:]]
+    for each in (*SCALING.values(), *CODEBOOKS.values()):
+        replace(PAPER.tokenizer, **each)  # names fields that there are
 
 
 @pytest.mark.parametrize("name", VARIANTS)

@@ -1,26 +1,30 @@
-"""Ablation of MOGO's own parts: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane.
+"""Ablation of MOGO's own parts: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane; and
+the paper's tables of the quantizer.
 
     marey train ablate data/prepared mogo-starter --what tokenizer --steps 1500 -o report
     marey train ablate data/prepared mogo-starter --what transformer --steps 600 --batch 8 -o report
+    marey train ablate data/prepared mogo-starter --what levels --steps 3000 -o report
 
 Each variant is trained from scratch for the same number of steps, on the same seeds; all other parts are the bundle's.
 `tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer` compares
 the ways of level and depth by cross-entropy of validation clips, and by the evaluation prompts where the product can
-generate with a variant. Finished variants are kept: a second call continues.
+generate with a variant. `scaling`, `levels` and `codebooks` (Tab. 3 to 5) train both networks, and compare by the
+errors and by the evaluation prompts; their bundles stay beside the numbers, for an evaluator. Finished variants are
+kept: a second call continues.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
 
-from marey.bundles import find_bundle
+from marey.bundles import Bundle, find_bundle
 from marey.checks.prompts import evaluation_prompts
 from marey.models.mogo.assembly import RECIPE, assemble, unpack
 from marey.models.mogo.config import MOGOConfig
@@ -32,6 +36,8 @@ from marey.training.ablation import compare, judge
 from marey.training.adherence import pipeline_of
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions, finish, use_threads
+
+V = TypeVar("V")
 
 
 class LevelToken(RQHCTransformer):
@@ -92,6 +98,23 @@ SCALES: dict[str, Scale] = {
 }
 
 
+SIZES = ((512, 512), (1024, 1024), (2048, 512), (4096, 256), (8192, 128))
+"""Codes of a codebook and numbers of a code, of Tab. 5; the last three are those of Tab. 3."""
+
+SCALING: dict[str, Mapping[str, Any]] = {
+    f"{codes} × {width}, {shown}": {"codes": codes, "code_width": width, "scale": scale}
+    for shown, scale in (("scaled", "elementwise"), ("not scaled", "none"))
+    for codes, width in SIZES[2:]
+}
+"""Fields of the tokenizer's configuration, by row of Tab. 3."""
+LEVELS: dict[str, Mapping[str, Any]] = {f"{count} levels": {"levels": count} for count in range(1, 8)}
+"""The same of Tab. 4."""
+CODEBOOKS: dict[str, Mapping[str, Any]] = {
+    f"{codes} × {width}": {"codes": codes, "code_width": width} for codes, width in SIZES
+}
+"""The same of Tab. 5."""
+
+
 def train_tokenizer(scale: Scale, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
     """Train one tokenizer; return its errors on captured test clips, in mm, and how many codes it uses."""
     tokenizer = replace(options.config.tokenizer, scale=scale)
@@ -115,25 +138,60 @@ def train_transformer(bundle: str, variant: Variant, options: TrainOptions[MOGOC
     if variant.network is not RQHCTransformer:
         return found
     finish(stage.module, options, stage.name, metrics, sha256)
-    made = assemble(options.prepared, run, run / "bundle", config)
-    generator = Generator.load(made, threads=options.threads)
+    return found | judged(assemble(options.prepared, run, run / "bundle", config), options.threads)
+
+
+def train_both(fields: Mapping[str, Any], options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    """Train a tokenizer of other sizes and a transformer on its tokens; return the tokenizer's errors on captured test
+    clips, in mm, the transformer's validation loss, and the judged evaluation prompts."""
+    config = replace(options.config, tokenizer=replace(options.config.tokenizer, **fields))
+    options = replace(options, config=config)
+    errors = train_stage("tokenizer", options)
+    found = {name: errors[f"test/{name}"] for name in ("local_mm", "error_mm")}
+    found["validation loss"] = train_stage("transformer", options)["loss"]
+    return found | judged(assemble(options.prepared, options.run, options.run / "bundle", config), options.threads)
+
+
+def judged(bundle: Bundle, threads: int) -> dict[str, float]:
+    """Judge a bundle on the evaluation prompts."""
+    generator = Generator.load(bundle, threads=threads)
     texts = pipeline_of(generator).features([p.text for p in evaluation_prompts()])
-    return found | judge(generator, texts, generator.settings({}))
+    return judge(generator, texts, generator.settings({}))
 
 
 def ablate_tokenizer(data: Path, bundle: str, output: Path, **options: Any) -> str:
     """Compare the scales of MoSA; see `_ablate`."""
-    return _ablate("tokenizer", SCALES, data, bundle, output, **options)
+    return _ablate("tokenizer", SCALES, train_tokenizer, data, bundle, output, **options)
 
 
 def ablate_transformer(data: Path, bundle: str, output: Path, **options: Any) -> str:
     """Compare the ways of levels and depth; see `_ablate`."""
-    return _ablate("transformer", VARIANTS, data, bundle, output, **options)
+
+    def train(variant: Variant, run: TrainOptions[MOGOConfig]) -> dict[str, float]:
+        return train_transformer(bundle, variant, run)
+
+    return _ablate("transformer", VARIANTS, train, data, bundle, output, **options)
+
+
+def ablate_scaling(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare learnable scaling with none at three sizes of codebooks (Tab. 3); see `_ablate`."""
+    return _ablate("scaling", SCALING, train_both, data, bundle, output, **options)
+
+
+def ablate_levels(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare numbers of levels (Tab. 4); see `_ablate`."""
+    return _ablate("levels", LEVELS, train_both, data, bundle, output, **options)
+
+
+def ablate_codebooks(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare sizes of codebooks (Tab. 5); see `_ablate`."""
+    return _ablate("codebooks", CODEBOOKS, train_both, data, bundle, output, **options)
 
 
 def _ablate(
     about: str,
-    names: Iterable[str],
+    variants: Mapping[str, V],
+    train: Callable[[V, TrainOptions[MOGOConfig]], dict[str, float]],
     data: Path,
     bundle: str,
     output: Path,
@@ -152,15 +210,11 @@ def _ablate(
             train_tokenizer=replace(config.train_tokenizer, batch=batch),
             train_transformer=replace(config.train_transformer, batch=batch),
         )
-    variants = list(names)
 
     def measured(name: str, seed: int) -> dict[str, float]:
-        run = output / f"{about}-{variants.index(name)}-{seed}"
+        run = output / f"{about}-{list(variants).index(name)}-{seed}"
         shutil.rmtree(run, ignore_errors=True)
         run.mkdir(parents=True)
-        options = TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads)
-        if name in SCALES:
-            return train_tokenizer(SCALES[name], options)
-        return train_transformer(bundle, VARIANTS[name], options)
+        return train(variants[name], TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads))
 
-    return compare(variants, measured, output, about, seeds=seeds)
+    return compare(list(variants), measured, output, about, seeds=seeds)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from marey.registry import Ablation, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
 
+ABLATION = "marey.models.mogo.ablation"
+
 SPEC = ModelSpec(
     name="mogo",
     title="MOGO",
@@ -50,7 +52,10 @@ The same prompt, seed, settings and bundle give the same motion.""",
     random_bundle="marey.models.mogo.bundle:random_bundle",
     live_adherence="marey.models.mogo.adherence:judge_streams",
     ablations=(
-        Ablation("tokenizer", "Ways in which MoSA scales its levels.", "marey.models.mogo.ablation:ablate_tokenizer"),
-        Ablation("transformer", "How levels and depth are drawn.", "marey.models.mogo.ablation:ablate_transformer"),
+        Ablation("tokenizer", "Ways in which MoSA scales its levels.", f"{ABLATION}:ablate_tokenizer"),
+        Ablation("transformer", "How levels and depth are drawn.", f"{ABLATION}:ablate_transformer"),
+        Ablation("scaling", "Learnable scaling at three sizes of codebooks.", f"{ABLATION}:ablate_scaling"),
+        Ablation("levels", "One to seven levels of tokens.", f"{ABLATION}:ablate_levels"),
+        Ablation("codebooks", "Five sizes of codebooks.", f"{ABLATION}:ablate_codebooks"),
     ),
 )

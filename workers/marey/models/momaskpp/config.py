@@ -24,6 +24,7 @@ class TokenizerConfig:
     depth: int = 3  # residual blocks a stage, dilations 3^(depth-1) … 1
     stages: int = 2  # each halves the frame rate: 4 frames a token
     dropout: float = 0.2
+    attention: bool = field(default=True, metadata=ADDED)  # behind the residual blocks of each stage
     attention_heads: int = 4
     attention_dropout: float = 0.1
     scales: tuple[int, ...] = (8, 4, 2, 1)  # full-scale tokens a token, coarse to fine

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from marey.registry import ImportKind, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
+from marey.registry import Ablation, ImportKind, LengthLimits, ModelSpec, Setting, Stage, Training, Variety
+
+ABLATION = "marey.models.momaskpp.ablation"
 
 SPEC = ModelSpec(
     name="momaskpp",
@@ -44,6 +46,11 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     tokenizer="marey.models.momaskpp.tokenizer:build_tokenizer",
     random_bundle="marey.models.momaskpp.bundle:random_bundle",
+    ablations=(
+        Ablation("scales", "Multi-scale tokens against full-scale ones.", f"{ABLATION}:ablate_scales"),
+        Ablation("attention", "The tokenizer with and without attention.", f"{ABLATION}:ablate_attention"),
+        Ablation("conditioning", "In-context against cross-attention.", f"{ABLATION}:ablate_conditioning"),
+    ),
     imports=(
         ImportKind(
             name="momaskpp",

@@ -51,10 +51,19 @@ class FrameAttention(nn.Module):
         return masked(x + mixed.transpose(1, 2), mask)
 
 
+class NoAttention(nn.Module):
+    """In place of attention: the input."""
+
+    def forward(self, x: Tensor, readable: Tensor, mask: Tensor | None) -> Tensor:
+        """(B, C, T) as it is."""
+        return x
+
+
 def _stages(config: TokenizerConfig) -> tuple[nn.ModuleList, nn.ModuleList]:
     """Residual blocks and attention of each stage."""
     residuals = (DilatedBlocks(config.width, config.depth, config.dropout) for _ in range(config.stages))
-    return nn.ModuleList(residuals), nn.ModuleList(FrameAttention(config) for _ in range(config.stages))
+    attention = (FrameAttention(config) if config.attention else NoAttention() for _ in range(config.stages))
+    return nn.ModuleList(residuals), nn.ModuleList(attention)
 
 
 class Encoder(nn.Module):
