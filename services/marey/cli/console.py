@@ -28,7 +28,7 @@ Limit = Annotated[
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 FullIds = Annotated[
-    bool, typer.Option("--full-ids", "-l", help="Whole ids in the table; else their last 8 digits, which will do.")
+    bool, typer.Option("--full-ids", "-l", help="Show whole ids; default: their last 8 digits, which commands accept.")
 ]
 ID_COLUMNS = frozenset({"id", "job", "stream", "event", "item", "motion", "key", "replaced by"})
 """Columns of drawn tables that hold ids: they are short there, and never wrap."""

@@ -58,7 +58,7 @@ Extra = Annotated[
 ]
 Repeats = Annotated[
     int | None,
-    typer.Option("--repeats", help="Motions of each prompt; none given = 1, and repeats draw pools out of the same."),
+    typer.Option("--repeats", help="Motions of each prompt; default 1: all 20 repeats draw from the same motions."),
 ]
 Regenerate = Annotated[
     bool, typer.Option("--regenerate", help=f"Generate anew in all {ANEW} repeats: as --repeats {ANEW}, and as long.")

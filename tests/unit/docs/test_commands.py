@@ -11,7 +11,7 @@ import re
 import subprocess
 from functools import cache
 from importlib.util import find_spec
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import Any
 
 import pytest
@@ -59,6 +59,14 @@ def unknown_source(words: list[str]) -> str | None:
     return f"no known set: {unknown}" if unknown else None
 
 
+def file_as_prompt(words: list[str]) -> str | None:
+    """The error of a prompt that is the name of a file: such a command lacks `-f`."""
+    if words[0] not in ("submit", "generate"):
+        return None
+    positional = [word for before, word in pairwise(words) if not before.startswith("-")]
+    return next((f"a file without -f: {word}" for word in positional if word.endswith((".csv", ".jsonl"))), None)
+
+
 def check(words: list[str]) -> str | None:
     """The error of a command; None if it is right."""
     while ENVIRONMENT.match(words[0]) and len(words) > 1:
@@ -71,7 +79,7 @@ def check(words: list[str]) -> str | None:
             return None
         except Exception as error:  # the parser's own errors have no public base class
             return str(error)
-        return unknown_source(words[1:])
+        return unknown_source(words[1:]) or file_as_prompt(words[1:])
     if program == "make":
         targets = [word for word in words[1:] if "=" not in word and not word.startswith(("-", "/"))]
         return None if set(targets) <= TARGETS else f"no target of the Makefile: {targets}"
@@ -109,6 +117,7 @@ def test_every_block_has_a_command() -> None:
         ["marey", "submit", "-f", "a.csv", "--no-such-option"],
         ["marey", "no-such-command"],
         ["marey", "convert", "a.npz"],
+        ["marey", "submit", "a.csv", "--model", "hgm3"],
         ["marey", "submit", "--seed", "x", "a person walks"],
         ["marey", "data", "prepare", "no-such-set", "set.zip", "-o", "prepared"],
         ["make", "no-such-target"],

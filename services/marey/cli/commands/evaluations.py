@@ -413,7 +413,7 @@ def studio(
     output: ReportFolder = None,
     as_json: console.Json = False,
 ) -> None:
-    """Measure a bundle on a studio's list of 300 prompts: what it obeys, and what it flags. Needs no server."""
+    """Measure a bundle on a studio's list of 300 prompts: motions that show them, and flagged ones. Needs no server."""
     from marey.cli.roles.actions import measure_studio
 
     _measure(lambda how: measure_studio(bundle, how), seeds, settings, threads, output, as_json)

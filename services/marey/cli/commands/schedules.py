@@ -29,7 +29,7 @@ class ScheduleGroup(TyperGroup):
 
 app = typer.Typer(
     cls=ScheduleGroup,
-    help='Evaluations that come again: `marey eval schedule "0 3 * * 1" --bundle hgm3` is every Monday at 03:00.',
+    help='Repeated evaluations: `marey eval schedule "0 3 * * 1" --bundle hgm3` is every Monday at 03:00.',
     no_args_is_help=True,
 )
 

@@ -224,8 +224,8 @@ def read_prompts(
         file_format = None if input_format is None else input_format.value
         return rows.read_file(file, file_format, defaults, extra_columns.value)
     for prompt in prompts or ():
-        if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and Path(prompt).is_file():
-            raise InvalidInput("is a file, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
+        if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and " " not in prompt:
+            raise InvalidInput("is a file name, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
     if not prompts:
         raise InvalidInput("no prompt is given", hint="Give one or more in quotes, or a file of them with -f.")
     return rows.read_arguments(prompts, defaults)
