@@ -111,6 +111,15 @@ JointNames = Annotated[
     ),
 ]
 
+Body = Annotated[
+    str | None,
+    typer.Option(
+        "--body",
+        metavar="standard|FILE",
+        help="Put the motion on a body with the proportions of a .bvh or .npz file; default: the body that it has.",
+    ),
+]
+
 ServerRig = Annotated[
     str | None,
     typer.Option(
@@ -130,6 +139,7 @@ OPTIONS: Mapping[str, tuple[Any, object]] = {
     "rig": (Rig, None),
     "rig_map": (RigMap, None),
     "names": (JointNames, None),
+    "body": (Body, None),
 }
 """Annotation and default of the option for each field of `ExportOptions`, in the order of the help."""
 NO_OTHERS: Mapping[str, Any] = MappingProxyType({})

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from marey.core.errors import MareyError, TimedOut
 
 OPTIONS = {
+    "body": "--body",
     "bundle": "--bundle",
     "bvh_root": "--bvh-root",
     "extra_columns": "--extra-columns",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marey.client.making import SOURCE, making_of
+from marey.client.making import SOURCE, check_body, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.transport import Transport
@@ -107,6 +107,7 @@ def fetch_job(
     observer = observer or FetchObserver()
     known = exporters()
     check_options((known[name] for name in formats or known if name in known), export)
+    check_body(export.body)
     pages = transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
     check_folder(folder)

@@ -392,6 +392,7 @@ class Jobs(Resource):
         rig: str | None = None,
         rig_map: str | None = None,
         names: Names | None = None,
+        body: str | None = None,
         on_progress: OnFetched | FetchObserver | None = None,
     ) -> Sequence[FetchedItem]:
         """Fetch the motions that a job has so far, eight files at a time, with a `manifest.csv`.
@@ -408,6 +409,7 @@ class Jobs(Resource):
             overwrite: replace files with other content.
             bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names: of files whose
                 formats have these options; see `docs/reference/formats.md`.
+            body: put the motions on a body of other proportions, a BVH or npz file; see `docs/how-to/bodies.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
 
@@ -417,7 +419,8 @@ class Jobs(Resource):
         Raises:
             Conflict: a file exists with other content, or a format was not made and cannot be made here; nothing is
                 fetched then, unless it is the content of a made file.
-            InvalidFile: the data that arrived has another sha256, or cannot be written.
+            NotFound: the file of a body or a rig does not exist.
+            InvalidFile: the data that arrived has another sha256, or cannot be written; or the body is no human one.
             InvalidInput: the folder cannot be written, two motions would have one name, an option is of no format, or
                 two contradict each other.
             Unreachable: the connection breaks repeatedly; another fetch continues.
@@ -442,6 +445,7 @@ class Jobs(Resource):
                 rig=rig,
                 rig_map=rig_map,
                 names=names,
+                body=body,
             ),
             observer=_Counting(on_progress) if callable(on_progress) else on_progress,
         )

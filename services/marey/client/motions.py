@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Literal
 
 from marey.client.fetching import FORMAT, FileToFetch, check_folder, download_all
 from marey.client.made import format_of, made_file
+from marey.client.making import SOURCE, check_body, making_of
 from marey.client.resources import Resource, identifier, identifiers
 from marey.client.types.jobs import Job
 from marey.client.types.motions import Motion, MotionDetail, Reroll
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.extras import needs_extra
 from marey.exporters import extension_of
+from marey.motion.export_options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -114,22 +116,26 @@ class Motions(Resource):
         """
         return Motion.of(self._transport.post(f"/v1/motions/{identifier(motion)}/revert"))
 
-    def fetch(self, motion: Motion | str, path: str | Path, *, overwrite: bool = False) -> Path:
+    def fetch(
+        self, motion: Motion | str, path: str | Path, *, body: str | None = None, overwrite: bool = False
+    ) -> Path:
         """Fetch a file of a motion, resumed where an earlier fetch broke off and verified by its sha256.
 
         Args:
             path: its ending names the format, such as `.bvh`.
+            body: put the motion on a body of other proportions, a BVH or npz file; this needs the extra `motion`.
             overwrite: replace a file with other content.
 
         Raises:
-            NotFound: the motion has no such file.
+            NotFound: the motion has no such file, or there is no file of the body.
             Conflict: the file exists with other content.
-            InvalidInput: the folder cannot be written.
-            InvalidFile: the data that arrived has another sha256, or cannot be written.
+            InvalidInput: the folder cannot be written, or the motion has another skeleton than bodies have.
+            InvalidFile: the data that arrived has another sha256, or cannot be written; or the body is no human one.
         """
         path = Path(path)
+        check_body(body)
         found = motion if isinstance(motion, Motion) else self.get(motion)
-        download = _download(found, path.suffix.removeprefix(".").lower(), path)
+        download = _download(found, path.suffix.removeprefix(".").lower(), path, ExportOptions(body=body))
         check_folder(path.parent)
         download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
         return path
@@ -174,21 +180,30 @@ class Motions(Resource):
         return path
 
     def fetch_all(
-        self, motions: Iterable[Motion], folder: str | Path, *, file_format: str = "npz", overwrite: bool = False
+        self,
+        motions: Iterable[Motion],
+        folder: str | Path,
+        *,
+        file_format: str = "npz",
+        body: str | None = None,
+        overwrite: bool = False,
     ) -> Sequence[Path]:
         """Fetch a file of each motion, eight at a time; the files are named by the ids of the motions.
 
         Args:
             folder: created if missing.
             file_format: such as npz or bvh.
+            body: as of `fetch`.
             overwrite: replace files with other content.
 
         Raises:
             NotFound, Conflict, InvalidInput, InvalidFile: as `fetch`.
         """
-        place = check_folder(Path(folder))
+        check_body(body)
+        place, export = check_folder(Path(folder)), ExportOptions(body=body)
         downloads = [
-            _download(motion, file_format, place / f"{motion.id}.{extension_of(file_format)}") for motion in motions
+            _download(motion, file_format, place / f"{motion.id}.{extension_of(file_format)}", export)
+            for motion in motions
         ]
         download_all(self._transport, downloads, overwrite=overwrite, done=lambda _: None)
         return [download.path for download in downloads]
@@ -212,22 +227,27 @@ class Motions(Resource):
                 raise
 
 
-def _download(motion: Motion, wanted: str, path: Path) -> FileToFetch:
+def _download(motion: Motion, wanted: str, path: Path, export: ExportOptions = PLAIN) -> FileToFetch:
     """Return the download of a file of a motion.
 
     Args:
         wanted: its format or its extension.
+        export: options of the file; with them it is made of the npz.
 
     Raises:
         NotFound: the motion has no such file.
+        Conflict: it cannot be put on the body.
     """
-    file = next((file for file in motion.files if wanted in (file.format, extension_of(file.format))), None)
-    if file is None or not FORMAT.fullmatch(file.format):
-        formats = ", ".join(file.format for file in motion.files)
+    by_format = {file.format: file for file in motion.files}
+    named = next((name for name in by_format if wanted in (name, extension_of(name))), None)
+    if named is None or not FORMAT.fullmatch(named):
+        formats = ", ".join(by_format)
         hint = f"It has {formats}." if formats else "If its prompt is being erased, wait a moment."
         raise NotFound(f"has no {wanted or 'such'} file", where=f"motion {motion.id}", hint=hint)
-    url = f"/v1/motions/{identifier(motion)}/files/{file.format}"
-    return FileToFetch(url, file.sha256, file.size, path)
+    making = making_of(named, by_format, export)
+    source = by_format[named if making is None else SOURCE]
+    url = f"/v1/motions/{identifier(motion)}/files/{source.format}"
+    return FileToFetch(url, source.sha256, source.size, path, making)
 
 
 def list_or_none(values: Sequence[str] | None) -> Sequence[str] | None:

@@ -59,7 +59,11 @@ def convert(
     if isinstance(clip, BvhClip):
         notes = clip.notes
         clip = clip if fps is None else resample_bvh(clip, fps)
-        clip = clip if writer is reader and export.rig is None else clip_from_bvh(clip, source.name)
+        clip = (
+            clip
+            if writer is reader and export.rig is None and export.body is None
+            else clip_from_bvh(clip, source.name)
+        )
     elif fps is not None:
         clip = resample(clip, fps)
     write_atomically(target, writer.write(clip, Coordinates.of(export, unit, up)))

@@ -21,6 +21,8 @@ Decoded = TypeVar("Decoded")
 _FORMAT = re.compile(r"[a-z0-9]{1,16}")
 _EXTENSION = re.compile(r"(?=.{1,9}\Z)[a-z0-9]+(\.[a-z0-9]+)?")
 """Names of files leave room for nine characters (`marey.client.names.MAX_BYTES`)."""
+EVERYWHERE = frozenset({"body"})
+"""Options that act on the motion before it is written, so that every format has them."""
 _DEFAULTS: dict[str, Any] = {each.name: each.default for each in fields(ExportOptions)}
 
 
@@ -54,6 +56,7 @@ class Exporter(Generic[Decoded]):
         stored: workers write it for every motion, and `marey generate` where no format is named; False = it is made on
             request alone, by `generate`, `convert` and `fetch`, because it takes long or can be made at any time.
         options: names of the `ExportOptions` that `encode` heeds; the others of its coordinates have their defaults.
+            Those of `EVERYWHERE` are not among them.
         encode_rigged: write a motion that was put on a rig, with the rig's hierarchy, rest pose and joint axes; needed
             for the option `rig`. `root_bone`, `in_place`, `tpose_frame` and `placement` are in the motion already.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
@@ -87,6 +90,11 @@ class Exporter(Generic[Decoded]):
         if unknown := self.options - _DEFAULTS.keys():
             raise ValueError(f"{self.format} has unknown options: {', '.join(sorted(unknown))}")
 
+    @property
+    def heeded(self) -> frozenset[str]:
+        """Names of all `ExportOptions` that files of the format heed."""
+        return self.options | EVERYWHERE
+
     def write(self, clip: MotionClip | Decoded, coordinates: Coordinates, body: RigBody | None = None) -> bytes:
         """Encode a clip with those of the coordinates that the format has.
 
@@ -94,13 +102,23 @@ class Exporter(Generic[Decoded]):
             body: the rig that the coordinates name; None = find it (`marey.motion.retarget.load.load_body`).
 
         Raises:
-            InvalidInput: the clip cannot be written with these options, or put on the rig.
+            InvalidInput: the clip cannot be written with these options, or put on the rig or the body.
+            NotFound, InvalidFile, TooLarge: the file of the rig or of the body cannot be read.
         """
         others = {name: value for name, value in _DEFAULTS.items() if name not in self.options}
         kept = replace(coordinates, **others)
+        if coordinates.body is not None:
+            clip = _on_body(clip, coordinates.body)
         if kept.rig is None or self.encode_rigged is None:
             return self.encode(clip, kept)
         from marey.motion.io.convert import as_motion_clip
         from marey.motion.retarget.apply import put_on_rig
 
         return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept, body), kept)
+
+
+def _on_body(clip: Any, body: str) -> MotionClip:
+    from marey.motion.change_body import change_body, load_shape
+    from marey.motion.io.convert import as_motion_clip
+
+    return change_body(as_motion_clip(clip), load_shape(body))

@@ -109,8 +109,8 @@ def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> N
     """
     writers = list(writers)
     for name in options.chosen:
-        if not any(name in each.options for each in writers):
-            having = [each.format for each in exporters().values() if name in each.options]
+        if not any(name in each.heeded for each in writers):
+            having = [each.format for each in exporters().values() if name in each.heeded]
             raise InvalidInput(
                 f"{', '.join(each.format for each in writers)} files have no such option",
                 where=name,

@@ -36,6 +36,7 @@ class ExportOptions:
         rig: put the motion on a rig: a reference skeleton (`mixamo`, `ue4`, `humanik`) or a file with a skeleton.
         rig_map: JSON file that says which joint of the rig is which part of the body, where the joints are not found.
         names: names of the joints, without a change of anything else.
+        body: put the motion on a body of other proportions: `standard`, or a BVH or npz file. It acts on every format.
 
     Raises:
         InvalidInput: two options contradict each other.
@@ -51,6 +52,7 @@ class ExportOptions:
     rig: str | None = None
     rig_map: str | None = None
     names: Names | None = None
+    body: str | None = None
 
     def __post_init__(self) -> None:
         if self.root_bone and self.bvh_root == "offset":
@@ -83,6 +85,13 @@ class ExportOptions:
                     hint=f"Leave out {name}, or the rig.",
                     argument=name,
                 )
+        if self.rig and self.body:
+            raise InvalidInput(
+                "a motion on a rig has the proportions of the rig",
+                where="body",
+                hint="Leave out body, or the rig.",
+                argument="body",
+            )
         if self.rig_map and not self.rig:
             raise InvalidInput(
                 "a map of joints belongs to a rig", where="rig_map", hint="Name the rig too.", argument="rig_map"

@@ -9,6 +9,15 @@ from pathlib import Path
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 
 
+def stamp_of(path: Path | str | None) -> tuple[int, int]:
+    """Return what changes when a file does; zeros where there is none."""
+    try:
+        status = Path("" if path is None else path).stat()
+    except (OSError, ValueError):
+        return 0, 0
+    return status.st_mtime_ns, status.st_size
+
+
 def read_limited(path: Path, limit: int) -> bytes:
     """Read a file.
 

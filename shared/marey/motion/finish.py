@@ -21,6 +21,9 @@ from marey.motion.pose import aim_bones, checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array, unroll
 
+CLEANED = "feet_cleaned"
+"""Key of a manifest: whether the feet were locked."""
+
 
 def finish_motion(
     features: Array,

@@ -10,7 +10,7 @@ from marey.generation.shots.provenance import describe_timeline, least_match, wi
 from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import MotionClip
-from marey.motion.finish import finish_motion
+from marey.motion.finish import CLEANED, finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.record import KEY, PromptMatch
@@ -68,7 +68,7 @@ def finish(
         clean: lock feet in contact.
     """
     body = body or standard_body(generator.layout.skeleton)
-    manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean, "body": body.describe()}
+    manifest = {**manifest_of(generator, request, settings), CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
     return judged(clip, request)
 

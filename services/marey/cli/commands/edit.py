@@ -14,7 +14,7 @@ from marey.motion.export_options import PLAIN, ExportOptions
 
 
 @with_operations
-@with_export(without=("in_place", "rest_pose"))
+@with_export(without=("in_place", "rest_pose", "body"))
 def edit(
     context: typer.Context,
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Motion files, such as .npz, .bvh or .glb.")],

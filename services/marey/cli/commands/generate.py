@@ -46,7 +46,7 @@ class Planned:
     """The path of each format."""
 
 
-@with_export()
+@with_export(without=("body",))  # it has one of its own, which motions are solved onto
 def generate(
     prompts: options.Prompts = None,
     timelines: options.Timelines = None,

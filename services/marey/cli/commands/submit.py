@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console, options
+from marey.cli.exporting import Body
 from marey.cli.poses import StoredMotions
 from marey.client import rows
 from marey.client.names import check_template
 from marey.core.errors import InvalidInput, MareyError
 from marey.items.item import InvalidItems
 from marey.items.timeline import timeline_gaps
+from marey.motion.export_options import ExportOptions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -62,6 +64,7 @@ def submit(
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
     ] = None,
     formats: options.Formats = None,
+    body: Body = None,
     name_template: options.Template = options.TEMPLATE,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Validate everything without submitting.")] = False,
     timeout: Annotated[
@@ -78,6 +81,7 @@ def submit(
         from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
+    export = _export_of(fetch, body)
     defaults = row_defaults(
         sampling,
         model=model,
@@ -118,7 +122,26 @@ def submit(
             elif not as_json:
                 console.result(job.id)
             if watch or fetch is not None:
-                _follow(client, job.id, fetch, formats, name_template, timeout, as_json)
+                _follow(client, job.id, fetch, formats, name_template, timeout, as_json, export)
+
+
+def _export_of(folder: Path | None, body: str | None) -> ExportOptions:
+    """Return the options of the files that `--fetch` writes; the body is read before anything is enqueued.
+
+    Raises:
+        InvalidInput: a body without `--fetch`, or a file that is none.
+        NotFound, InvalidFile: of the file.
+    """
+    from marey.client.making import check_body
+
+    if body is not None and folder is None:
+        raise InvalidInput(
+            "the server has one body; files are put on another where they are fetched",
+            where="--body",
+            hint="Add --fetch FOLDER, or leave it to `marey fetch JOB --body FILE`.",
+        )
+    check_body(body)
+    return ExportOptions(body=body)
 
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
@@ -239,11 +262,12 @@ def _follow(
     template: str,
     timeout: float | None,
     as_json: bool,
+    export: ExportOptions,
 ) -> None:
     from marey.cli.commands.fetch import write_job
     from marey.cli.watching import check_ended, watch_job
 
     ended = watch_job(client, job, timeout=timeout)
     if folder is not None:
-        write_job(client, job, folder, formats, template=template, as_json=as_json)
+        write_job(client, job, folder, formats, template=template, export=export, as_json=as_json)
     check_ended(ended)

@@ -186,7 +186,7 @@ def revert(motions: Motions, as_json: console.Json = False) -> None:
 
 
 @app.command("file")
-@with_export(without=("rig_map", "names"), instead={"rig": ServerRig})
+@with_export(without=("rig_map", "names", "body"), instead={"rig": ServerRig})
 def make_file(
     motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
     file_format: Annotated[str, typer.Argument(metavar="FORMAT", help="Format of the file, such as glb or mp4.")],

@@ -15,11 +15,9 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.place import posed
 from marey.motion.features import LAYOUTS
 from marey.motion.feet import clean_feet, find_contacts, need_feet
-from marey.motion.finish import finish_motion
+from marey.motion.finish import CLEANED, finish_motion
 from marey.motion.kinematics import bone_lengths
 from marey.motion.pose import aim_bones, checked_joints
-
-CLEANED = "feet_cleaned"
 
 
 def set_feet(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:

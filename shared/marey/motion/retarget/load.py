@@ -8,6 +8,7 @@ from typing import Any
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidInput, NotFound
+from marey.motion.files import stamp_of
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints, read_map
@@ -25,7 +26,7 @@ def load_body(rig: str | Path, rig_map: str | Path | None = None) -> RigBody:
         InvalidInput: an unknown rig, one without legs or of a size that no character has, or a map that does not fit.
         NotFound, InvalidFile, TooLarge: a file cannot be read.
     """
-    return _load(str(rig), _stamp(rig), None if rig_map is None else str(rig_map), _stamp(rig_map))
+    return _load(str(rig), stamp_of(rig), None if rig_map is None else str(rig_map), stamp_of(rig_map))
 
 
 def parse_body(data: bytes, name: str, rig_map: Any = None) -> RigBody:
@@ -42,15 +43,6 @@ def parse_body(data: bytes, name: str, rig_map: Any = None) -> RigBody:
     given = None if rig_map is None else read_map(rig_map, "map")
     found = parse_rig(data, name)
     return RigBody.of(found, map_joints(found, given, where="map"))
-
-
-def _stamp(path: str | Path | None) -> tuple[int, int]:
-    """Return what changes when a file does."""
-    try:
-        status = Path("" if path is None else path).stat()
-    except (OSError, ValueError):
-        return 0, 0
-    return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(maxsize=16)
