@@ -19,6 +19,7 @@ from marey.takes.model_edits import EditGenerator, needs_model
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
 from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
+from marey.takes.rig_backups import RigRecord, back_up_rigs, restore_rig
 from marey.takes.rigs import add_rig, get_rig, list_rigs, remove_rig
 from marey.takes.types import AddedRig, Erasure, GarbageReport, MotionFilter, NewRig, Reroll, RigRow
 
@@ -36,8 +37,10 @@ __all__ = [
     "ReferenceKind",
     "ReferenceMatch",
     "Reroll",
+    "RigRecord",
     "RigRow",
     "add_rig",
+    "back_up_rigs",
     "check_edit",
     "claim_making",
     "collect_garbage",
@@ -60,6 +63,7 @@ __all__ = [
     "renew_makings",
     "reroll",
     "resolve_reference",
+    "restore_rig",
     "revert",
     "review",
     "rewrite_files",

@@ -60,7 +60,7 @@ def list_rigs(conn: sa.Connection, tenant: str, *, cursor: str | None = None, li
     """Return rigs, newest first."""
     table = tables.rig.c
     ours = table.tenant_id == tenant
-    query, order = _rigs().where(ours), Order(table.created_at, table.id)
+    query, order = rigs_query().where(ours), Order(table.created_at, table.id)
     rows = order.read(conn, query, ours, cursor, limit)
     return cut_page([RigRow(**row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
@@ -72,7 +72,7 @@ def get_rig(conn: sa.Connection, tenant: str, name: str) -> RigRow:
         NotFound: the tenant has no such rig.
     """
     table = tables.rig.c
-    row = conn.execute(_rigs().where(table.tenant_id == tenant, table.name == name)).mappings().one_or_none()
+    row = conn.execute(rigs_query().where(table.tenant_id == tenant, table.name == name)).mappings().one_or_none()
     if row is None:
         raise _no_rig(name)
     return RigRow(**row)
@@ -84,7 +84,7 @@ def remove_rig(conn: sa.Connection, tenant: str, name: str) -> UUID:
     Raises:
         NotFound: the tenant has no such rig.
     """
-    _lock_rigs(conn, tenant)
+    lock_rigs(conn, tenant)
     table = tables.rig.c
     statement = sa.delete(tables.rig).where(table.tenant_id == tenant, table.name == name).returning(table.asset_id)
     asset: UUID | None = conn.execute(statement).scalar_one_or_none()
@@ -102,13 +102,14 @@ class _Before:
     map: Mapping[str, str | None] | None
 
 
-def _lock_rigs(conn: sa.Connection, tenant: str) -> None:
+def lock_rigs(conn: sa.Connection, tenant: str) -> None:
+    """Lock the names of a tenant's rigs until the transaction ends."""
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(RIG_LOCK, sa.func.hashtext(tenant))))
 
 
 def _lock(conn: sa.Connection, new: NewRig, sha256: str, limit: int) -> _Before | None:
     """Lock the rigs of the tenant, and check its limits; return the rig that has the name."""
-    _lock_rigs(conn, new.tenant)
+    lock_rigs(conn, new.tenant)
     table, asset = tables.rig.c, tables.asset.c
     query = (
         sa.select(table.id, table.asset_id.label("asset"), asset.sha256, table.format, table.map)
@@ -156,7 +157,8 @@ def _write(
         conn.execute(sa.delete(tables.made_file).where(tables.made_file.c.rig_id == before.id))
 
 
-def _rigs() -> sa.Select[*tuple[Any, ...]]:
+def rigs_query() -> sa.Select[*tuple[Any, ...]]:
+    """Return a query for the fields of `RigRow` of all rigs."""
     table, asset = tables.rig.c, tables.asset.c
     return sa.select(
         *(table.id, table.name, table.version, table.format, asset.sha256, asset.size, table.map, table.report),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from uuid import UUID
 
 import pytest
@@ -35,7 +37,20 @@ from marey.jobs import (
 )
 from marey.jobs.types import EventRow, ItemRow
 from marey.storage import FolderStore
-from marey.takes import GarbageReport, NewEdit, collect_garbage, erase, reroll, review, submit_edit
+from marey.takes import (
+    GarbageReport,
+    NewEdit,
+    NewRig,
+    add_rig,
+    collect_garbage,
+    erase,
+    list_rigs,
+    remove_rig,
+    reroll,
+    review,
+    submit_edit,
+)
+from marey.tenants import Actor
 from tests.servers.audit import audit
 from tests.servers.jobs import MODEL, PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.marey import Marey
@@ -130,7 +145,7 @@ def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: Fol
     manifest, left = export_tenant(engine, folder_store, "default", tmp_path / "b")
     assert (list(manifest.jobs), manifest.items, manifest.files, left) == (jobs, 6, 4, 1)
     lose_everything(engine, folder_store)
-    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 2
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == (2, 0)
     after = snapshot(engine, jobs)
     assert after[0] == before[0]
     assert (after[1][0].keep_days, before[1][0].keep_days) == (None, 1)  # its days are over, or would soon be
@@ -143,8 +158,73 @@ def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: Fol
         with pytest.raises(Conflict, match="came from a backup"):
             retry(conn, "default", jobs[0])
     assert collect_garbage(engine, folder_store) == GarbageReport(0, 0, ())
-    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 0  # again: nothing to do
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == (0, 0)  # again: nothing to do
     assert snapshot(engine, jobs) == after
+
+
+def test_rigs_come_back_and_a_name_that_is_taken_is_left_alone(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    character(engine, folder_store, rig_map={"left_toes": None})
+    character(engine, folder_store, "lead", b"another character")
+    character(engine, folder_store, "lead", b"the lead's second version")
+    before, files = rigs_of(engine), contents(folder_store)
+    assert [(rig["name"], rig["version"]) for rig in before] == [("hero", 1), ("lead", 2)]
+    manifest, _ = export_tenant(engine, folder_store, "default", tmp_path / "b")
+    assert (manifest.rigs, manifest.files) == (2, 2)
+    lose_everything(engine, folder_store)
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == (0, 2)
+    assert (rigs_of(engine), contents(folder_store)) == (before, files)
+    assert collect_garbage(engine, folder_store) == GarbageReport(0, 0, ())
+    with transaction(engine) as conn:
+        assert audit(conn) == []
+        remove_rig(conn, "default", "hero")
+    character(engine, folder_store, "hero", b"another hero")
+    mine = rigs_of(engine)
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == (0, 0)
+    assert rigs_of(engine) == mine
+
+
+def test_a_backup_of_a_release_that_left_rigs_out_is_imported(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    jobs = studio(engine, folder_store)
+    export_tenant(engine, folder_store, "default", tmp_path / "b")
+    (tmp_path / "b" / "rigs.jsonl").unlink()
+    path = tmp_path / "b" / "manifest.json"
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps({name: value for name, value in document.items() if "rig" not in name}))
+    lose_everything(engine, folder_store)
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == (2, 0)
+    assert [row.id for row, *_ in snapshot(engine, jobs)] == jobs
+
+
+def test_a_rig_that_no_text_can_hold_is_refused(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:
+    character(engine, folder_store, rig_map={"hips": "Hips"})
+    export_tenant(engine, folder_store, "default", tmp_path / "b")
+    edit_rigs(tmp_path / "b", lambda d: d.replace(b'"hips":"Hips"', b'"hips":"\\u0000"'))
+    lose_everything(engine, folder_store)
+    with pytest.raises(InvalidFile, match="the database refuses it"):
+        import_tenant(engine, folder_store, "default", tmp_path / "b")
+    assert rigs_of(engine) == []
+
+
+def character(
+    engine: sa.Engine,
+    store: FolderStore,
+    name: str = "hero",
+    data: bytes = b"a character",
+    rig_map: dict[str, str | None] | None = None,
+) -> None:
+    new = NewRig("default", name, "glb", data, rig_map, {"parts": {"hips": {"joint": "Hips", "how": "words"}}})
+    add_rig(engine, store, new, Actor("ann", None), limit=9)
+
+
+def rigs_of(engine: sa.Engine) -> list[dict[str, Any]]:
+    """The rigs, in the order of their names; their ids are made anew."""
+    with transaction(engine) as conn:
+        rows = list_rigs(conn, "default").rows
+    return sorted(({**vars(row), "id": None} for row in rows), key=lambda row: row["name"])
 
 
 def test_another_tenants_job_is_not_overwritten_and_a_folder_with_something_in_it_is_not_used(
@@ -177,6 +257,14 @@ def edit_job(folder: Path, change: Callable[[bytes], bytes]) -> None:
     jobs = {str(job): entry.model_dump() for job, entry in manifest.jobs.items()}
     jobs[str(first)] = {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
     edit_manifest(folder, jobs=jobs)
+
+
+def edit_rigs(folder: Path, change: Callable[[bytes], bytes]) -> None:
+    """Change the records of the rigs, and their hash with them."""
+    path = folder / "rigs.jsonl"
+    data = change(path.read_bytes())
+    path.write_bytes(data)
+    edit_manifest(folder, rig_records={"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)})
 
 
 def a_file(folder: Path) -> Path:
@@ -220,6 +308,29 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
         InvalidFile,
         "holds job",
     ),
+    "no rigs": (lambda b: (b / "rigs.jsonl").unlink(), InvalidFile, "is missing"),
+    "other rigs": (lambda b: (b / "rigs.jsonl").write_bytes(b"x"), InvalidFile, "another hash"),
+    "a rig of a foreign name": (
+        lambda b: edit_rigs(b, lambda d: d.replace(b'"name":"hero"', b'"name":"../hero"')),
+        InvalidFile,
+        "name",
+    ),
+    "a reference rig": (
+        lambda b: edit_rigs(b, lambda d: d.replace(b'"name":"hero"', b'"name":"mixamo"')),
+        InvalidFile,
+        "reference rig",
+    ),
+    "a rig twice": (lambda b: edit_rigs(b, lambda d: d + d), InvalidFile, "two rigs have one name"),
+    "a job among the rigs": (
+        lambda b: edit_rigs(b, lambda d: b'{"job":{}}\n' + d),
+        InvalidFile,
+        "not a record of a backup",
+    ),
+    "a rig without its file": (
+        lambda b: edit_rigs(b, lambda d: re.sub(rb'"sha256":"\w{64}","size"', b'"sha256":"%064d","size"' % 0, d)),
+        InvalidFile,
+        "is missing",
+    ),
     "what no text can hold": (
         lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),
         InvalidFile,
@@ -232,6 +343,7 @@ def test_a_damaged_or_forged_backup_is_refused_and_nothing_is_written(
     engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
 ) -> None:
     studio(engine, folder_store)
+    character(engine, folder_store)
     export_tenant(engine, folder_store, "default", tmp_path / "good")
     lose_everything(engine, folder_store)
     for name, (damage, error, words) in DAMAGE.items():
@@ -242,17 +354,23 @@ def test_a_damaged_or_forged_backup_is_refused_and_nothing_is_written(
             import_tenant(engine, folder_store, "default", folder)
         with transaction(engine) as conn:
             assert list_jobs(conn, "default").rows == (), name
+            assert list_rigs(conn, "default").rows == (), name
 
 
 def test_the_commands_say_what_they_did(
     engine: sa.Engine, database_url: str, folder_store: FolderStore, tmp_path: Path
 ) -> None:
     studio(engine, folder_store)
+    character(engine, folder_store)
     environment = {"MAREY_DATABASE_URL": database_url, "MAREY_STORE": str(folder_store.root)}
     marey = Marey(tmp_path / "home", tmp_path / "models", environment)
     ran = marey("admin", "export", tmp_path / "b").ok()
-    assert "2 jobs of 6 items in all, 4 files" in ran.err
+    assert "2 jobs of 6 items in all, 1 rigs, 5 files" in ran.err
     lose_everything(engine, folder_store)
     ran = marey("admin", "import", tmp_path / "b", "--json").ok()
-    assert (ran.lines[0]["written"], ran.lines[0]["tenant"]) == (2, "default")
-    assert len(contents(folder_store)) == 4
+    (line,) = ran.lines
+    assert [line[name] for name in ("tenant", "jobs", "written", "rigs", "rigs_written")] == ["default", 2, 2, 1, 1]
+    assert len(contents(folder_store)) == 5
+    ran = marey("admin", "import", tmp_path / "b").ok()
+    assert "0 jobs of 6 items in all, 0 rigs, 5 files" in ran.err
+    assert "2 jobs and 1 rigs were there already" in ran.err
