@@ -115,15 +115,65 @@ def test_a_fetched_manifest_is_submitted_again_with_its_constraints(
 def test_an_item_that_cannot_be_made_names_the_field(
     api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client
 ) -> None:
-    late = {**PATH, "times": [0.0, 1.0, 3.2]}
-    bad, good = made(api, loop, {"timeline": TIMELINE, "constraints": [late]}, {"timeline": TIMELINE}, name="late")
+    tail = {"type": "pose_keyframe", "frame": 20, "joint_rotations": {"tail": [1.0, 0.0, 0.0, 0.0]}}
+    bad, good = made(api, loop, {"timeline": TIMELINE, "constraints": [tail]}, {"timeline": TIMELINE}, name="late")
     assert (bad["state"], good["state"]) == ("failed", "succeeded")
-    assert bad["error"]["where"] == "constraints.0.times.2"
+    assert bad["error"]["where"].startswith("constraints.0.joint_rotations")
     shown = marey("jobs", "show", "late").ok().out
-    assert f"failed     0: {TIMELINE!r}: constraints.0.times.2: 3.2 s is beyond the clip" in shown
-    assert "Its last frame is at 2.95 s: end there" in shown
+    assert f"failed     0: {TIMELINE!r}: constraints.0.joint_rotations" in shown
     watched = marey("jobs", "watch", "late")
     assert watched.code == 6
+
+
+LATE = {**PATH, "times": [0.0, 1.0, 3.2]}
+BY_FRAMES = {"type": "root_path", "frames": [0, 15, 30], "positions_xz": PATH["positions_xz"]}
+FAR = {**PATH, "times": [0.0, 1.0, 20.0]}
+
+
+@pytest.mark.parametrize(
+    ("item", "field", "message"),
+    [
+        ({"timeline": TIMELINE, "constraints": [LATE]}, "constraints.0.times.2", "3.2 s is beyond the clip"),
+        ({"prompt": "walk", "seconds": 3, "constraints": [LATE]}, "constraints.0.times.2", "3.2 s is beyond the clip"),
+        ({"prompt": "walk for 3 seconds", "constraints": [LATE]}, "constraints.0.times.2", "3.2 s is beyond the clip"),
+        (
+            {"prompt": "walk", "seconds": 3, "settings": {"fps": 10}, "constraints": [BY_FRAMES]},
+            "constraints.0.frames.2",
+            "frame 30 is beyond the clip, which has 30 frames at 10 fps",
+        ),
+        ({"prompt": "walk", "constraints": [FAR]}, "constraints", "they take 20.05 s; this bundle generates 9.8 s"),
+        ({"prompt": "walk", "constraints": []}, "constraints", "is an empty list"),
+    ],
+    ids=["timeline", "seconds", "stated", "another rate", "longer than the model", "empty"],
+)
+def test_constraints_beyond_a_known_length_are_refused_before_the_queue(
+    api: LiveApi, marey: Command, http: httpx2.Client, tmp_path: Path, item: dict[str, Any], field: str, message: str
+) -> None:
+    for validate_only in ("true", "false"):
+        answer = http.post("/v1/jobs", json={"items": [item]}, params={"validate_only": validate_only})
+        assert answer.status_code == 422, answer.text
+        ((found, said),) = [(each["field"], each["message"]) for each in answer.json()["problems"]]
+        assert found == field
+        assert message in said
+    rows = tmp_path / "rows.jsonl"
+    rows.write_text(json.dumps(item) + "\n")
+    ran = marey("submit", "-f", rows, "--dry-run")
+    assert ran.code == 2
+    assert f"line 1: {field}: {message}" in ran.err
+
+
+def test_constraints_up_to_the_last_frame_are_accepted(api: LiveApi, marey: Command, tmp_path: Path) -> None:
+    file = tmp_path / "path.json"
+    for seconds, end in ((3, 3.0), (3, 2.95)):
+        file.write_text(json.dumps([{**PATH, "times": [0.0, 1.0, end]}]))
+        marey("submit", "walk", "--seconds", seconds, "--constraints", file, "--dry-run").ok()
+    file.write_text(json.dumps([LATE]))
+    marey("submit", "walk", "--constraints", file, "--dry-run").ok()
+    refused = marey("submit", "walk", "--seconds", 3, "--constraints", file, "--dry-run")
+    assert (refused.code, "constraints.0.times.2: 3.2 s is beyond the clip" in refused.err) == (2, True)
+    file.write_text("[]")
+    refused = marey("submit", "walk", "--constraints", file, "--dry-run")
+    assert (refused.code, "constraints: is an empty list" in refused.err) == (2, True)
 
 
 def test_pages_of_timelines_and_of_edits_by_a_model(

@@ -9,11 +9,14 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
+from marey.items.constraints import ROOT_PATH, for_clip, frames_to_last, last_frame
 from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, Rows, outside_range
 from marey.items.timeline import TIMELINE_HINT, no_timelines, timeline_seconds
 from marey.registry import Setting, find_model
 from marey.vocabulary.lengths import stated_length
 
+DEFAULT_FPS = 20.0
+"""Of a bundle whose manifest states none."""
 MAX_FRAMES = 2**53
 """The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""
 
@@ -46,7 +49,7 @@ def _seconds(bundle: Bundle, name: str, of_model: float | None) -> float:
         return of_model
     if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < MAX_FRAMES:
         raise InvalidBundle(f"its parameters give no number as {name!r}", where=str(bundle.path))
-    return value / (bundle.manifest.fps or 20.0)
+    return value / (bundle.manifest.fps or DEFAULT_FPS)
 
 
 def check_seconds(bundle: Bundle, seconds: float | None) -> None:
@@ -69,6 +72,26 @@ def check_timeline(bundle: Bundle, timeline: Rows | None) -> None:
     spec = find_model(bundle.manifest.model)
     if timeline is not None and not (spec and spec.keeps_frames):
         raise InvalidInput(no_timelines(bundle.manifest.model), hint=TIMELINE_HINT)
+
+
+def check_constraints(bundle: Bundle, item: Item) -> None:
+    """Check the constraints of an item against its motion, as far as its length is known before it is generated.
+
+    Raises:
+        InvalidInput: one is beyond the motion, or two contradict each other there; with the field in `where`.
+    """
+    if item.constraints is None:
+        return
+    model_fps = bundle.manifest.fps or DEFAULT_FPS
+    fps, seconds = item.settings.get("fps", model_fps), length_of(bundle, item)
+    if seconds is not None:
+        frames = round(seconds * model_fps)
+    else:
+        low, high = (round(length * model_fps) for length in seconds_of(bundle))
+        least = frames_to_last(item.constraints, fps, model_fps, low, high)
+        frames = least if last_frame(item.constraints, fps, kind=ROOT_PATH) is not None else None
+    if frames is not None:
+        for_clip(item.constraints, frames, model_fps, fps)
 
 
 def length_of(bundle: Bundle, item: Item) -> float | None:

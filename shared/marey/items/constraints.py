@@ -14,6 +14,7 @@ from typing import Any, cast
 
 from marey.core.characters import check_text, is_printable
 from marey.core.errors import InvalidInput
+from marey.core.frame_rates import frames_at_rate
 
 Constraint = dict[str, Any]
 
@@ -47,6 +48,8 @@ def read_constraints(value: object) -> list[Constraint]:
         InvalidInput: with the field in `where`, as `constraints.0.positions_xz.3`.
     """
     given = _items(value, "constraints", "a list of constraints")
+    if not given:
+        raise InvalidInput("is an empty list", where="constraints", hint="Leave it out, or name a constraint.")
     if len(given) > MAX_CONSTRAINTS:
         raise InvalidInput(f"{len(given)} constraints; at most {MAX_CONSTRAINTS}", where="constraints")
     read = [_constraint(each, f"constraints.{number}") for number, each in enumerate(given)]
@@ -106,6 +109,49 @@ def ended_with_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: 
         if times and end < times[-1] <= end + 1 / fps + 1e-6 and (len(times) == 1 or times[-2] < end):
             each["times"] = [*times[:-1], end]
     return found
+
+
+def frames_to_last(
+    constraints: Sequence[Mapping[str, Any]], fps: float, model_fps: float, low: int, high: int
+) -> int | None:
+    """Return the frames of the model that reach to the last constraint; None without any.
+
+    Args:
+        fps: of the clip.
+        model_fps: of the model.
+        low, high: fewest and most frames that the model generates.
+
+    Raises:
+        InvalidInput: they are more than that.
+    """
+    last = last_frame(constraints, fps)
+    if last is None:
+        return None
+    least = max(math.ceil(last / fps * model_fps - 1e-6) + 1, low)
+    if least > high:
+        raise InvalidInput(
+            f"they take {least / model_fps:g} s; this bundle generates {high / model_fps:g} s", where="constraints"
+        )
+    return least
+
+
+def for_clip(
+    constraints: Sequence[Mapping[str, Any]], frames: int, model_fps: float, fps: float
+) -> tuple[list[dict[str, Any]], int]:
+    """Return constraints as they are for a clip, with its number of frames.
+
+    Args:
+        frames: of the model.
+        model_fps: of the model.
+        fps: of the clip.
+
+    Raises:
+        InvalidInput: as `check_clip`.
+    """
+    count = frames_at_rate(frames, model_fps, fps)
+    ended = ended_with_clip(constraints, count, fps)
+    check_clip(ended, count, fps)
+    return ended, count
 
 
 def check_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: float) -> None:

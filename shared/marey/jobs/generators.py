@@ -12,6 +12,7 @@ from functools import cached_property
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from marey.bundles.find import log_broken
 from marey.bundles.limits import (
+    check_constraints,
     check_seconds,
     check_settings,
     check_timeline,
@@ -58,6 +59,10 @@ class GeneratorCapabilities:
     def check_timeline(self, timeline: Rows | None) -> None:
         """See `check_timeline`."""
         check_timeline(self.bundle, timeline)
+
+    def check_constraints(self, item: Item) -> None:
+        """See `check_constraints`."""
+        check_constraints(self.bundle, item)
 
     def judge(self, item: Item, report: ScopeReport) -> Scope | None:
         """Return the scope of an item's prompts, and count it; None if the bundle lists no actions."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.core.frame_rates import frames_at_rate
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array, normalize, unroll
@@ -23,8 +24,7 @@ def frame_times(frames: int, fps: float, to: float) -> Array:
     """
     if not SLOWEST <= to <= FASTEST:
         raise InvalidInput(f"{to:g} frames a second; allowed: {SLOWEST:g} to {FASTEST:g}")
-    count = int((frames - 1) / fps * to + 1e-6) + 1
-    return np.minimum(np.arange(count) * (fps / to), frames - 1)
+    return np.minimum(np.arange(frames_at_rate(frames, fps, to)) * (fps / to), frames - 1)
 
 
 def interpolate(values: Array, times: Array) -> Array:

@@ -33,7 +33,9 @@ MOTION = {"type": "pose_keyframe", "frame": 3, "motion": {"file": "pose.npz", "f
 def constraints(draw: st.DrawFn) -> list[dict[str, Any]]:
     """Constraints of one clip that contradict nothing: each names frames of its own."""
     number, frame, found = st.floats(-3, 3, allow_nan=False), 0, list[dict[str, Any]]()
-    for kind in draw(st.lists(st.sampled_from(("root_path", "pose_keyframe", "effector_target")), max_size=6)):
+    for kind in draw(
+        st.lists(st.sampled_from(("root_path", "pose_keyframe", "effector_target")), min_size=1, max_size=6)
+    ):
         frames = [frame := frame + draw(st.integers(30, 60)) for _ in range(draw(st.integers(1, 4)))]
         if kind == "root_path":
             x, z = draw(number), draw(number)
@@ -96,6 +98,7 @@ def changed(base: dict[str, Any], **changes: Any) -> dict[str, Any]:
     ("value", "where", "message"),
     [
         ({"type": "root_path"}, "constraints", "not a list"),
+        ([], "constraints", "an empty list"),
         ([3], "constraints.0", "not an object"),
         ([{"frames": []}], "constraints.0.type", "missing"),
         ([{"type": "path"}], "constraints.0.type", "unknown type 'path'"),

@@ -29,6 +29,8 @@ MAX_MODELS = 100
 """Maximum distinct models in one body: each is looked up on disk."""
 MAX_LINES = 1_000_000
 """Maximum lines of NDJSON, including blank ones."""
+LENGTH_FIELDS = ("prompt", "seconds", "timeline", "settings", "constraints")
+"""Fields of an item that decide the length of its motion, and what is to fit it."""
 Raws = Callable[[], Iterator[tuple[int, object]]]
 """Function that yields the items of a body with their lines, from its beginning at each call."""
 
@@ -184,7 +186,9 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
                     hold(values[name])
             except MareyError as error:
                 yield _problem(error, line, name)
-        yield from named.add(values.get("constraints", ()), line)
+        if (constraints := values.get("constraints")) is not None:
+            yield from _beyond(generator, values, line)
+            yield from named.add(constraints, line)
 
     for item in read_items(counted(), check=check):
         bundle = generators[item.model].bundle
@@ -193,6 +197,15 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     if fields.scope == "refuse":
         refuse_unknown(submission.prompts())
     return submission
+
+
+def _beyond(generator: GeneratorCapabilities, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+    """Yield the problem of constraints that do not fit the motion of an item, as far as its length is known."""
+    known = {"prompt": "", **{name: values[name] for name in LENGTH_FIELDS if name in values}}
+    try:
+        generator.check_constraints(Item(**known))
+    except InvalidInput as error:
+        yield _problem(error, line, "constraints")
 
 
 def _problem(error: MareyError, line: int | None, field: str) -> Problem:

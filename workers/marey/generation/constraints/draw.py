@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from marey.core.errors import InvalidInput
+from marey.core.frame_rates import frames_at_rate
 from marey.generation.candidates import DrawPlan, candidate_seed
 from marey.generation.constraints.choose import candidate_of, fit_candidate
 from marey.generation.constraints.constraint_set import ConstraintSet, asked_of
@@ -20,10 +20,9 @@ from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.generation.shots.timelines import plan_timeline
-from marey.items.constraints import ROOT_PATH, check_clip, ended_with_clip, last_frame
+from marey.items.constraints import ROOT_PATH, for_clip, frames_to_last, last_frame
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.clip import MotionClip
-from marey.motion.resample import frame_times
 from marey.motion.skeleton import Skeleton
 from marey.quality.selection import KEY, Selection
 
@@ -77,15 +76,9 @@ def constrained_request(
 
 def _reaching(known: Request, constraints: Constraints, limits: Limits, rate: float) -> int | None:
     """Return the length in frames of the model that reaches to the last constraint; None = it decides later."""
-    last = last_frame(constraints, rate)
-    if last is None:
+    least = frames_to_last(constraints, rate, limits.fps, limits.min_frames, limits.max_frames)
+    if least is None:
         return known.frames
-    least = max(int(np.ceil(last / rate * limits.fps - 1e-6)) + 1, limits.min_frames)
-    if least > limits.max_frames:
-        raise InvalidInput(
-            f"they take {least / limits.fps:g} s; this bundle generates {limits.max_frames / limits.fps:g} s",
-            where="constraints",
-        )
     if last_frame(constraints, rate, kind=ROOT_PATH) is not None:
         return least
     return None if known.frames is None else max(known.frames, least)
@@ -104,10 +97,8 @@ def _asked(
         frames = plan_timeline(request.timeline, request.seed, limits).frames
     else:
         frames = request.frames or limits.max_frames
-    count = len(frame_times(frames, limits.fps, rate))
-    constraints = ended_with_clip(constraints, count, rate)
-    check_clip(constraints, count, rate)
-    asked = asked_of(constraints, skeleton, count, rate)
+    own, count = for_clip(constraints, frames, limits.fps, rate)
+    asked = asked_of(own, skeleton, count, rate)
     return asked if request.timeline is None else replace(asked, retimed=False)
 
 
@@ -182,7 +173,7 @@ def _cost(generator: Generator[Any], asked: ConstraintSet, generated: MotionFeat
         return 0.0
     layout = generator.layout
     joints = np.asarray(layout.decode(generated.features), np.float64) * scale
-    frames = len(frame_times(asked.frames, asked.fps, layout.fps))
+    frames = frames_at_rate(asked.frames, asked.fps, layout.fps)
     return misfit(joints, asked.at_rate(layout.fps, frames), layout.skeleton)
 
 
