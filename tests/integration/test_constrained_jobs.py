@@ -176,6 +176,16 @@ def test_constraints_up_to_the_last_frame_are_accepted(api: LiveApi, marey: Comm
     assert (refused.code, "constraints: is an empty list" in refused.err) == (2, True)
 
 
+def test_a_motion_has_the_terms_of_its_poses(api: LiveApi, loop: Loop, generator: Any) -> None:
+    turns = [[1.0, 0.0, 0.0, 0.0]] * len(generator.layout.skeleton)
+    pose = {"type": "pose_keyframe", "frame": 20, "joint_rotations": turns, "licence": "CC-BY-NC-4.0"}
+    own, plain = made(
+        api, loop, {"prompt": "walk", "seconds": 3, "constraints": [pose]}, {"prompt": "walk", "seconds": 3}
+    )
+    assert own["motion"]["licence"] == clip_of(api, own["motion"]["id"]).manifest["licence"] == "CC-BY-NC-4.0"
+    assert plain["motion"]["licence"] == generator.bundle.manifest.licence
+
+
 def test_pages_of_timelines_and_of_edits_by_a_model(
     api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client, tmp_path: Path
 ) -> None:

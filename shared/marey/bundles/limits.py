@@ -12,6 +12,7 @@ from marey.core.errors import InvalidBundle, InvalidInput
 from marey.items.constraints import ROOT_PATH, for_clip, frames_to_last, last_frame
 from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, Rows, outside_range
 from marey.items.timeline import TIMELINE_HINT, no_timelines, timeline_seconds
+from marey.motion.edits.licences import terms_with
 from marey.registry import Setting, find_model
 from marey.vocabulary.lengths import stated_length
 
@@ -75,13 +76,16 @@ def check_timeline(bundle: Bundle, timeline: Rows | None) -> None:
 
 
 def check_constraints(bundle: Bundle, item: Item) -> None:
-    """Check the constraints of an item against its motion, as far as its length is known before it is generated.
+    """Check the constraints of an item against its motion, as far as its length is known before it is generated, and
+    the terms of their poses against those of the bundle.
 
     Raises:
-        InvalidInput: one is beyond the motion, or two contradict each other there; with the field in `where`.
+        InvalidInput: one is beyond the motion, two contradict each other there, or no licence satisfies the terms of
+            both; with the field in `where`.
     """
     if item.constraints is None:
         return
+    terms_with(bundle.manifest.licence, item.constraints)
     model_fps = bundle.manifest.fps or DEFAULT_FPS
     fps, seconds = item.settings.get("fps", model_fps), length_of(bundle, item)
     if seconds is not None:

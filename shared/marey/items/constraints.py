@@ -35,6 +35,8 @@ HIGHEST, LOWEST = 2.6, -0.1
 FARTHEST = 1.2
 """Metres on the floor between a body on its path and what it reaches."""
 MAX_JOINTS, MAX_JOINT_NAME = 200, 100
+MAX_LICENCE = 200
+"""Characters."""
 AGREE, NEAR_PATH = 0.03, 0.25
 """Metres: two targets of one joint at one frame are the same up to the first, and a root on a path up to the second."""
 UNIT = 0.02
@@ -283,6 +285,8 @@ def _pose_keyframe(given: Mapping[str, object], where: str) -> Constraint:
         read["root_position"] = _place(given["root_position"], f"{where}.root_position")
     if "root_height" in given:
         read["root_height"] = _height(_number(given["root_height"], f"{where}.root_height"), f"{where}.root_height")
+    if "licence" in given:
+        read["licence"] = _licence(given["licence"], f"{where}.licence")
     return read
 
 
@@ -305,7 +309,7 @@ def _effector_target(given: Mapping[str, object], where: str) -> Constraint:
 
 _READERS: dict[str, tuple[tuple[str, ...], Callable[[Mapping[str, object], str], Constraint]]] = {
     ROOT_PATH: (("frames", "times", "positions_xz", "heading_radians"), _root_path),
-    POSE_KEYFRAME: (("frame", "motion", "joint_rotations", "root_position", "root_height"), _pose_keyframe),
+    POSE_KEYFRAME: (("frame", "motion", "joint_rotations", "root_position", "root_height", "licence"), _pose_keyframe),
     EFFECTOR_TARGET: (("joint", "frames", "positions", "rotations"), _effector_target),
 }
 
@@ -333,6 +337,12 @@ def _targets(each: Constraint, where: str) -> Iterator[tuple[str, int, list[floa
             yield "pelvis", each["frame"], each["root_position"], f"{where}.root_position"
         number = float(where.rpartition(".")[2])
         yield "pose", each["frame"], [number, 0.0, 0.0], f"{where}.frame"
+
+
+def _licence(value: object, where: str) -> str:
+    if not isinstance(value, str) or not 0 < len(value) <= MAX_LICENCE or not value.isprintable():
+        raise InvalidInput(f"is not the name of a licence: 1 to {MAX_LICENCE} printable characters", where=where)
+    return value
 
 
 def _motion(value: object, where: str) -> dict[str, Any]:

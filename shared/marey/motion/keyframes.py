@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput, MareyError
 from marey.core.extras import needs_extra
+from marey.motion.edits.licences import LICENCE
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -59,11 +60,14 @@ class PoseFiles:
 
 
 def pose_of(clip: MotionClip, frame: int) -> dict[str, Any]:
-    """Return a frame of a clip as fields of a pose keyframe: rotations by joint, and the height of the root."""
+    """Return a frame of a clip as fields of a pose keyframe: rotations by joint, the height of the root, and the terms
+    of the clip, where it has any."""
+    licence = clip.manifest.get(LICENCE)
     turns = zip(clip.skeleton.joint_names, clip.rotations[frame], strict=True)
     return {
         "joint_rotations": {name: [float(x) for x in turn] for name, turn in turns},
         "root_height": float(clip.root[frame, 1]),
+        **({LICENCE: licence} if isinstance(licence, str) and licence else {}),
     }
 
 

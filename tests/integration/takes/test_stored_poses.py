@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import httpx2
 import pytest
+import sqlalchemy as sa
 
 from marey.api.jobs import poses
 from marey.api.making.processes import MakingProcess, MakingProcesses
 from marey.client import Client
 from marey.core.errors import InvalidInput
 from marey.db import transaction
-from marey.jobs import FailureReason, asset_key
+from marey.jobs import FailureReason, asset_key, tables
 from marey.tenants import Quotas, create_key, create_tenant
 from tests.support.command import Command
 from tests.support.editing import clip_of, stored
@@ -170,7 +172,8 @@ def test_submit_reads_files_and_short_references(
 
 def test_rows_name_motions_too(api: LiveApi, http: httpx2.Client, marey: Command, tmp_path: Path) -> None:
     source = stored(api)
-    clip_of(api, source["id"]).save_npz(tmp_path / "pose.npz")
+    clip = clip_of(api, source["id"])
+    replace(clip, manifest={**clip.manifest, "licence": source["licence"]}).save_npz(tmp_path / "pose.npz")
     file = tmp_path / "rows.jsonl"
     by_file = {"type": "pose_keyframe", "frame": 10, "motion": {"file": str(tmp_path / "pose.npz"), "frame": 5}}
     rows = [{"prompt": "a person walks", "constraints": [each]} for each in (by_file, keyframe("last", 5, 10))]
@@ -189,3 +192,30 @@ def test_rows_name_motions_too(api: LiveApi, http: httpx2.Client, marey: Command
     with Client(api.url, api.key) as client, pytest.raises(InvalidInput) as refused:
         client.jobs.check(rows[:1])
     assert "constraints.0.motion.file" in str(refused.value)
+
+
+def terms(api: LiveApi, motion: str, licence: str) -> None:
+    """Let a stored motion have these terms."""
+    with transaction(api.engine) as conn:
+        conn.execute(sa.update(tables.motion).where(tables.motion.c.id == motion).values(licence=licence))
+
+
+def test_poses_bring_the_terms_of_their_motion(
+    api: LiveApi, http: httpx2.Client, marey: Command, tmp_path: Path
+) -> None:
+    closed, shared = stored(api), stored(api)
+    terms(api, closed["id"], "CC-BY-NC-4.0")
+    terms(api, shared["id"], "CC-BY-SA-4.0")
+    answer = post(http, keyframe(closed["id"], 7), keyframe(closed["id"], 9, 50))
+    assert answer.status_code == 202, answer.text
+    _, found = constraints_of(http, answer.json()["id"])
+    assert [each["licence"] for each in found] == ["CC-BY-NC-4.0"] * 2
+    for validate_only in (False, True):
+        answer = post(http, keyframe(closed["id"], 7), keyframe(shared["id"], 9, 50), validate_only=validate_only)
+        ((line, field, message),) = problems(answer)
+        assert (line, field) == (2, "constraints.1.licence")
+        assert "no licence satisfies both" in message
+    file = tmp_path / "poses.json"
+    file.write_text(json.dumps([keyframe(closed["id"], 7), keyframe(shared["id"], 9, 50)]))
+    ran = marey("submit", "a person walks", "--constraints", file, "--dry-run")
+    assert (ran.code, "constraints.1.licence" in ran.err) == (2, True)

@@ -21,6 +21,7 @@ from marey.generation.port import Request
 from marey.items.constraints import read_constraints
 from marey.motion.arrange import placement_of
 from marey.motion.clip import MotionClip
+from marey.motion.edits.licences import terms_with
 from marey.motion.rotations import rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import Flag, read_quality
@@ -183,6 +184,31 @@ def test_a_pose_is_read_from_a_motion_file(generator: Any, tmp_path: Path) -> No
         with pytest.raises(InvalidInput) as refused:
             with_poses(read_constraints([{**named, "motion": wrong}]), tmp_path)
         assert refused.value.where == f"constraints.0.motion.{field}"
+
+
+def test_a_pose_passes_its_terms_on(generator: Any) -> None:
+    closed = {**POSE, "licence": "CC-BY-NC-4.0"}
+    plain, bound = make(generator, [POSE], 0)[0], make(generator, [closed], 0)[0]
+    assert plain.manifest["licence"] == generator.bundle.manifest.licence
+    assert bound.manifest["licence"] == "CC-BY-NC-4.0"
+    np.testing.assert_array_equal(plain.joints, bound.joints)
+
+
+def test_terms_that_exclude_each_other_are_refused(generator: Any) -> None:
+    shared, closed = {**POSE, "licence": "CC-BY-SA-4.0"}, {**POSE, "frame": 3, "licence": "CC-BY-NC-4.0"}
+    with pytest.raises(InvalidInput, match="no licence satisfies both") as refused:
+        constrained_request(generator, request(generator), [shared, closed], None, None)
+    assert refused.value.where == "constraints.1.licence"
+    assert terms_with("MIT", [line(), shared]) == "CC-BY-SA-4.0"
+    assert terms_with("MIT", [line(), POSE]) == "MIT"
+
+
+def test_the_terms_of_a_file_are_those_of_its_manifest(generator: Any, tmp_path: Path) -> None:
+    (clip,) = make(generator, [POSE], 0)
+    replace(clip, manifest={**clip.manifest, "licence": "CC-BY-NC-4.0"}).save_npz(tmp_path / "pose.npz")
+    named = {"type": "pose_keyframe", "frame": 5, "motion": {"file": "pose.npz", "frame": 7}, "licence": "MIT"}
+    (read,) = with_poses(read_constraints([named]), tmp_path)
+    assert read["licence"] == "CC-BY-NC-4.0"
 
 
 def test_smoothing_keeps_both_ends() -> None:

@@ -123,6 +123,8 @@ def changed(base: dict[str, Any], **changes: Any) -> dict[str, Any]:
         ([changed(POSE, joint_rotations={"a" * 101: [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
         ([changed(POSE, joint_rotations={"": [1, 0, 0, 0]})], "constraints.0.joint_rotations", "not the name"),
         ([changed(MOTION, motion={"file": "a\0b", "frame": 0})], "constraints.0.motion.file", "NUL"),
+        ([changed(POSE, licence="")], "constraints.0.licence", "not the name of a licence"),
+        ([changed(POSE, licence="MIT\n")], "constraints.0.licence", "not the name of a licence"),
         ([POSE] * 65, "constraints", "65 constraints; at most 64"),
         ([changed(PATH, frames=[*range(2001)], positions_xz=[[0, 0]] * 2001)], "constraints.0.frames", "2,001 points"),
     ],

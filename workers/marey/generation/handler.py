@@ -22,6 +22,7 @@ from marey.generation.requests import request_of
 from marey.generation.shots.dispatch import bucket_of, generate_any
 from marey.generation.shots.editor import EditModel
 from marey.jobs import ClaimedItem
+from marey.motion.edits.licences import LICENCE
 from marey.runtime.editing import EditInput
 from marey.runtime.exporting import export_clip
 from marey.runtime.exports import Export
@@ -145,10 +146,10 @@ class GeneratorHandler(Generic[S]):
     ) -> Sequence[Callable[[], Export] | None]:
         """Generate motions with constraints."""
         values, plan = split_settings(items[0].settings)
-        settings, licence = self.generator.settings(values), self.generator.bundle.manifest.licence
+        settings = self.generator.settings(values)
         asked = [item.constraints or () for item in items]
         clips = constrained_clips(self.generator, requests, asked, settings, plan, control=control)
-        return [None if clip is None else partial(export_clip, clip, licence) for clip in clips]
+        return [None if clip is None else partial(export_clip, clip, str(clip.manifest[LICENCE])) for clip in clips]
 
     def _free_exports(
         self, items: Sequence[ClaimedItem], requests: Sequence[Request], control: GenerationControl

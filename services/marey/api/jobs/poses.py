@@ -16,6 +16,7 @@ from marey.exporters.registry import CANONICAL
 from marey.items.constraints import named_motions
 from marey.items.item import InvalidItems, Item, Problem
 from marey.jobs import MotionRow, asset_key, find_motions
+from marey.motion.edits.licences import LICENCE
 from marey.motion.keyframes import beyond, with_pose
 from marey.tenants import ApiKey
 
@@ -24,7 +25,7 @@ MOST_MOTIONS, MOST_FRAMES = 16, 256
 MOST_KEYFRAMES = 10_000
 """Keyframes of one job that name motions: each becomes the rotations of all joints."""
 Poses = Mapping[tuple[UUID, int], Mapping[str, Any]]
-"""Poses (`pose_of`) by motion and frame."""
+"""Poses (`pose_of`) by motion and frame, with the terms of the motion."""
 Place = tuple[int | None, str]
 """Line and field that name a frame first, as `constraints.0.motion`."""
 
@@ -93,7 +94,8 @@ async def read_poses(shared: Context, key: ApiKey, named: NamedPoses) -> Poses:
             line, where = next(iter(frames.values()))
             problems.append(Problem(line, f"{where}.id", _said(error)))
             continue
-        poses |= {(motion, frame): pose for frame, pose in zip(frames, found, strict=True)}
+        terms = {LICENCE: rows[motion].licence} if rows[motion].licence else {}
+        poses |= {(motion, frame): {**pose, **terms} for frame, pose in zip(frames, found, strict=True)}
     if problems:
         raise InvalidItems(problems)
     return poses

@@ -101,7 +101,7 @@ async def submit_job(
     }
     async with kept_body(request, shared, key.tenant) as body:
         submission = await body.run(_read, kind, body.file, fields, shared)
-        submission = submission.with_poses(await read_poses(shared, key, submission.named))
+        submission = await body.run(submission.with_poses, await read_poses(shared, key, submission.named))
         if validate_only:
             report = await body.run(submission.examine)
             if report is not None and report.left and (decided := await shared.texts.scopes(report.left)):

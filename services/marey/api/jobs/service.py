@@ -21,6 +21,7 @@ from marey.items.item import InvalidItems, Item, Problem, read_item, read_items,
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items
+from marey.motion.edits.licences import terms_with
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import Scope
 
@@ -52,8 +53,34 @@ class Submission:
     _poses: Poses = field(default_factory=dict[Any, Any])
 
     def with_poses(self, poses: Poses) -> Submission:
-        """Return the submission with the poses that its constraints name; its items need them."""
-        return replace(self, _poses=poses)
+        """Return the submission with the poses that its constraints name; its items need them.
+
+        Raises:
+            InvalidItems: no licence satisfies the terms of a pose and of the bundle.
+        """
+        filled = replace(self, _poses=poses)
+        if poses:
+            filled.check_terms()
+        return filled
+
+    def check_terms(self) -> None:
+        """Check the terms of the poses against those of the bundles; the body is read again.
+
+        Raises:
+            InvalidItems: with each that excludes its bundle.
+        """
+        problems: list[Problem] = []
+        for line, raw in self._raws():
+            item, _ = read_item(raw, line)
+            if item is None or item.constraints is None:
+                continue
+            licence = self._generators[item.model].bundle.manifest.licence
+            try:
+                terms_with(licence, posed(item, self._poses).constraints or ())
+            except InvalidInput as error:
+                problems.append(_problem(error, line, "constraints"))
+        if problems:
+            raise InvalidItems(problems)
 
     @property
     def bundles(self) -> list[str]:

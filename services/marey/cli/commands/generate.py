@@ -366,7 +366,7 @@ def _write(
         "variant": plan.variant,
         "model": bundle.manifest.model,
         "bundle": bundle.reference,
-        "licence": bundle.manifest.licence,
+        "licence": clip.manifest.get("licence", bundle.manifest.licence),
         "seed": plan.wanted.seed,
         "state": "succeeded",
         "error": None,

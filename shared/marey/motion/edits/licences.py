@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from marey.core.errors import InvalidInput
 
+LICENCE = "licence"
+"""Field of a pose keyframe, and key of a manifest."""
 _NON_COMMERCIAL = re.compile(r"(?<![A-Za-z])NC(?![A-Za-z])|non-?commercial|research only", re.IGNORECASE)
 _SHARE_ALIKE = re.compile(r"(?<![A-Za-z])SA(?![A-Za-z])|share-?alike", re.IGNORECASE)
 
@@ -30,3 +33,20 @@ def strictest(licences: Iterable[str | None], *, where: str = "licence") -> str 
             hint="Leave one of the motions out.",
         )
     return " AND ".join(closed or shared or known) or None
+
+
+def terms_with(licence: str | None, constraints: Iterable[Mapping[str, Any]]) -> str | None:
+    """Return the licence of a motion that is generated with constraints: that of the weights and of the motions that
+    their poses are from.
+
+    Raises:
+        InvalidInput: no licence satisfies both; with the field in `where`.
+    """
+    found = licence
+    for number, each in enumerate(constraints):
+        try:
+            found = strictest([found, each.get(LICENCE)])
+        except InvalidInput as error:
+            hint = "Leave the pose out, or use another bundle."
+            raise InvalidInput(error.message, where=f"constraints.{number}.{LICENCE}", hint=hint) from None
+    return found

@@ -23,6 +23,7 @@ from marey.generation.shots.timelines import plan_timeline
 from marey.items.constraints import ROOT_PATH, for_clip, frames_to_last, last_frame
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.clip import MotionClip
+from marey.motion.edits.licences import LICENCE, terms_with
 from marey.motion.skeleton import Skeleton
 from marey.quality.selection import KEY, Selection
 
@@ -63,9 +64,10 @@ def constrained_request(
         fps: of the clip; None = the model's.
 
     Raises:
-        InvalidInput: constraints beyond the clip, of another skeleton, or that contradict one another; with the field
-            in `where`.
+        InvalidInput: constraints beyond the clip, of another skeleton, that contradict one another, or poses under
+            terms that exclude those of the weights; with the field in `where`.
     """
+    terms_with(generator.bundle.manifest.licence, constraints)
     rate, limits = fps or generator.layout.fps, generator.limits
     known = resolve_request(generator, request)
     if seconds is None and request.timeline is None:
@@ -195,6 +197,7 @@ def _best(generator: Generator[S], row: _Drawn, settings: S, plan: DrawPlan, bod
     )
     about = {
         "seed": row.request.seed,
+        LICENCE: terms_with(generator.bundle.manifest.licence, row.constraints),
         CONSTRAINTS: [dict(each) for each in row.constraints],
         KEY: selection.model_dump(mode="json"),
     }
