@@ -65,11 +65,20 @@ class NewItemBody(BaseModel):
         None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = as the prompt states, else the model decides."
     )
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Seed of variant 0; variant k uses seed + k.")
-    variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
+    variants: int | None = Field(
+        None, ge=1, le=MAX_VARIANTS, description="Motions of the prompt, each with its own seed; None = 1."
+    )
     model: str | None = Field(None, description="Model, bundle or exact bundle.", json_schema_extra=ITEM_MODEL)
-    tags: list[str] | None = Field(None, max_length=MAX_TAGS, json_schema_extra=TAGS)
+    tags: list[str] | None = Field(
+        None,
+        max_length=MAX_TAGS,
+        description="Words or `key=value`, such as `shot=010`, by which motions are found.",
+        json_schema_extra=TAGS,
+    )
     settings: dict[str, Any] | None = Field(
-        None, description="Sampling settings, such as `guidance`.", json_schema_extra=SAMPLING
+        None,
+        description="Sampling settings of the model, such as `guidance`, and `fps`, `best_of`, `redraws`.",
+        json_schema_extra=SAMPLING,
     )
     variety: Literal["low", "normal", "high"] | None = Field(
         None, description="How much motions of the prompt differ; None = `normal`, as the bundle ships."
@@ -92,9 +101,14 @@ class CommonJobFields(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    name: Name | None = None
-    comment: Comment | None = None
-    priority: int = Field(0, ge=-PRIORITY_LIMIT, le=PRIORITY_LIMIT)
+    name: Name | None = Field(None, description="A name by which the job is found; need not be unique.")
+    comment: Comment | None = Field(None, description="A note for people.")
+    priority: int = Field(
+        0,
+        ge=-PRIORITY_LIMIT,
+        le=PRIORITY_LIMIT,
+        description="Order among the jobs of the tenant: higher runs first.",
+    )
     keep_days: int | None = Field(
         None, ge=1, le=MAX_KEEP_DAYS, description="Days after its end when the job is deleted, with motions and files."
     )
@@ -112,7 +126,9 @@ class JobFields(CommonJobFields):
 class NewJobBody(JobFields):
     """A job as JSON."""
 
-    items: list[NewItemBody] = Field(min_length=1, max_length=MAX_ITEMS)
+    items: list[NewItemBody] = Field(
+        min_length=1, max_length=MAX_ITEMS, description="Prompts; all variants together are at most 100,000 motions."
+    )
 
 
 class JobPatch(BaseModel):
@@ -201,11 +217,11 @@ class CheckedView(View):
 class CountersView(View):
     """Number of items by state."""
 
-    ready: int
-    leased: int
-    succeeded: int
-    failed: int
-    dead: int
+    ready: int = Field(description="Items that wait for a worker.")
+    leased: int = Field(description="Items that a worker generates now.")
+    succeeded: int = Field(description="Items with a motion.")
+    failed: int = Field(description="Items that cannot be generated; their `error` says why.")
+    dead: int = Field(description="Items whose attempts are used up.")
     cancelled: int
 
 
@@ -228,17 +244,19 @@ class JobView(View):
     id: UUID
     name: str | None
     comment: str | None
-    priority: int
-    control: JobControl
-    state: JobState
-    total: int
+    priority: int = Field(description="Higher runs first, among the jobs of the tenant.")
+    control: JobControl = Field(description="What was asked for last: to run, to pause or to cancel.")
+    state: JobState = Field(
+        description="`succeeded`, `partial` (some items have no motion), `failed` and `cancelled` are ends."
+    )
+    total: int = Field(description="Number of items: prompts times variants.")
     counters: CountersView
-    fail_early: float | None
-    event_seq: int
+    fail_early: float | None = Field(description="Ratio of failed items above which open items are cancelled.")
+    event_seq: int = Field(description="Number of the newest event.")
     created: datetime
-    started: datetime | None
-    finished: datetime | None
-    keep_days: int | None
+    started: datetime | None = Field(description="Time of the first claim by a worker; null = not yet.")
+    finished: datetime | None = Field(description="Time at which the last item ended; null = some are open.")
+    keep_days: int | None = Field(description="Days from its end to its deletion; null = kept.")
     expires: datetime | None = Field(description="Time of deletion; null = never, or not before it ends.")
     erased: datetime | None = Field(description="Time when its prompts were erased.")
     scope: ScopePolicy

@@ -92,19 +92,19 @@ class MotionView(View):
     id: UUID
     job: UUID
     item: UUID
-    index: int
+    index: int = Field(description="Place of its prompt in the job, from 0.")
     name: str | None
     tags: list[str]
     prompt: str
     model: str
-    bundle: str
-    licence: str
+    bundle: str = Field(description="Exact bundle that generated it, as `hgm3-open@4b73363936fc`.")
+    licence: str = Field(description="Terms of the motion: those of the bundle's weights, as an SPDX identifier.")
     seed: int
-    variant: int
-    frames: int
-    fps: float
-    elapsed: float
-    files: list[FileView]
+    variant: int = Field(description="Number among the motions of its prompt, from 0.")
+    frames: int = Field(description="Number of poses.")
+    fps: float = Field(description="Frames a second.")
+    elapsed: float = Field(description="Seconds of computation.")
+    files: list[FileView] = Field(description="Stored files; others are made on request.")
     created: datetime
     review: ReviewView | None
     replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
