@@ -98,6 +98,26 @@ def test_an_error_names_the_operation_and_what_is_allowed(
     assert words in answer.text
 
 
+@pytest.mark.parametrize("model", [".", "../..", "/etc", "~", "/", "models/hgm3-open", ""])
+def test_a_model_is_a_name_and_no_folder_of_the_server(api: LiveApi, http: httpx2.Client, model: str) -> None:
+    answer = post(http, stored(api)["id"], {"op": "extend", "seconds": 1}, model=model)
+    assert (answer.status_code, answer.json()["where"]) == (422, "model")
+    assert "no bundle at" not in answer.text
+    assert "manifest" not in answer.text
+
+
+def test_settings_without_a_model_are_refused(api: LiveApi, http: httpx2.Client) -> None:
+    answer = post(http, stored(api)["id"], {"op": "mirror"}, settings={"temperature": 0.7})
+    assert (answer.status_code, answer.json()["where"]) == (422, "settings")
+
+
+def test_text_that_is_no_unicode_is_refused_with_an_idempotency_key_too(api: LiveApi, http: httpx2.Client) -> None:
+    body = b'{"ops": [{"op": "concat", "with": "\\ud800"}]}'
+    headers = {"Content-Type": "application/json", "Idempotency-Key": "broken"}
+    answer = http.post(f"/v1/motions/{stored(api)['id']}/edits", content=body, headers=headers)
+    assert (answer.status_code, answer.json()["where"]) == (422, "ops.0.with")
+
+
 def test_motions_of_others_are_not_found(api: LiveApi, http: httpx2.Client) -> None:
     ours = stored(api)
     with transaction(api.engine) as conn:

@@ -375,6 +375,13 @@ def test_what_cannot_be_done_is_said(ops, said):
         edit(walker(), ops)
 
 
+def test_prompts_hold_marks_that_scripts_need():
+    (step,) = read_steps([{"op": "repaint", "prompt": "a person\u200f  walks"}])
+    assert step.values["prompt"] == "a person\u200f walks"
+    with pytest.raises(InvalidInput, match="printable"):
+        read_steps([{"op": "repaint", "prompt": "a person\u202e walks"}])
+
+
 def test_every_operation_can_be_computed():
     for operation in OPERATIONS.values():
         if not operation.pieces:

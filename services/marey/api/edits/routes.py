@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections import Counter
 from typing import Annotated
 from uuid import UUID
@@ -18,6 +19,7 @@ from marey.api.edits.schemas import CheckedEditView, NewEditBody
 from marey.api.jobs.estimates import check_capacity
 from marey.api.jobs.schemas import JobView
 from marey.api.takes.schemas import MotionView
+from marey.bundles import named_by
 from marey.core import tracing
 from marey.core.errors import InvalidInput, NotFound
 from marey.http.problems import RESPONSES
@@ -101,13 +103,17 @@ def _check(conn: Connection, new: takes.NewEdit) -> CheckedEditView:
 def _generator(body: NewEditBody, shared: Context) -> takes.EditGenerator | None:
     """Return the bundle that generates frames; None if no operation needs one and none is named."""
     if body.model is None and not takes.needs_model(read_steps(body.ops)):
+        if body.settings:
+            raise InvalidInput("no operation generates frames, so no settings are used", where="settings")
         return None
     try:
-        return takes.EditGenerator(shared.catalogue.capabilities(body.model), body.settings)
+        with named_by("model"):
+            return takes.EditGenerator(shared.catalogue.capabilities(body.model), body.settings)
     except NotFound as error:
         raise InvalidInput(error.message, where="model", hint=error.hint) from error
 
 
 def _sha256(motion: UUID, body: NewEditBody) -> str:
-    """Return the digest that identifies equal edits."""
-    return hashlib.sha256(f"edits {motion}\n{body.model_dump_json()}".encode()).hexdigest()
+    """Return the digest that identifies equal edits; the values of operations are not checked yet."""
+    given = json.dumps(body.model_dump(), ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(f"edits {motion}\n{given}".encode(errors="surrogatepass")).hexdigest()

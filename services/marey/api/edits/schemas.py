@@ -9,9 +9,10 @@ from pydantic import Field, WithJsonSchema
 
 from marey.api.jobs.estimates import EstimateView
 from marey.api.jobs.schemas import CommonJobFields
-from marey.http.fields import ITEM_MODEL, SAMPLING
+from marey.http.fields import MAX_MODEL, SAMPLING
 from marey.http.problems import QuotaBody
 from marey.http.schemas import View
+from marey.items.item import MODEL
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
 
@@ -36,7 +37,8 @@ class NewEditBody(CommonJobFields):
 
     model: str | None = Field(
         None,
-        json_schema_extra=ITEM_MODEL,
+        max_length=MAX_MODEL,
+        pattern=rf"^{MODEL.pattern}$",  # a path would be one of the server's
         description="Model, bundle or exact bundle that generates frames, for operations that need one; default: the "
         "server's.",
     )

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from marey.core.characters import is_printable
+
 _FRAME = re.compile(r"f(\d{1,9})")
 REQUIRED: Any = object()
 """Default of a parameter that has to be given."""
@@ -71,7 +73,7 @@ def whole(low: int, high: int) -> Reader:
 
 def sentence(value: Any) -> str:
     """Read a prompt; what a model can read of it is checked where it is parsed."""
-    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_SENTENCE or not value.isprintable():
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_SENTENCE or not is_printable(value):
         raise ValueError(f"a sentence of 1 to {LONGEST_SENTENCE} printable characters")
     return " ".join(value.split())
 
