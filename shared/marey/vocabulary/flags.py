@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Literal
 
+from marey.vocabulary.inflection import verb_forms
 from marey.vocabulary.lexicon import Lexicon
 from marey.vocabulary.phrases import Match, Word
 from marey.vocabulary.word_lists import WordLists
@@ -29,6 +31,18 @@ _FOREIGN_SHARE = 0.3
 _GIBBERISH_SHARE = 0.5
 _LEAST_WORDS = 4
 """Words of a prompt with an action that may be gibberish nevertheless ("lorem ipsum dolor sit amet")."""
+_TOGETHER = frozenset([("each", "other"), ("one", "another")])
+"""Of people, unless parts of one are named before."""
+_ARM_IN_ARM = frozenset([("hand", "in", "hand"), ("arm", "in", "arm")])
+_SPEAKERS = frozenset(["i", "you", "we", "me"])
+"""Those who ask for a motion, and are asked: "I need a guard"."""
+_UNREAL = frozenset(["imaginary", "imagined", "invisible"])
+_NUMBERS = frozenset(["two", "three", "four", "five", "both", "several", "many"])
+_INTRODUCES = frozenset(["a", "an", "another", "other", "his", "her", "their", "my", "your"])
+_TO = frozenset(["to", "at", "toward", "towards", "for"])
+_LIKE = frozenset(["like", "as"])
+_PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we"])
+_NAMELESS = _PRONOUNS | {"someone", "somebody"}
 _MAX_SUBJECT = 5
 """Words within which the subject stands."""
 
@@ -40,19 +54,20 @@ class Flagger:
         """Keep the tables."""
         self._lexicon = lexicon
         self._lists = lists
+        self._likened = lists.likened | {form for verb in lists.likened for form in verb_forms(verb)}
 
     def details(self, words: list[Word], found: list[Match]) -> Iterator[Flag]:
         """Yield the flags of a prompt whatever it names."""
         lists = self._lists
         texts = [word.text for word in words]
-        if any(text in lists.negations for text in texts):
+        if any(text in lists.negations for text in texts) or ("rather", "than") in pairwise(texts):
             yield "negation"
         verbs = {match.start for match in found if match.end - match.start == 1}
         if any(word.base in lists.objects and at not in verbs for at, word in enumerate(words)):
             yield "objects"
         if any(self._counts(words, at) for at in range(len(words))):
             yield "counts"
-        if self._several(texts):
+        if self._several(words):
             yield "several-people"
 
     def foreign(self, words: list[Word], found: list[Match]) -> Flag | None:
@@ -60,9 +75,15 @@ class Flagger:
         texts = [word.text for word in words if word.text.isalpha()]
         if self._is_other_language(texts):
             return "other-language"
-        if words and self._is_other_subject(words):
+        if words and self._is_other_subject(words, found):
             return "other-subject"
         return "gibberish" if self._is_gibberish(texts, bool(found)) else None
+
+    def has_other_script(self, words: list[Word]) -> bool:
+        """Return True if a word is written in other letters than English ones; single letters may be signs."""
+        return any(
+            len(word.text) > 1 and not word.text.isascii() and not any(map(_is_latin, word.text)) for word in words
+        )
 
     def _counts(self, words: list[Word], at: int) -> bool:
         text = words[at].text
@@ -71,22 +92,117 @@ class Flagger:
         after = words[at + 1] if at + 1 < len(words) else Word("", "")
         return after.base not in self._lists.uncounted and after.text.removesuffix("s") not in self._lists.uncounted
 
-    def _several(self, texts: list[str]) -> bool:
-        pairs = set(pairwise(texts))
-        if ("each", "other") in pairs or ("one", "another") in pairs or {"together", "people"} <= set(texts):
+    def _several(self, words: list[Word]) -> bool:
+        """Return True if more than one person is named, or a person beside the one who acts."""
+        lists, texts = self._lists, [word.text for word in words]
+        if _ARM_IN_ARM & set(zip(texts, texts[1:], texts[2:], strict=False)) or ("someone", "else") in pairwise(texts):
             return True
-        return any(a in self._lists.several and b in self._lists.plural_people for a, b in pairs)
+        parts = self._lists.body_parts | self._lists.uncounted - self._lists.people - self._lists.plural_people
+        for at, pair in enumerate(pairwise(texts)):
+            if pair in _TOGETHER and not any({word.text, word.base} & parts for word in words[:at]):
+                return True
+        first: str | None = None
+        for at, word in enumerate(words):
+            if not self._is_person(word) or (word.text in lists.groups and not self._is_group(words, at)):
+                continue
+            if self._is_likened(words, at) or self._is_addressed(words, at):
+                continue
+            if self._is_plural(words, at) or self._are_two(words, at):
+                return True
+            if first is None and word.text not in lists.companions:
+                first = word.base
+            elif word.text not in _PRONOUNS and self._is_other(words, at, first):
+                return True
+        return False
 
-    def _is_other_subject(self, words: list[Word]) -> bool:
-        """Return True if the first noun is an animal or a thing that does something."""
+    def _is_person(self, word: Word) -> bool:
+        """Return True if a word is a person or several, not a part of one."""
         lists = self._lists
+        if {word.text, word.base} & lists.body_parts or word.text in _SPEAKERS:
+            return False
+        known = lists.people | lists.plural_people | lists.groups | lists.companions
+        return word.text in known or _single(word.text) in (lists.people | lists.companions) - _PRONOUNS
+
+    def _is_group(self, words: list[Word], at: int) -> bool:
+        """Return True if a word such as "crowd" is no part of another: not "a couple of steps", "a crowd member"."""
+        if at + 1 == len(words):
+            return True
+        after, lists = words[at + 1].text, self._lists
+        if after == "of":
+            return False
+        ends = lists.breaks | lists.prepositions | lists.auxiliaries | lists.skipped
+        return after in ends or self._lexicon.is_verb_form(after)
+
+    def _is_plural(self, words: list[Word], at: int) -> bool:
+        """Return True if a word names several people: "soldiers march", "a crowd"."""
+        lists, text = self._lists, words[at].text
+        before = words[at - 1].text if at else ""
+        if text in lists.groups or (before in _NUMBERS and text not in _NAMELESS):
+            return True
+        many = text in lists.plural_people or (text.endswith("s") and text not in lists.people | lists.companions)
+        return many and before not in lists.people  # "she guards the door"
+
+    def _are_two(self, words: list[Word], at: int) -> bool:
+        """Return True if "and" joins a word with another person: "a man and his dog" are one, "father and son" two."""
+        after = words[at + 1 : at + 5]
+        if not after or after[0].text != "and":
+            return False
+        after = after[2:] if len(after) > 1 and after[1].text in self._lists.determiners else after[1:]
+        named = next((word for word in after[:2] if self._is_person(word)), None)
+        return named is not None and (named is after[0] or not self._lexicon.is_verb_form(after[0].text))
+
+    def _is_other(self, words: list[Word], at: int, first: str | None) -> bool:
+        """Return True if a noun behind the first person introduces another one: "hugs his friend", "a boy chases a
+        girl", but not "a person does a soldier crawl"."""
+        lists = self._lists
+        start = next((k for k in range(at - 1, max(at - 4, -1), -1) if words[k].text in lists.determiners), None)
+        if start is None or words[start].text not in _INTRODUCES:
+            return False
+        between = words[start + 1 : at + 1]
+        if any(self._lexicon.is_verb_form(word.text) or word.text in _UNREAL for word in between):
+            return False
+        if words[at].base == first and words[start].text not in ("another", "other"):
+            return False
+        if first in _PRONOUNS and start and words[start - 1].text in lists.breaks:  # "where she stands, a woman …"
+            return False
+        after = words[at + 1] if at + 1 < len(words) else None
+        ends = lists.breaks | lists.prepositions | lists.auxiliaries | lists.skipped
+        return after is None or after.text in ends or after.text.endswith(("ly", "ing"))
+
+    def _is_addressed(self, words: list[Word], at: int) -> bool:
+        """Return True if something is done to, or for, a person who need not be there: "bows to the audience"."""
+        for word in reversed(words[max(at - 4, 0) : at]):
+            if word.text in self._lists.prepositions or word.text in _TO or word.text in self._lists.breaks:
+                return word.text in _TO
+        return False
+
+    def _is_likened(self, words: list[Word], at: int) -> bool:
+        """Return True if a person is only what another acts or looks like: "like a boxer", "the walk of a zombie"."""
+        for word in reversed(words[max(at - 4, 0) : at]):
+            if word.text in (".", ",", ";"):
+                return False
+            if word.text in _LIKE or word.text in self._likened:
+                return True
+            if word.text == "of":
+                return not {each.text for each in words[max(at - 4, 0) : at]} & (self._lists.groups | {"front"})
+        return False
+
+    def _is_other_subject(self, words: list[Word], found: list[Match]) -> bool:
+        """Return True if the first noun is an animal or a thing that does something; not that of a phrase such as
+        "star jumps" or "wave hands"."""
+        lists = self._lists
+        phrases = {match.start for match in found if match.end - match.start > 1}
         bare = words[0].text not in lists.determiners
         for at, word in enumerate(words[:_MAX_SUBJECT]):
             if word.text in lists.people or word.base in lists.people:
                 return False
+            if at in phrases and (bare or words[0].text in lists.counts):
+                return False
             if self._is_thing(word):
-                after = words[at + 1] if at + 1 < len(words) else None
-                if after is None or not self._is_thing(after):
+                after, third = [*words[at + 1 : at + 3], None, None][:2]
+                # "the flag waves", but in "the ocean waves crash" the waves do.
+                acts = third is None or not self._lexicon.is_verb_form(third.text)
+                if after is None or not self._is_thing(after) or (acts and self._acts(word, after)):
                     sure = not bare and not self._lexicon.knows(word.text)
                     return sure or (after is not None and self._acts(word, after))
             elif word.text in lists.breaks or word.text in lists.prepositions or (bare and at):
@@ -116,3 +232,12 @@ class Flagger:
 
     def _is_english(self, text: str) -> bool:
         return self._lexicon.knows(text) or text in self._lists.english
+
+
+def _single(text: str) -> str:
+    """Return the singular of a regular plural; any other word as it is."""
+    return text[:-1] if len(text) > 3 and text.endswith("s") else text
+
+
+def _is_latin(letter: str) -> bool:
+    return unicodedata.name(letter, "").startswith(("LATIN", "FULLWIDTH LATIN"))

@@ -152,6 +152,8 @@ class ScopeMatcher:
         if foreign is not None or not found:
             left = "verb" if foreign is None and self._phrases.names_person(words) else None
             return Scope((_nothing(prompt),), (*flags, foreign or "no-action"), left=left)
+        if self._flagger.has_other_script(words):
+            flags.append("other-language")
         named = tuple(_unique(self._named(words, match, lists) for match in found))
         scope = Scope(named, tuple(flags))
         ambiguous = scope.verdict != "unknown" and self._phrases.may_be_things(words, found)

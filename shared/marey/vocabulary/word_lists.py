@@ -21,6 +21,10 @@ class WordLists:
     sides: frozenset[str]
     breaks: frozenset[str]
     people: frozenset[str]
+    body_parts: frozenset[str]
+    groups: frozenset[str]
+    companions: frozenset[str]
+    likened: frozenset[str]
     plural_people: frozenset[str]
     several: frozenset[str]
     not_people: frozenset[str]
@@ -43,6 +47,7 @@ def load_word_lists() -> WordLists:
     sets = {name: frozenset(value.split()) for name, value in table.items() if isinstance(value, str)}
     english = frozenset(word for words in sets.values() for word in words)
     sets["skipped"] = sets.pop("dropped") | sets.pop("adverbs") | sets["sides"]
+    sets["people"] |= sets["body_parts"]
     sets["breaks"] |= frozenset(".,;:!?")
     del sets["other_verbs"]
     return WordLists(

@@ -1,11 +1,15 @@
 """Scope of prompts by their words."""
 
+import csv
+from pathlib import Path
+
 import pytest
 
 from marey.bundles import Bundle
 from marey.checks.scope_prompts import IN_SCOPE, ScopeRate, is_right, scope_prompts, scope_rates
 from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.report import warn_of
 from marey.vocabulary.scope import ActionLists, match_scope, read_policy
 from tests.support.marey import REPOSITORY
 
@@ -15,6 +19,16 @@ FEW = ActionLists(
 )
 ALL = ActionLists(tuple(load_vocabulary().actions))
 DEVELOPMENT = scope_prompts("development")
+
+
+def read_captions(folder: Path) -> list[str]:
+    """Captions of a data set, those of one cell apart."""
+    texts: list[str] = []
+    for file in sorted(folder.glob("captions-*.csv")):
+        with file.open(encoding="utf-8", newline="") as lines:
+            cells = [cell for row in csv.reader(lines) for cell in row[1:]]
+        texts += [text.strip() for cell in cells for text in cell.split("|") if len(text.split()) > 2]
+    return texts
 
 
 def test_the_development_set_has_eight_classes() -> None:
@@ -88,6 +102,22 @@ def test_verdicts_of_a_bundle_with_few_actions(
         ("ein Mann läuft", "other-language"),
         ("an old man in a coat", "no-action"),
         ("asdf qwer zxcv", "gibberish"),
+        ("she fails to stand up", "negation"),
+        ("dont run", "negation"),
+        ("crawls rather than walks", "negation"),
+        ("a double kick", "counts"),
+        ("a nurse and a doctor dance", "several-people"),
+        ("the runners stop", "several-people"),
+        ("a gang cheers", "several-people"),
+        ("he lifts his brother", "several-people"),
+        ("a guard pushes a tall thief away", "several-people"),
+        ("a two person dance", "several-people"),
+        ("everybody claps", "several-people"),
+        ("they run arm in arm", "several-people"),
+        ("a man is hugging his friend", "several-people"),
+        ("walk 前に進む", "other-language"),
+        ("she runs шагом", "other-language"),
+        ("a kite waves", "other-subject"),
     ],
 )
 def test_flags(prompt: str, flag: str) -> None:
@@ -97,6 +127,49 @@ def test_flags(prompt: str, flag: str) -> None:
 @pytest.mark.parametrize("prompt", ["lifts two hands", "a wave of the left hand", "he walks for 3 seconds", "..."])
 def test_prompts_without_counts(prompt: str) -> None:
     assert "counts" not in match_scope(prompt, ALL).flags
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "a person walks like an old man",
+        "someone imitates a boxer",
+        "the walk of a zombie",
+        "a man does a soldier crawl",
+        "she bows to the audience",
+        "he waves at a friend",
+        "I need a guard who kneels",
+        "a couple of steps to the left",
+        "an audience member claps",
+        "both hands circle each other",
+        "punches an imaginary opponent",
+        "jogging where she stands, a woman keeps her elbows bent",
+        "she guards the door",
+    ],
+)
+def test_one_person_is_no_several(prompt: str) -> None:
+    assert "several-people" not in match_scope(prompt, ALL).flags
+
+
+@pytest.mark.parametrize("prompt", ["three star jumps", "wave hands, no no", "wave arms in turn, right high"])
+def test_the_noun_of_a_phrase_is_no_subject(prompt: str) -> None:
+    assert match_scope(prompt, ALL).verdict == "known"
+
+
+def test_words_of_another_script_leave_the_verdict_to_the_others() -> None:
+    scope = match_scope("a person walks 前に", ALL)
+    assert (scope.verdict, scope.flags) == ("known", ("other-language",))
+    (warning,) = warn_of("a person walks 前に", "bundle", ALL)
+    assert "words in another language are not read" in warning
+    assert match_scope("a person walks to the café", ALL).flags == ()
+
+
+def test_few_captions_of_one_person_are_flagged_as_of_several() -> None:
+    """Captions of people who saw one figure: 1 in 300 is the words' doing."""
+    captions = read_captions(REPOSITORY / "workers" / "marey" / "data" / "sets" / "cmu")
+    flagged = [each for each in captions if "several-people" in match_scope(each, ALL).flags]
+    assert len(captions) > 1000
+    assert len(flagged) < len(captions) / 100, flagged
 
 
 def test_the_worst_action_is_the_verdict_of_a_prompt() -> None:
