@@ -43,7 +43,7 @@ from marey.jobs.operate import cancel, pause, resume, retry, set_comment, set_fa
 from marey.jobs.policy import Policy, policy
 from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
 from marey.jobs.states import ItemStage, ItemState, JobControl, JobKind, JobState, Review
-from marey.jobs.submit import submit
+from marey.jobs.submit import find_submitted, submit
 from marey.jobs.sweep import make_due, sweep
 from marey.jobs.types import (
     EDIT_QUEUE,
@@ -121,6 +121,7 @@ __all__ = [
     "events_after",
     "fail_items",
     "find_motions",
+    "find_submitted",
     "get_job",
     "get_motion",
     "heartbeat",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -47,7 +47,7 @@ def take_key(
         owner: identifier,
         "created_at": CLOCK,
     }
-    forgotten = table.c.created_at < CLOCK - interval(policy().idempotency)
+    forgotten = table.c.created_at < CLOCK - interval(policy().idempotency)  # as in `find_key`
     ours = conn.execute(
         insert(table)
         .values(tenant_id=tenant, key=key, **values)
@@ -56,11 +56,32 @@ def take_key(
     ).one_or_none()
     if ours is not None:
         return None
-    earlier = conn.execute(
-        sa.select(table.c.body_sha256, table.c[owner].label("made")).where(
-            table.c.tenant_id == tenant, table.c.key == key
-        )
-    ).one()
+    return _made(conn.execute(_earlier(tenant, key, owner)).one(), key, body_sha256)
+
+
+def find_key(conn: sa.Connection, tenant: str, key: str | None, body_sha256: str | None, owner: Owner) -> UUID | None:
+    """Return the object of an earlier request with a key, and register nothing: what a request names may be gone when
+    it is repeated.
+
+    Args:
+        key, body_sha256, owner: as `take_key`.
+
+    Raises:
+        IdempotencyMismatch: as `take_key`.
+    """
+    if key is None:
+        return None
+    fresh = tables.idempotency.c.created_at >= CLOCK - interval(policy().idempotency)
+    earlier = conn.execute(_earlier(tenant, key, owner).where(fresh)).one_or_none()
+    return None if earlier is None else _made(earlier, key, body_sha256)
+
+
+def _earlier(tenant: str, key: str, owner: Owner) -> sa.Select[Any, Any]:
+    table = tables.idempotency.c
+    return sa.select(table.body_sha256, table[owner].label("made")).where(table.tenant_id == tenant, table.key == key)
+
+
+def _made(earlier: sa.Row[Any], key: str, body_sha256: str | None) -> UUID:
     if earlier.body_sha256 != body_sha256 or earlier.made is None:
         raise IdempotencyMismatch(
             "this idempotency key was used with another body",

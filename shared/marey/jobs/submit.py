@@ -20,7 +20,7 @@ from marey.db.ids import new_id
 from marey.db.sql import among, check_text
 from marey.items.item import JSON_FIELDS, SPEC_FIELDS
 from marey.jobs import tables
-from marey.jobs.idempotency import take_key
+from marey.jobs.idempotency import find_key, take_key
 from marey.jobs.journal import Lane, LaneChange, NewEvent, change_lanes, lock_job, record
 from marey.jobs.states import ItemStage, JobState
 from marey.jobs.types import (
@@ -111,8 +111,20 @@ def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:
 def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob | None:
     """Register the idempotency key for this job, or return the job that has it."""
     made = take_key(conn, job.tenant, job.idempotency_key, job.body_sha256, "job_id", identifier)
-    if made is None:
-        return None
+    return None if made is None else _replayed(conn, made)
+
+
+def find_submitted(conn: sa.Connection, tenant: str, key: str | None, body_sha256: str | None) -> SubmittedJob | None:
+    """Return the job of an earlier submit with an idempotency key; None = there is none, or no key.
+
+    Raises:
+        IdempotencyMismatch: the key was used with another body.
+    """
+    made = find_key(conn, tenant, key, body_sha256, "job_id")
+    return None if made is None else _replayed(conn, made)
+
+
+def _replayed(conn: sa.Connection, made: UUID) -> SubmittedJob:
     total = conn.execute(sa.select(tables.job.c.total).where(tables.job.c.id == made)).scalar_one()
     return SubmittedJob(made, replayed=True, items=total)
 

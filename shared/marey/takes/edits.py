@@ -22,6 +22,7 @@ from marey.jobs import (
     NewJob,
     Review,
     SubmittedJob,
+    find_submitted,
     submit,
     tables,
 )
@@ -103,6 +104,9 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
         QuotaUsedUp, IdempotencyMismatch: as `marey.jobs.submit`.
     """
     steps = _read_steps(edit.ops)
+    earlier = find_submitted(conn, edit.tenant, edit.idempotency_key, edit.body_sha256)
+    if earlier is not None:  # whose motions may be gone
+        return earlier
     # An erasure of a source waits, and then finds the edit.
     conn.execute(HOLD_JOBS, {"motions": _sources(edit.motion, steps), "tenant": edit.tenant})
     items = _items(conn, edit, steps)

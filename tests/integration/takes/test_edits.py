@@ -111,6 +111,19 @@ def test_settings_without_a_model_are_refused(api: LiveApi, http: httpx2.Client)
     assert (answer.status_code, answer.json()["where"]) == (422, "settings")
 
 
+def test_a_repeated_edit_is_answered_when_its_motion_is_gone(api: LiveApi, http: httpx2.Client) -> None:
+    source, headers = stored(api), {"Idempotency-Key": str(uuid4())}
+    path, body = f"/v1/motions/{source['id']}/edits", {"ops": [{"op": "mirror"}]}
+    first = http.post(path, json=body, headers=headers)
+    assert first.status_code == 202, first.text
+    with transaction(api.engine) as conn:
+        delete(conn, DEFAULT_TENANT, UUID(source["job"]))
+    second = http.post(path, json=body, headers=headers)
+    assert (second.status_code, second.json()["id"]) == (202, first.json()["id"])
+    assert second.headers["idempotency-replayed"] == "true"
+    assert http.post(path, json=body).status_code == 404
+
+
 def test_text_that_is_no_unicode_is_refused_with_an_idempotency_key_too(api: LiveApi, http: httpx2.Client) -> None:
     body = b'{"ops": [{"op": "concat", "with": "\\ud800"}]}'
     headers = {"Content-Type": "application/json", "Idempotency-Key": "broken"}

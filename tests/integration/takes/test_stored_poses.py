@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
+from uuid import UUID, uuid4
 
 import httpx2
 import pytest
@@ -18,7 +18,8 @@ from marey.client import Client
 from marey.core.errors import InvalidInput
 from marey.db import transaction
 from marey.jobs import FailureReason, asset_key, tables
-from marey.tenants import Quotas, create_key, create_tenant
+from marey.takes import delete
+from marey.tenants import DEFAULT_TENANT, Quotas, create_key, create_tenant
 from tests.support.command import Command
 from tests.support.editing import clip_of, stored
 from tests.support.live_api import LiveApi
@@ -107,6 +108,22 @@ def test_motions_of_others_are_not_there(api: LiveApi, http: httpx2.Client) -> N
         ((_, field, message),) = problems(post(theirs, keyframe(ours["id"], 0)))
         assert (field, "no such motion" in message) == ("constraints.0.motion.id", True)
     assert post(http, keyframe(ours["id"], 0)).status_code == 202
+
+
+def test_a_repeated_submit_is_answered_when_its_motion_is_gone(api: LiveApi, http: httpx2.Client) -> None:
+    motion = stored(api)
+    again = {"Idempotency-Key": str(uuid4())}
+    body = {"items": [{"prompt": "a person walks", "seconds": 3, "constraints": [keyframe(motion["id"], 0)]}]}
+    first = http.post("/v1/jobs", json=body, headers=again)
+    assert first.status_code == 202, first.text
+    with transaction(api.engine) as conn:
+        delete(conn, DEFAULT_TENANT, UUID(motion["job"]))
+    second = http.post("/v1/jobs", json=body, headers=again)
+    assert (second.status_code, second.json()["id"]) == (202, first.json()["id"])
+    assert second.headers["idempotency-replayed"] == "true"
+    assert http.post("/v1/jobs", json=body).status_code == 422
+    other = {"items": [{**body["items"][0], "seed": 7}]}
+    assert http.post("/v1/jobs", json=other, headers=again).json()["type"].endswith("idempotency-mismatch")
 
 
 def test_an_npz_that_is_gone_or_broken_is_a_problem_of_the_line(api: LiveApi, http: httpx2.Client) -> None:

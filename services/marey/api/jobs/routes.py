@@ -101,16 +101,25 @@ async def submit_job(
     }
     async with kept_body(request, shared, key.tenant) as body:
         submission = await body.run(_read, kind, body.file, fields, shared)
-        submission = await body.run(submission.with_poses, await read_poses(shared, key, submission.named))
+        sha256 = None
+        if idempotency_key and not validate_only:
+            sha256 = await body.run(service.request_sha256, str(request.url.query), body.file)
+        if not submission.named.frames or not await body.run(_is_there, shared, key, idempotency_key, sha256):
+            submission = await body.run(submission.with_poses, await read_poses(shared, key, submission.named))
         if validate_only:
             report = await body.run(submission.examine)
             if report is not None and report.left and (decided := await shared.texts.scopes(report.left)):
                 report = await body.run(submission.examine, decided)
             return await body.run(_check, shared, key, submission, report)
-        sha256 = None
-        if idempotency_key:
-            sha256 = await body.run(service.request_sha256, str(request.url.query), body.file)
         return await body.run(_write, shared, key, submission, idempotency_key, sha256)
+
+
+def _is_there(shared: Context, key: tenants.ApiKey, idempotency_key: str | None, sha256: str | None) -> bool:
+    """Return True if this submit made a job before; the motions that its poses were of may be gone."""
+    if sha256 is None:
+        return False
+    with db.transaction(shared.engine, db.SEARCH) as conn:
+        return jobs.find_submitted(conn, key.tenant, idempotency_key, sha256) is not None
 
 
 def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) -> service.Submission:

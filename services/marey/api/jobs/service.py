@@ -105,8 +105,8 @@ class Submission:
         report = self.new_report()
         if report is not None:
             report.decided = decided or {}
-            for item, generator in self._items():
-                generator.judge(item, report)
+            for item in read_items(self._raws()):
+                self._generators[item.model].judge(item, report)
         return report
 
     def prompts(self) -> Iterator[tuple[int | None, str | None, str, Bundle]]:
