@@ -81,7 +81,7 @@ def _earlier(tenant: str, key: str, owner: Owner) -> sa.Select[Any, Any]:
     return sa.select(table.body_sha256, table[owner].label("made")).where(table.tenant_id == tenant, table.key == key)
 
 
-def _made(earlier: sa.Row[Any], key: str, body_sha256: str | None) -> UUID:
+def _made(earlier: sa.Row[Any, Any], key: str, body_sha256: str | None) -> UUID:
     if earlier.body_sha256 != body_sha256 or earlier.made is None:
         raise IdempotencyMismatch(
             "this idempotency key was used with another body",
