@@ -87,8 +87,6 @@ class MiningConfig:
     conditions: Literal["all", "motion", "action", "specific"] = field(default="all", metadata=ADDED)
     """Levels of condition that are trained: all, or one alone for the ablation (Tab. 3); "specific" is the full one."""
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
-    level_shares: tuple[Weight, ...] = field(default=(1.0, 1.0, 1.0), metadata=ADDED)
-    """Ours: how often each level of condition (motion, action, specific) is drawn, where one is drawn per sample."""
     early: Share = field(default=0.0, metadata=ADDED)
     """Ours: share of samples that are masked as in the first passes of decoding, whose tokens the prompt alone decides:
     their τ is at most `EARLY`."""
@@ -167,8 +165,6 @@ class HGM3Config(ModelConfig):
         check_windows(self.windows, self.tokenizer.frames_per_token)
         for name in ("masked", "predictor", "residual"):
             check_heads(name, getattr(self, name).heads, getattr(self, name).width)
-        if len(self.mining.level_shares) != LEVELS or not sum(self.mining.level_shares):
-            raise InvalidInput("must be three shares, not all 0", where="mining.level_shares")
         inference = self.inference
         if not inference.motion_steps <= inference.action_steps <= inference.steps:
             raise InvalidInput(

@@ -27,6 +27,8 @@ from marey.training.pairs import Pairs, pieces_of
 
 CONDITIONS = ("motion", "action", "specific")
 """Names of the levels of condition, each with those before it."""
+EVEN = (1 / LEVELS,) * LEVELS
+"""Probability of each level, where one is drawn per sample."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ class MaskedStage(MaskedObjective):
             torch.from_numpy(self._progress(rng, len(clips))).to(device),
             torch.from_numpy(rng.random(tokens.shape[:2], np.float32)).to(device),
             torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop * drop).to(device),
-            torch.from_numpy(self._levels(rng, len(clips))).to(device),
+            torch.from_numpy(rng.choice(LEVELS, size=len(clips), p=EVEN)).to(device),
         )
 
     def _progress(self, rng: np.random.Generator, count: int) -> NDArray[np.float32]:
@@ -231,11 +233,6 @@ class MaskedStage(MaskedObjective):
         if not self.config.mining.early:
             return progress
         return np.where(rng.random(count) < self.config.mining.early, progress * EARLY, progress).astype(np.float32)
-
-    def _levels(self, rng: np.random.Generator, count: int) -> NDArray[np.int64]:
-        """Draw a level of condition for each sample (B,)."""
-        shares = np.array(self.config.mining.level_shares)
-        return rng.choice(LEVELS, size=count, p=shares / shares.sum())
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
