@@ -6,9 +6,9 @@ checks by which motions are chosen (best of N, self-training), and neither train
 
 from __future__ import annotations
 
-from marey.referee import aerial, combat, gaits, gestures
+from marey.referee import aerial, combat, exercises, gaits, gestures, postures
 from marey.referee.body import Body
 from marey.referee.rules import RULES
 from marey.referee.sequences import shows, shows_in_order
 
-__all__ = ["RULES", "Body", "aerial", "combat", "gaits", "gestures", "shows", "shows_in_order"]
+__all__ = ["RULES", "Body", "aerial", "combat", "exercises", "gaits", "gestures", "postures", "shows", "shows_in_order"]
