@@ -135,6 +135,32 @@ SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
 of another content or style, and three times the error of the second if clips are drawn evenly."""
 
 
+class ClipWindows:
+    """Windows of random training clips, in whole tokens."""
+
+    def __init__(self, data: MotionData, rate: int, smallest: int) -> None:
+        """Take the clips of the training split.
+
+        Args:
+            data: the prepared data.
+            rate: frames of a token.
+            smallest: frames of the shortest window that is drawn.
+        """
+        self._data = data
+        clips = tokenizer_clips(data.prepared.split("train"), rate)
+        self._weights = tokenizer_weights(clips, smallest)
+        self._first = np.array([c.start for c in clips])
+        self._lengths = np.array([c.length - c.length % rate for c in clips])
+
+    def draw(self, rng: np.random.Generator, batch: int, window: int) -> tuple[Tensor, NDArray[np.int64]]:
+        """Return the features (B, T, D) of windows of T frames, and the frames (B,) that are the clip's own."""
+        chosen = rng.choice(len(self._first), size=batch, p=self._weights)
+        slack = np.maximum(self._lengths[chosen] - window, 0)
+        offsets = np.floor(rng.random(batch) * (slack + 1)).astype(np.int64)
+        starts = torch.from_numpy(self._first[chosen] + offsets).to(self._data.features.device)
+        return self._data.windows(starts, window), np.minimum(self._lengths[chosen], window)
+
+
 class TokenizerStage:
     """Windows of random clips; `module` is the tokenizer itself."""
 
@@ -154,11 +180,7 @@ class TokenizerStage:
         self.penalty = penalty
         self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
-        rate = module.frames_per_token
-        self.train_clips = tokenizer_clips(data.prepared.split("train"), rate)
-        self.weights = tokenizer_weights(self.train_clips, min(config.windows))
-        self.first = np.array([c.start for c in self.train_clips])
-        self.lengths = np.array([c.length - c.length % rate for c in self.train_clips])
+        self.windows = ClipWindows(data, module.frames_per_token, min(config.windows))
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
@@ -169,13 +191,8 @@ class TokenizerStage:
         rng, config = context.rng, self.config
         window = int(rng.choice(config.windows))
         batch = max(1, self.optimisation.batch * min(config.windows) // window)
-        chosen = rng.choice(len(self.train_clips), size=batch, p=self.weights)
-        slack = np.maximum(self.lengths[chosen] - window, 0)
-        offsets = np.floor(rng.random(batch) * (slack + 1)).astype(np.int64)
-        lengths = np.minimum(self.lengths[chosen], window)
-        device = self.data.features.device
-        features = self.data.windows(torch.from_numpy(self.first[chosen] + offsets).to(device), window)
-        own = None if bool((lengths == window).all()) else torch.from_numpy(lengths).to(device)
+        features, lengths = self.windows.draw(rng, batch, window)
+        own = None if bool((lengths == window).all()) else torch.from_numpy(lengths).to(features.device)
         loss, quantized = tokenizer_loss(self.module, config, features, own, context.fraction)
         logs = {
             "loss": loss.total.detach(),

@@ -18,7 +18,7 @@ from marey.nn.motion_tokenizer import ROOT, biased_std
 from marey.training.joints import heading_joints, unit_of, world_joints
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData
-from marey.training.tokenizing import feature_weights, reconstruction_errors, tokenizer_clips, tokenizer_weights
+from marey.training.tokenizing import ClipWindows, feature_weights, reconstruction_errors
 
 
 @dataclass(frozen=True)
@@ -106,11 +106,7 @@ class ScaleTokenizerStage:
         self.data = data
         self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
-        rate = module.frames_per_token
-        self.clips = tokenizer_clips(data.prepared.split("train"), rate)
-        self.weights = tokenizer_weights(self.clips, min(config.windows))
-        self.first = np.array([c.start for c in self.clips])
-        self.lengths = np.array([c.length - c.length % rate for c in self.clips])
+        self.windows = ClipWindows(data, module.frames_per_token, min(config.windows))
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
@@ -121,13 +117,9 @@ class ScaleTokenizerStage:
         rng, config = context.rng, self.config
         window = int(rng.choice(config.windows))
         batch = max(1, self.optimisation.batch * min(config.windows) // window)
-        chosen = rng.choice(len(self.clips), size=batch, p=self.weights)
-        slack = np.maximum(self.lengths[chosen] - window, 0)
-        offsets = np.floor(rng.random(batch) * (slack + 1)).astype(np.int64)
-        device = self.data.features.device
-        lengths = torch.from_numpy(np.minimum(self.lengths[chosen], window)).to(device)
-        features = self.data.windows(torch.from_numpy(self.first[chosen] + offsets).to(device), window)
-        losses = tokenizer_loss(self.module, config, features, lengths, context.fraction)
+        features, lengths = self.windows.draw(rng, batch, window)
+        own = torch.from_numpy(lengths).to(features.device)
+        losses = tokenizer_loss(self.module, config, features, own, context.fraction)
         logs = {name: value.detach() for name, value in vars(losses).items() if name != "total"}
         return losses.total, {"loss": losses.total.detach(), **logs}
 
