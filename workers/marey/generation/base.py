@@ -1,4 +1,4 @@
-"""What the generators of Marey's models share: reading of settings, open lengths, and passes over groups of equal
+"""Bases of the generators of Marey's models: reading of settings, open lengths, and passes over groups of equal
 length. A model may have its own instead: `marey.generation.port.Generator` is all that others know of it."""
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Sampling(Protocol):
 P = TypeVar("P", bound=Sampling)
 """Sampling settings of a model."""
 G = TypeVar("G")
-"""What a model generates of one request."""
+"""One motion as a model generates it."""
 
 
 class SampledGenerator(Generic[P]):

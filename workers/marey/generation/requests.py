@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from marey.streams.recording import StreamRecording  # it would import the database
 
 
-class Asked(Protocol):
+class MotionFields(Protocol):
     """Fields of an item that decide its motion, beside its prompts."""
 
     @property
@@ -47,7 +47,7 @@ class Asked(Protocol):
 
 def request_of(
     generator: Generator[Any],
-    item: Asked,
+    item: MotionFields,
     texts: Sequence[TextFeatures],
     scope: Mapping[str, Any] | None,
     recording: StreamRecording | None = None,
