@@ -220,11 +220,6 @@ def read_file(
     return PromptReader(((number, _completed(raw, defaults)) for number, raw in lines), where_of(path))
 
 
-def items_from_prompts(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> Iterator[Item]:
-    """Items of `read_arguments`, which count only once all are read."""
-    return right_items(read_arguments(prompts, defaults))
-
-
 def items_from_file(
     path: str, file_format: Format | None = None, defaults: Mapping[str, object] = NO_DEFAULTS
 ) -> Iterator[Item]:
@@ -250,11 +245,6 @@ def right_items(reader: PromptReader) -> Iterator[Item]:
             yield item
     if reader.total:
         raise reader.error()
-
-
-def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
-    """Prompts of an evaluation; see `read_evaluation_prompts`."""
-    return read_evaluation_prompts(path)[0]
 
 
 def read_evaluation_prompts(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from typing import Any
 
 from marey.client.transport import PATIENCE, Transport
@@ -17,7 +17,6 @@ SILENCE = 30.0
 RETRY_SECONDS = 0.5
 POLL = 1.0
 """Seconds between two requests: an evaluation takes minutes, and the scheduler checks it every two seconds."""
-WITHOUT_RESULT = ("failed", "dead", "cancelled")
 
 
 def follow_job(
@@ -105,13 +104,3 @@ def follow_evaluation(
                 "the time allowed has passed; the evaluation goes on", where=f"evaluation {evaluation}", hint=hint
             )
         time.sleep(min(POLL, left))
-
-
-def ended_items(view: Mapping[str, Any]) -> int:
-    """The items of a job that are not open any more, by its counters."""
-    return view["counters"]["succeeded"] + items_without_result(view)
-
-
-def items_without_result(view: Mapping[str, Any]) -> int:
-    """The items of a job that failed, died or were cancelled, by its counters."""
-    return sum(view["counters"][name] for name in WITHOUT_RESULT)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, get_args
 
-from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
 from marey.vocabulary.lengths import stated_length
@@ -220,15 +219,3 @@ def match_as(prompt: str, action: str, lists: ActionLists) -> Scope:
 def match_as_thing(scope: Scope, prompt: str) -> Scope:
     """Return the scope of a prompt whose nouns name things and no action."""
     return Scope((_nothing(prompt),), (*scope.flags, "no-action"), by="encoder")
-
-
-def read_policy(text: str) -> ScopePolicy:
-    """Return the policy of this name.
-
-    Raises:
-        InvalidInput: no policy has this name.
-    """
-    for policy in POLICIES:
-        if policy == text:
-            return policy
-    raise InvalidInput(f"unknown scope {text[:40]!r}; known: {', '.join(POLICIES)}")

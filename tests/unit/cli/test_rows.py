@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.client.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
+from marey.client.rows import defaults_of, items_from_file, read_arguments, read_evaluation_prompts, right_items
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import InvalidItems, Item
@@ -173,7 +173,7 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
     table = write(tmp_path, "p.csv", "prompt,variants,seed\na person bows,1,\na person waves,,9\n")
     found = [(item.variants, item.seed) for item in items_from_file(table, defaults=defaults)]
     assert found == [(1, 1), (3, 9)]
-    assert [item.variants for item in items_from_prompts(["a person bows"], defaults)] == [3]
+    assert [item.variants for item in right_items(read_arguments(["a person bows"], defaults))] == [3]
 
 
 def test_tags_of_the_command_come_beside_those_of_a_line(tmp_path: Path) -> None:
@@ -181,7 +181,7 @@ def test_tags_of_the_command_come_beside_those_of_a_line(tmp_path: Path) -> None
     table = write(tmp_path, "p.csv", "prompt,tags\na person walks,walk; take 2\na person bows,\n")
     found = [item.tags for item in items_from_file(table, defaults=defaults)]
     assert found == [("walk", "take 2", "shot=010"), ("shot=010", "walk")]
-    assert [item.tags for item in items_from_prompts(["a person bows"], defaults)] == [("shot=010", "walk")]
+    assert [item.tags for item in right_items(read_arguments(["a person bows"], defaults))] == [("shot=010", "walk")]
     for wrong in ("3", "[{}]"):
         line = f'{{"prompt": "a person bows", "tags": {wrong}}}'
         with pytest.raises(InvalidItems, match="tags"):
@@ -221,12 +221,12 @@ def test_no_file_breaks_the_reader(tmp_path_factory: pytest.TempPathFactory, con
 
 def test_a_file_of_an_evaluation_has_columns_of_its_own(tmp_path: Path) -> None:
     text = 'prompt,seconds,expected\n"walks, then waves",2.5,walk then wave left\na person runs,,\n'
-    assert evaluation_prompts_from_file(write(tmp_path, "p.csv", text)) == (
+    assert read_evaluation_prompts(write(tmp_path, "p.csv", text))[0] == (
         EvaluationPrompt("walks, then waves", 2.5, "walk then wave left"),
         EvaluationPrompt("a person runs"),
     )
     lines = '{"prompt": "a person walks", "expected": "Walk  straight"}\n\n{"prompt": "a person runs"}\n'
-    assert evaluation_prompts_from_file(write(tmp_path, "p.jsonl", lines)) == (
+    assert read_evaluation_prompts(write(tmp_path, "p.jsonl", lines))[0] == (
         EvaluationPrompt("a person walks", expected="walk straight"),
         EvaluationPrompt("a person runs"),
     )
@@ -246,5 +246,5 @@ def test_a_file_of_an_evaluation_has_columns_of_its_own(tmp_path: Path) -> None:
 )
 def test_a_file_of_an_evaluation_that_cannot_be_used_says_why(tmp_path: Path, content: str, said: str) -> None:
     with pytest.raises(InvalidInput) as caught:
-        evaluation_prompts_from_file(write(tmp_path, "p.csv", content))
+        read_evaluation_prompts(write(tmp_path, "p.csv", content))[0]
     assert said in str(caught.value)

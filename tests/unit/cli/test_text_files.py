@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from marey.client import rows
-from marey.client.rows import evaluation_prompts_from_file, items_from_file
+from marey.client.rows import items_from_file, read_evaluation_prompts
 from marey.client.text_files import MAX_LINE
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
@@ -77,7 +77,7 @@ def test_a_packed_file_on_stdin_is_known_by_its_first_bytes(monkeypatch: pytest.
 
 def test_a_packed_file_of_an_evaluation_is_read_too(tmp_path: Path) -> None:
     content = gzip.compress(b"prompt,seconds\na person walks,2\na person runs,3\n")
-    assert len(evaluation_prompts_from_file(written(tmp_path, "p.csv.gz", content))) == 2
+    assert len(read_evaluation_prompts(written(tmp_path, "p.csv.gz", content))[0]) == 2
 
 
 @pytest.mark.parametrize(

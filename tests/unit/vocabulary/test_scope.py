@@ -7,10 +7,9 @@ import pytest
 
 from marey.bundles import Bundle
 from marey.checks.scope_prompts import IN_SCOPE, ScopeRate, is_right, scope_prompts, scope_rates
-from marey.core.errors import InvalidInput
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.report import warn_of
-from marey.vocabulary.scope import ActionLists, match_scope, read_policy
+from marey.vocabulary.scope import ActionLists, match_scope
 from tests.support.marey import REPOSITORY
 
 FEW = ActionLists(
@@ -190,9 +189,3 @@ def test_a_prompt_without_an_action_has_one_unknown() -> None:
 
 def test_a_single_take_is_known() -> None:
     assert match_scope("claps", ActionLists((), single_take=("clap",))).verdict == "known"
-
-
-def test_an_unknown_policy_lists_the_known_ones() -> None:
-    assert read_policy("refuse") == "refuse"
-    with pytest.raises(InvalidInput, match="unknown scope 'no'; known: warn, refuse, ignore"):
-        read_policy("no")
