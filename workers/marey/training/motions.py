@@ -5,7 +5,7 @@ Random choices use a numpy generator that the loop seeds from (seed, step, rank)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, Self
@@ -101,32 +101,12 @@ class TokenData:
         """Tokenize every clip whole; training clips at all phases, others at phase 0."""
         tokenizer.eval()
         rate = tokenizer.frames_per_token
-        device = data.features.device
-        clips = data.prepared.clips
-        jobs = [
-            (c, p, clip.start + p, (clip.length - p) // rate)
-            for c, clip in enumerate(clips)
-            for p in range(rate if clip.split == "train" else 1)
-            if clip.length - p >= rate
-        ]
-        jobs.sort(key=lambda job: job[3])  # similar lengths together
-        starts = torch.zeros(len(clips), rate, dtype=torch.long)
-        lengths = torch.zeros(len(clips), rate, dtype=torch.long)
-        found: list[Tensor] = []
-        total = 0
-        for at in range(0, len(jobs), batch):
-            part = jobs[at : at + batch]
-            counts = torch.tensor([job[3] for job in part], device=device)
-            features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
-            tokens = tokenizer.encode(features, counts * rate)  # (B, n, V)
-            for row, (clip, phase, _, count) in enumerate(part):
-                starts[clip, phase], lengths[clip, phase] = total, count
-                found.append(tokens[row, :count])
-                total += count
-        missing = lengths == 0
-        starts = torch.where(missing, starts[:, :1], starts).to(device)
-        lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
-        return cls(torch.cat(found), starts, lengths)
+
+        def tokens_of(features: Tensor, frames: Tensor) -> list[Tensor]:
+            tokens = tokenizer.encode(features, frames)  # (B, n, V)
+            return [row[:count] for row, count in zip(tokens, (frames // rate).tolist(), strict=True)]
+
+        return encode_phases(tokens_of, data, rate, batch=batch)
 
     @property
     def phases(self) -> int:
@@ -164,6 +144,50 @@ def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> Toke
     key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}"
     device = data.features.device
     return TokenData(**made_once(run / TOKENS, key, device, lambda: vars(TokenData.encode(tokenizer, data))))
+
+
+def encode_phases(
+    tokens_of: Callable[[Tensor, Tensor], Sequence[Tensor]],
+    data: MotionData,
+    rate: int,
+    *,
+    longest: int | None = None,
+    batch: int = 64,
+) -> TokenData:
+    """Tokenize every clip: training clips at all phases, others at phase 0.
+
+    Args:
+        tokens_of: function from features (B, T, D) and frames (B,), multiples of `rate`, to the tokens (n, V) of each.
+        data: the prepared data.
+        rate: frames of a token, which are also the phases.
+        longest: tokens that a clip is cut to; None = clips are whole.
+        batch: clips that are encoded together.
+    """
+    device = data.features.device
+    clips = data.prepared.clips
+    jobs = [
+        (c, p, clip.start + p, min((clip.length - p) // rate, longest or clip.length))
+        for c, clip in enumerate(clips)
+        for p in range(rate if clip.split == "train" else 1)
+        if clip.length - p >= rate
+    ]
+    jobs.sort(key=lambda job: job[3])  # similar lengths together
+    starts = torch.zeros(len(clips), rate, dtype=torch.long)
+    lengths = torch.zeros(len(clips), rate, dtype=torch.long)
+    found: list[Tensor] = []
+    total = 0
+    for at in range(0, len(jobs), batch):
+        part = jobs[at : at + batch]
+        counts = torch.tensor([job[3] for job in part], device=device)
+        features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
+        for own, (clip, phase, _, count) in zip(tokens_of(features, counts * rate), part, strict=True):
+            starts[clip, phase], lengths[clip, phase] = total, count
+            found.append(own)
+            total += len(own)
+    missing = lengths == 0
+    starts = torch.where(missing, starts[:, :1], starts).to(device)
+    lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
+    return TokenData(torch.cat(found), starts, lengths)
 
 
 def made_once(

@@ -13,7 +13,7 @@ from torch import Tensor
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.nn.quantizer import NO_TOKEN
-from marey.training.motions import TOKENS, MotionData, TokenData, fingerprint, made_once
+from marey.training.motions import TOKENS, MotionData, TokenData, encode_phases, fingerprint, made_once
 
 
 @dataclass(frozen=True)
@@ -50,31 +50,10 @@ def encode_clips(tokenizer: Tokenizer, data: MotionData, *, batch: int = 64) -> 
     """Encode every clip, longer ones up to the longest that the model makes; training clips at all phases, others at
     phase 0. Returns the fields of `TokenData`."""
     tokenizer.eval()
+
+    def tokens_of(features: Tensor, frames: Tensor) -> list[Tensor]:
+        tokens = tokenizer.encode(features, frames)  # (B, N, 1)
+        return [row[row[:, 0] != NO_TOKEN] for row in tokens]
+
     rate, longest = tokenizer.frames_per_token, tokenizer.scales.longest
-    device = data.features.device
-    clips = data.prepared.clips
-    jobs = [
-        (c, p, clip.start + p, min((clip.length - p) // rate, longest))
-        for c, clip in enumerate(clips)
-        for p in range(rate if clip.split == "train" else 1)
-        if clip.length - p >= rate
-    ]
-    jobs.sort(key=lambda job: job[3])  # similar lengths together
-    starts = torch.zeros(len(clips), rate, dtype=torch.long)
-    lengths = torch.zeros(len(clips), rate, dtype=torch.long)
-    found: list[Tensor] = []
-    total = 0
-    for at in range(0, len(jobs), batch):
-        part = jobs[at : at + batch]
-        counts = torch.tensor([job[3] for job in part], device=device)
-        features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
-        tokens = tokenizer.encode(features, counts * rate)[..., 0]  # (B, N)
-        for row, (clip, phase, _, count) in enumerate(part):
-            own = tokens[row][tokens[row] != NO_TOKEN]
-            starts[clip, phase], lengths[clip, phase] = total, count
-            found.append(own)
-            total += len(own)
-    missing = lengths == 0
-    starts = torch.where(missing, starts[:, :1], starts).to(device)
-    lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
-    return {"tokens": torch.cat(found)[:, None], "starts": starts, "lengths": lengths}
+    return vars(encode_phases(tokens_of, data, rate, longest=longest, batch=batch))
