@@ -21,6 +21,10 @@ DEFAULT_FPS = 20.0
 MAX_FRAMES = 2**53
 """The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""
 
+LONGEST = ("longest_frames", "max_frames")
+"""Parameters of a bundle that give its longest motion, the first that there is: where it makes longer motions than it
+was trained on, and otherwise."""
+
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
     """Return the shortest and longest motion of a generator, in seconds: limits of its model, narrowed by the bundle.
@@ -31,7 +35,8 @@ def seconds_of(bundle: Bundle) -> tuple[float, float]:
     spec = find_model(bundle.manifest.model)
     limits = None if spec is None else spec.limits
     low = _seconds(bundle, "min_frames", limits and limits.min_seconds)
-    high = _seconds(bundle, "max_frames", limits and limits.max_seconds)
+    longest = next((name for name in LONGEST if name in bundle.manifest.parameters), LONGEST[-1])
+    high = _seconds(bundle, longest, limits and limits.max_seconds)
     if not 0 < low <= high < math.inf:
         raise InvalidBundle(f"has an invalid range of lengths: {low:g} to {high:g} seconds", where=str(bundle.path))
     if limits is not None and not limits.min_seconds <= low <= high <= limits.max_seconds:

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 
 from marey.bundles import Bundle
+from marey.bundles.limits import seconds_of
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
@@ -19,6 +21,7 @@ from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY, InferenceConfig
 from marey.models.mogo.generate import Generator, SamplingSettings
 from marey.models.mogo.spec import SPEC
+from marey.models.mogo.state import NEVER
 from marey.models.mogo.train import train_stage
 from marey.motion.skeleton import HUMANML3D
 from marey.training.budget import Budget
@@ -53,6 +56,41 @@ def test_an_open_length_is_the_models_within_its_limits(generator: Generator) ->
     lengths = {made.features.shape[0] for made in generator.generate([Request(text_features(1), k) for k in range(40)])}
     assert all(TINY.min_frames <= length <= TINY.max_frames for length in lengths)
     assert len(lengths) > 1
+
+
+def test_a_bundle_may_make_longer_motions_than_it_was_trained_on(generator: Generator, tmp_path: Path) -> None:
+    config = replace(TINY, longest_frames=70)
+    bundle = random_bundle(tmp_path / "long", config)
+    assert seconds_of(bundle) == (0.8, 3.5)
+    long = Generator.load(bundle, device="cpu")
+    requests = [Request(text_features(0), seed=1, frames=frames) for frames in (70, TINY.max_frames, 31)]
+    made = long.generate(requests)
+    assert [each.features.shape[0] for each in made] == [70, TINY.max_frames, 31]
+    assert np.isfinite(made[0].features).all()
+    # the weights are the same
+    (short,) = generator.generate([requests[1]])
+    assert np.array_equal(made[1].tokens, short.tokens)
+    (alone,) = long.generate(requests[:1])
+    assert np.array_equal(made[0].tokens, alone.tokens)
+    with pytest.raises(InvalidInput, match=r"71 frames is out of range; this bundle generates 0.8 to 3.5 seconds"):
+        long.generate([replace(requests[0], frames=71)])
+    with pytest.raises(InvalidInput, match="is under max_frames, 24") as error:
+        replace(TINY, longest_frames=20).check()
+    assert error.value.where == "longest_frames"
+
+
+def test_beyond_its_training_length_a_motion_is_that_of_a_stream(tmp_path: Path) -> None:
+    """Attention looks back over its window, whatever the length of the whole."""
+    config = replace(TINY, longest_frames=70, split_actions=False)
+    generator = Generator.load(random_bundle(tmp_path / "long", config), device="cpu")
+    request = Request(text_features(0, 1), seed=5, frames=70)
+    (made,) = generator.generate([request])
+    streams = generator.streams(1, SamplingSettings().inference(config.inference))
+    actions, _ = generator.actions(request.text)
+    session = streams.start(actions, 5, ends_from=NEVER, lasts=[70])
+    columns = [streams.step()[session] for _ in range(70)]
+    assert np.array_equal(made.tokens.T, torch.stack(columns).numpy())
+    assert len({tuple(column.tolist()) for column in columns[TINY.max_frames :]}) > 1
 
 
 def test_prompt_seed_and_settings_make_a_difference(generator: Generator) -> None:

@@ -41,6 +41,7 @@ def dancer(tmp_path: Path):
         ({"min_frames": 40}, (2.0, 8.0)),
         ({"max_frames": 40}, (1.0, 2.0)),
         ({"min_frames": 20, "max_frames": 160}, (1.0, 8.0)),
+        ({"max_frames": 40, "longest_frames": 60}, (1.0, 3.0)),
     ],
 )
 def test_a_bundle_narrows_its_model(
@@ -55,7 +56,7 @@ def test_a_bundle_narrows_its_model(
             check_seconds(found, value)
 
 
-@pytest.mark.parametrize("parameters", [{"min_frames": 19}, {"max_frames": 161}])
+@pytest.mark.parametrize("parameters", [{"min_frames": 19}, {"max_frames": 161}, {"longest_frames": 161}])
 def test_a_bundle_cannot_do_more_than_its_model(dancer: None, tmp_path: Path, parameters: dict[str, int]) -> None:
     with pytest.raises(InvalidBundle, match="and the model 'dancer' makes those of 1 to 8"):
         seconds_of(bundle(tmp_path / "long", **parameters))

@@ -103,6 +103,8 @@ class MOGOConfig(ModelConfig):
     fps: Positive = 20.0
     min_frames: Count = 16  # shortest motion; END is ignored before
     max_frames: Count = 196  # longest training sequence: no relative distance beyond it is learned
+    longest_frames: Whole = field(default=0, metadata=ADDED)
+    """Longest motion; 0 = `max_frames`. Beyond it attention reaches back `inference.window` frames, as in streams."""
     corruption: Share = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
     first_level: Positive = 1.0  # weight of level 0 in the loss, to 1 of each other level
     ahead: tuple[Count, ...] = ()
@@ -134,8 +136,15 @@ class MOGOConfig(ModelConfig):
         if self.transformer.joint and not self.depth.layers:
             raise InvalidInput("one sequence for all levels needs a depth head", where="transformer.joint")
 
+    @property
+    def longest(self) -> int:
+        """Return the frames of the longest motion."""
+        return self.longest_frames or self.max_frames
+
     def check(self) -> None:
         """Check sizes against each other; see `ModelConfig.check`."""
+        if self.longest < self.max_frames:
+            raise InvalidInput(f"is under max_frames, {self.max_frames}", where="longest_frames")
         check_body(self.layout, self.features, self.joints, self.fps, (self.min_frames, self.max_frames))
         check_windows(self.windows, 1)
         check_heads("transformer", self.transformer.heads, self.transformer.width)
@@ -147,7 +156,10 @@ class MOGOConfig(ModelConfig):
             )
 
 
-PAPER = MOGOConfig(split_actions=False, float_logits=True, condition=ConditionConfig(standardised=False))
+# The paper generates up to 260 frames of cyclic motions (Sec. 5).
+PAPER = MOGOConfig(
+    longest_frames=260, split_actions=False, float_logits=True, condition=ConditionConfig(standardised=False)
+)
 PAPER_KIT = replace(PAPER, name="paper-kit", layout="kit-251", features=251, joints=21, fps=12.5)
 """`paper` on KIT-ML."""
 

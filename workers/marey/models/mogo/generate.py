@@ -80,7 +80,7 @@ class Generator(SampledGenerator[SamplingSettings]):
         self.tokenizer, self.transformer = tokenizer, transformer
         self.device, self.dtype = transformer.head.weight.device, dtype
         self.layout: FeatureLayout = layout_of(bundle.manifest)
-        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
+        self.limits = Limits(config.min_frames, config.longest, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
         self._packed: dict[int, PackedModel] = {}
         self._streams: tuple[InferenceConfig, StreamBatch] | None = None
@@ -257,7 +257,7 @@ class _Drawing:
         """Return the frames of each action: in natural proportion, in total the requested or the largest possible
         length."""
         natural = np.array(self._generator.actions(request.text)[1])
-        whole = request.frames or min(int(natural.sum()), self._generator.config.max_frames)
+        whole = request.frames or min(int(natural.sum()), self._generator.config.longest)
         return np.diff(np.round(np.cumsum([0, *natural]) * whole / natural.sum())).astype(int).tolist()
 
     def _stop(self, session: int) -> None:

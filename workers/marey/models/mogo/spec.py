@@ -31,7 +31,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         low={"temperature": 0.7, "upper_temperature": 0.8, "top_k": 0.5},
         high={"temperature": 1.35, "upper_temperature": 1.2, "top_k": 2.0},
     ),
-    limits=LengthLimits(0.8, 9.8),
+    limits=LengthLimits(0.8, 60.0),  # of most bundles 9.8, the length of their training clips
     live="marey.models.mogo.live:create_live_model",
     live_examples="marey.models.mogo.live_examples:prompts_of",
     training=Training(
