@@ -67,9 +67,9 @@ class TextSpec(_Frozen):
     width: int = Field(default=384, ge=1)
     labeller: str = "light"
     labeller_sha256: Sha256 | None = None
-    rewriter: Literal["none", "rules", "openai"] = "none"
+    rewriter: Literal["none", "rules", "openai", "tca"] = "none"
     rewriter_model: str | None = None
-    """The language model of `openai`."""
+    """The language model of `openai` and `tca`."""
     node_features: Literal["pooled", "span"] = "pooled"
     max_actions: int = Field(default=8, ge=1)
     max_specifics: int = Field(default=16, ge=1)
@@ -80,7 +80,7 @@ class TextSpec(_Frozen):
     """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
 
     wording: Literal["caption", "description"] = "caption"
-    """Texts that the model was trained on, in whose wording the rewriter `openai` writes: captions of one sentence, or
+    """Texts that the model was trained on, in whose wording a language model rewrites: captions of one sentence, or
     descriptions of about 60 words (SnapMoGen)."""
 
     @model_serializer(mode="wrap")

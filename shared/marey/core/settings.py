@@ -217,11 +217,11 @@ class Settings(BaseSettings):
     drain_seconds: Seconds = 300.0
     """Seconds after which a drain task claims no more and returns."""
 
-    rewriter: Literal["none", "rules", "openai"] | None = None
+    rewriter: Literal["none", "rules", "openai", "tca"] | None = None
     """Rewriter that adapts prompts to the words of captions; unset = the bundle's own, usually `none`. The API and
     all workers need the same value."""
     rewriter_url: Web = "https://api.openai.com/v1"
-    """Of `openai`: any endpoint that speaks `POST /chat/completions`."""
+    """Of `openai` and `tca`: any endpoint that speaks `POST /chat/completions`."""
     rewriter_model: str | None = Field(default=None, validate_default=True)
     rewriter_key: SecretStr | None = None
     rewriter_seconds: float = Field(default=10.0, gt=0, le=60)
@@ -317,8 +317,9 @@ class Settings(BaseSettings):
     @field_validator("rewriter_model")
     @classmethod
     def _named_model(cls, value: str | None, info: ValidationInfo) -> str | None:
-        if value is None and info.data.get("rewriter") == "openai":
-            raise ValueError("MAREY_REWRITER=openai needs the name of your language model.")
+        rewriter = info.data.get("rewriter")
+        if value is None and rewriter in ("openai", "tca"):
+            raise ValueError(f"MAREY_REWRITER={rewriter} needs the name of your language model.")
         return value
 
     @model_validator(mode="before")

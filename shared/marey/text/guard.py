@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from functools import lru_cache
 
 from marey.text.graph import SemanticGraph
 from marey.text.words import DIRECTIONS, NUMBERS, SIDES, bare, lemma
+from marey.vocabulary.entries import load_vocabulary
 
 LIGHT_VERBS = frozenset({"be"})
 _DIGITS = re.compile(r"^(\d+(?:[.,]\d+)?)\D{0,3}$")
@@ -35,6 +37,46 @@ def lost_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
         if lost := set(was) - set(now):
             return f"it loses {what}: {', '.join(sorted(lost))}"
     return None
+
+
+def changed_but_aligned(before: SemanticGraph, after: SemanticGraph) -> str | None:
+    """Describe the difference between a prompt and its rewrite that is more than verbs brought into the vocabulary;
+    None if there is none.
+
+    Verbs by which the vocabulary calls its actions stay. Each other verb stays or becomes one of them, and the one of
+    its own action where the vocabulary knows the verb.
+
+    Args:
+        before: of the prompt with its spelling corrected.
+        after: of the rewrite.
+    """
+    was, now = _verbs(before), _verbs(after)
+    gone, new = was - now, now - was
+    names, meant = _verbs_of_actions()
+    strange = any(verb in names for verb in gone) or any(verb not in names for verb in new)
+    other = any(verb in meant and not meant[verb] & new.keys() for verb in gone)
+    if strange or other or gone.total() != new.total():
+        return f"it changes the verbs: {_list(was)} became {_list(now)}"
+    for what, earlier, later in _named(before.words, after.words):
+        if earlier != later:
+            return f"it changes {what}: {_list(earlier)} became {_list(later)}"
+    return None
+
+
+@lru_cache(maxsize=1)
+def _verbs_of_actions() -> tuple[frozenset[str], Mapping[str, Set[str]]]:
+    """Return the verbs by which the vocabulary calls its actions, and for each verb that it knows those of its
+    actions."""
+    meant: dict[str, set[str]] = {}
+    names: set[str] = set()
+    for action in load_vocabulary().actions.values():
+        first, *_ = (lemma(phrase.split()[0]) for phrase in action.verbs) if action.verbs else (None,)
+        if first is None:
+            continue
+        names.add(first)
+        for phrase in (*action.verbs, *action.near):
+            meant.setdefault(lemma(phrase.split()[0]), set()).add(first)
+    return frozenset(names), meant
 
 
 def changed_details(before: str, after: str) -> str | None:

@@ -13,7 +13,9 @@ from marey.vocabulary.scope import VERSION, ActionLists
 
 PIPELINE_VERSION = 5
 """Raise it when the graph, the actions or the features of the same prompt change for any reason but weights."""
-REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
+REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1, "tca": 1}
+ASKING = frozenset({"openai", "tca"})
+"""Rewriters that ask a language model."""
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
 MEANING_VERSION = 1
 """Raise it when `marey.text.meaning` judges the same prompt otherwise for any reason but the vocabulary."""
@@ -51,8 +53,10 @@ def _rewriter_parts(spec: TextSpec) -> list[str | int]:
     parts: list[str | int] = [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]]
     if spec.rewriter_model:
         parts.append(spec.rewriter_model)
-    if spec.rewriter == "openai" and spec.wording != "caption":
+    if spec.rewriter in ASKING and spec.wording != "caption":
         parts.append(spec.wording)
+    if spec.rewriter == "tca":
+        parts.append(load_vocabulary().sha256)
     return parts
 
 
@@ -76,7 +80,7 @@ def as_served(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
     config = config or settings()
     if config.rewriter is None:
         return spec
-    model = config.rewriter_model if config.rewriter == "openai" else None
+    model = config.rewriter_model if config.rewriter in ASKING else None
     return spec.model_copy(update={"rewriter": config.rewriter, "rewriter_model": model})
 
 

@@ -11,11 +11,12 @@ from marey.bundles import find_bundle
 from marey.core.errors import InvalidBundle, NotFound
 from marey.core.settings import settings
 from marey.text.encoders import WIDTHS, TextEncoder, find_encoder, find_weights
-from marey.text.keys import NO_LABELLER, labeller_bundle
+from marey.text.keys import ASKING, NO_LABELLER, labeller_bundle
 from marey.text.labellers import NoLabeller
 from marey.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
 from marey.text.roles import RoleLabeller
 from marey.text.wordings import Wording
+from marey.vocabulary.entries import load_vocabulary
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
@@ -72,11 +73,11 @@ def load_labeller(name: str) -> RoleLabeller:
 
 
 def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption") -> PromptRewriter:
-    """The rewriter of that name; `openai` writes in the wording of the training texts.
+    """The rewriter of that name; `openai` and `tca` write in the wording of the training texts.
 
     Raises:
-        InvalidBundle: there is none.
-        InvalidInput: `openai` without its settings.
+        InvalidBundle: there is none, or `tca` for descriptions, which may use other verbs anyway.
+        InvalidInput: `openai` or `tca` without their settings.
     """
     if name == "none":
         return NoRewriter()
@@ -84,9 +85,12 @@ def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption
         from marey.text.spelling import Speller
 
         return RulesRewriter(labeller, Speller.load())
-    if name == "openai":
+    if name in ASKING:
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
-        from marey.text.wordings import QUESTIONS
+        from marey.text.wordings import QUESTIONS, alignment
 
-        return OpenAIRewriter(Endpoint.of(settings()), QUESTIONS[wording])
-    raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai.")
+        if name == "tca" and wording != "caption":
+            raise InvalidBundle("the rewriter 'tca' writes captions", where=wording, hint="Use the rewriter openai.")
+        question = alignment(load_vocabulary()) if name == "tca" else QUESTIONS[wording]
+        return OpenAIRewriter(Endpoint.of(settings()), question, name)
+    raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai, tca.")

@@ -1,4 +1,4 @@
-"""Rewriter `openai`: a language model brings prompts into the wording of the training texts (`marey.text.wordings`).
+"""Rewriters `openai` and `tca`: a language model brings prompts into the wording of training texts (`text.wordings`).
 
 Any endpoint with OpenAI's `POST /chat/completions` works, including a local one. A failure never costs a motion: if the
 endpoint is slow, unreachable or returns an unusable answer, the prompt is used as written and the reason is recorded.
@@ -69,9 +69,8 @@ class Endpoint:
 class OpenAIRewriter:
     """Rewrites prompts by a language model; answers are cached, so that a process asks once per prompt. Thread-safe."""
 
-    name = "openai"
-
-    def __init__(self, endpoint: Endpoint, question: Question) -> None:
+    def __init__(self, endpoint: Endpoint, question: Question, name: str = "openai") -> None:
+        self.name = name
         self._endpoint = endpoint
         self._question = question
         secret = {} if endpoint.key is None else {"Authorization": f"Bearer {endpoint.key.get_secret_value()}"}

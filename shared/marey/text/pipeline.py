@@ -21,7 +21,7 @@ from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
-from marey.text.guard import changed_meaning, lost_meaning
+from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
@@ -150,11 +150,19 @@ class TextPipeline:
         if self._speller is None:
             self._speller = Speller.load()
         before, after = self._graphs([self._speller.correct(prompt), rewrite.text])
-        reason = (lost_meaning if self.spec.wording == "description" else changed_meaning)(before, after)
+        reason = self._changed(before, after)
         if reason is None:
             return rewrite
         log.info("a rewrite was refused")
         return Rewrite(prompt, refused=reason)
+
+    def _changed(self, before: SemanticGraph, after: SemanticGraph) -> str | None:
+        """Describe a change of meaning that the rewriter may not make; None if there is none."""
+        if self.spec.wording == "description":
+            return lost_meaning(before, after)
+        if self.spec.rewriter == "tca":
+            return changed_but_aligned(before, after)
+        return changed_meaning(before, after)
 
     def features(self, prompts: Sequence[str]) -> list[TextFeatures]:
         """Graph and node vectors of each prompt.

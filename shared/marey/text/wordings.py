@@ -14,6 +14,7 @@ from typing import Literal
 from marey.core.errors import MareyError
 from marey.items.prompts import check_prompt
 from marey.text.rewriters import NotRewritten, Rewrite
+from marey.vocabulary.entries import Vocabulary
 
 Wording = Literal["caption", "description"]
 
@@ -51,6 +52,12 @@ tense, plain and precise, one paragraph of about 60 words, at most {DESCRIPTION_
 and 12 seconds. {_ONLY_DATA} Answer with two lines and nothing else:
 Motion: the description
 Seconds: the length as a number"""
+
+TO_VOCABULARY = f"""{TO_CAPTION.partition("Keep every action")[0]}Keep every action that is one of those named below, \
+and say every other one by the nearest of these, with as many repetitions:
+{{actions}}
+Keep the order of the actions, the sides of the body, directions, counts and speeds. Add no action and no object.
+Third person, present tense, at most {CAPTION_WORDS} words. {_ONLY_DATA} Answer with the caption alone."""
 
 
 MANNERS = (
@@ -121,6 +128,13 @@ QUESTIONS: Mapping[Wording, Question] = {
     "caption": Question(TO_CAPTION, _caption),
     "description": Question(TO_DESCRIPTION, _description),
 }
+
+
+def alignment(vocabulary: Vocabulary) -> Question:
+    """Return the question for a caption whose actions are those of a vocabulary, by their first words (MOGO's TCA)."""
+    actions = ", ".join(sorted({action.verbs[0] for action in vocabulary.actions.values() if action.verbs}))
+    return Question(TO_VOCABULARY.format(actions=actions), _caption)
+
 
 PARAPHRASES: tuple[Question, ...] = tuple(
     Question(TO_PARAPHRASE + manner, lambda answer: _caption(answer, DESCRIPTION_WORDS)) for manner in MANNERS

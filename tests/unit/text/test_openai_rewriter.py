@@ -10,14 +10,17 @@ import pytest
 from pydantic import SecretStr
 
 from marey.bundles import TextSpec
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidBundle, InvalidInput
 from marey.core.settings import Settings
-from marey.text import openai_rewriter
+from marey.text import loading, openai_rewriter
 from marey.text.features import TextFeatures
 from marey.text.keys import as_served, feature_key
+from marey.text.loading import load_rewriter
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
+from marey.text.pipeline import TextPipeline
 from marey.text.rewriters import NotRewritten, Rewrite
 from marey.text.wordings import QUESTIONS
+from marey.vocabulary.entries import load_vocabulary
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.texts import shared_pipeline
 
@@ -56,6 +59,28 @@ def test_the_endpoint_is_asked_for_a_caption_in_the_style_of_the_training_captio
     assert [m["role"] for m in asked.question["messages"]] == ["system", "user"]
     assert "A youth waves hi with the left hand." in asked.question["messages"][0]["content"]
     assert asked.prompt == PROMPT
+
+
+def test_an_alignment_is_asked_for_the_actions_of_the_vocabulary(
+    model: LanguageModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = Settings(rewriter="tca", rewriter_url=model.url, rewriter_model="some-model")
+    monkeypatch.setattr(loading, "settings", lambda: config)
+    model.answer = lambda asked, before: CompletionReply("A person walks to the left.")
+    pipeline = shared_pipeline()
+    spec = pipeline.spec.model_copy(update={"rewriter": "tca"})
+    rewriter = load_rewriter("tca", pipeline.labeller)
+    aligned = TextPipeline(spec, rewriter=rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+    (parsed,) = aligned.explain(["he strolls to the left"])
+    assert parsed.graph.text == "A person walks to the left."
+    assert parsed.rewrite_reason == "rewritten by the rewriter 'tca'"
+    instruction = model.asked[0].question["messages"][0]["content"]
+    assert "A youth waves hi with the left hand." in instruction
+    for action in load_vocabulary().actions.values():
+        assert not action.verbs or action.verbs[0] in instruction
+    assert "{" not in instruction
+    with pytest.raises(InvalidBundle, match="'tca' writes captions"):
+        load_rewriter("tca", pipeline.labeller, "description")
 
 
 DESCRIBED = "The person shuffles forward, the left foot dragging behind, with both arms hanging loosely at the sides."
@@ -248,9 +273,10 @@ def test_a_machine_chooses_its_rewriter_and_the_keys_of_features_tell_which() ->
 
     assert served() == spec
     specs = [served(rewriter=name, rewriter_model=model)
-             for name, model in (("none", "a"), ("rules", "a"), ("openai", "a"), ("openai", "b"))]  # fmt: skip
-    assert [s.rewriter for s in specs] == ["none", "rules", "openai", "openai"]
-    assert len({feature_key("walk", s) for s in specs}) == 4
+             for name, model in (("none", "a"), ("rules", "a"), ("openai", "a"), ("openai", "b"), ("tca", "a"),
+                                 ("tca", "b"))]  # fmt: skip
+    assert [s.rewriter for s in specs] == ["none", "rules", "openai", "openai", "tca", "tca"]
+    assert len({feature_key("walk", s) for s in specs}) == 6
     assert feature_key("walk", specs[0]) == feature_key("walk", spec)
 
 

@@ -116,6 +116,34 @@ def test_a_description_may_say_more_but_loses_nothing(pipeline: TextPipeline, re
     assert TextFeatures.from_blob(features.to_blob()).seconds == features.seconds
 
 
+@pytest.mark.parametrize(
+    ("prompt", "rewrite", "refused"),
+    [
+        ("a man jabs twice", "a person punches two times", None),
+        ("she strolls to the left", "A person walks to the left.", None),
+        ("a person waves", "Someone waves.", None),
+        ("he moonwalks then waves", "a person walks then waves", None),
+        ("a man jabs twice", "a person punches", "a count"),
+        ("a man jabs twice", "a person kicks two times", "verbs"),  # the vocabulary knows a jab as a punch
+        ("she strolls to the left", "a person walks to the right", "a side"),
+        ("she strolls forward", "a person walks backward", "a direction"),
+        ("a person waves", "a person walks", "verbs"),
+        ("he strolls", "a person ambles", "verbs"),
+        ("he strolls", "a person walks and waves", "verbs"),
+    ],
+)
+def test_an_alignment_brings_other_verbs_into_the_vocabulary_and_keeps_the_rest(
+    pipeline: TextPipeline, prompt: str, rewrite: str, refused: str | None
+) -> None:
+    aligned = TextPipeline(
+        TextSpec(rewriter="tca"), rewriter=Says(rewrite), labeller=pipeline.labeller, encoder=pipeline.encoder
+    )
+    made = aligned.rewrite(prompt)
+    assert made.text == (prompt if refused else rewrite), made.refused
+    assert (refused or "") in (made.refused or "")
+    assert (made.refused is None) == (refused is None)
+
+
 def test_the_guard_compares_verbs_by_their_lemma() -> None:
     before = build_graph("a person walked", [Frame(2)], max_actions=4, max_specifics=8)
     after = build_graph("a person walks", [Frame(2)], max_actions=4, max_specifics=8)
