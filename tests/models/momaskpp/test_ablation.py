@@ -13,7 +13,7 @@ from marey.bundles import Bundle, find_bundle
 from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
 from marey.models.momaskpp import ablation
-from marey.models.momaskpp.ablation import ATTENTION, CONDITIONING, SCALES, Variant, train_variant
+from marey.models.momaskpp.ablation import ATTENTION, CONDITIONING, SCALES, NetworkVariant, train_variant
 from marey.models.momaskpp.assembly import assemble
 from marey.models.momaskpp.config import TINY, MoMaskPPConfig
 from marey.models.momaskpp.scales import Scales
@@ -49,7 +49,7 @@ def bundle(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> 
     ],
 )
 def test_a_variant_trains_its_stages_alone(
-    variant: Variant, stages: tuple[str, ...], prepared: PreparedData, bundle: Bundle, tmp_path: Path
+    variant: NetworkVariant, stages: tuple[str, ...], prepared: PreparedData, bundle: Bundle, tmp_path: Path
 ) -> None:
     run = tmp_path / "networks" / "one"
     found = train_variant(str(bundle.path), stages, options_of(prepared, run, variant.of(TINY)))

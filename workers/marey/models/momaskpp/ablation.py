@@ -35,7 +35,7 @@ from marey.training.staging import TrainOptions
 
 
 @dataclass(frozen=True)
-class Variant:
+class NetworkVariant:
     """A row of an ablation: fields that differ from the bundle's configuration."""
 
     tokenizer: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -51,17 +51,17 @@ class Variant:
 
 
 SCALES = {
-    "multi-scale, 8 4 2 1": Variant(tokenizer={"scales": (8, 4, 2, 1)}),
-    "full-scale, 2 levels": Variant(tokenizer={"scales": (1, 1)}),
-    "full-scale, 4 levels": Variant(tokenizer={"scales": (1, 1, 1, 1)}),
+    "multi-scale, 8 4 2 1": NetworkVariant(tokenizer={"scales": (8, 4, 2, 1)}),
+    "full-scale, 2 levels": NetworkVariant(tokenizer={"scales": (1, 1)}),
+    "full-scale, 4 levels": NetworkVariant(tokenizer={"scales": (1, 1, 1, 1)}),
 }
 ATTENTION = {
-    "with attention": Variant(tokenizer={"attention": True}),
-    "without attention": Variant(tokenizer={"attention": False}),
+    "with attention": NetworkVariant(tokenizer={"attention": True}),
+    "without attention": NetworkVariant(tokenizer={"attention": False}),
 }
 CONDITIONING = {
-    "cross-attention": Variant(masked={"conditioning": "cross-attention"}),
-    "in-context": Variant(masked={"conditioning": "in-context"}),
+    "cross-attention": NetworkVariant(masked={"conditioning": "cross-attention"}),
+    "in-context": NetworkVariant(masked={"conditioning": "in-context"}),
 }
 
 
@@ -82,7 +82,7 @@ def ablate_conditioning(data: Path, bundle: str, output: Path, **options: Any) -
 
 def ablate(
     name: str,
-    variants: Mapping[str, Variant],
+    variants: Mapping[str, NetworkVariant],
     stages: tuple[str, ...],
     data: Path,
     bundle: str,
