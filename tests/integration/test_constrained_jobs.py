@@ -15,7 +15,7 @@ from marey.core.settings import Settings
 from marey.generation.handler import GeneratorHandler
 from marey.registry import get_model, model_names
 from tests.support.command import Command
-from tests.support.editing import clip_of
+from tests.support.editing import clip_of, edited
 from tests.support.live_api import LiveApi, write_bundle
 from tests.support.models import load, random_bundle
 from tests.support.runtime import Loop
@@ -184,6 +184,21 @@ def test_a_motion_has_the_terms_of_its_poses(api: LiveApi, loop: Loop, generator
     )
     assert own["motion"]["licence"] == clip_of(api, own["motion"]["id"]).manifest["licence"] == "CC-BY-NC-4.0"
     assert plain["motion"]["licence"] == generator.bundle.manifest.licence
+
+
+def test_a_cut_timeline_has_the_prompts_that_are_left(api: LiveApi, loop: Loop, http: httpx2.Client) -> None:
+    (item,) = made(api, loop, {"timeline": "0-1.5 a person walks; 1.5-3 a person bows; 3-4.5 a person sits", "seed": 3})
+    motion = item["motion"]["id"]
+    for op, wanted in (
+        ({"op": "trim", "to": "f29"}, "a person walks"),
+        ({"op": "trim", "from": 0.5, "to": "f59"}, "0-1 a person walks; 1-2.5 a person bows"),
+    ):
+        answer = http.post(f"/v1/motions/{motion}/edits", json={"ops": [op]}, params={"validate_only": "true"})
+        assert answer.json()["prompts"] == [wanted]
+        (found,) = edited(api, motion, op)
+        assert found["prompt"] == clip_of(api, found["id"]).manifest["prompt"] == wanted
+    (again,) = edited(api, found["id"], {"op": "trim", "from": 1})
+    assert again["prompt"] == "a person bows"
 
 
 def test_pages_of_timelines_and_of_edits_by_a_model(

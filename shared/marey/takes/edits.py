@@ -31,6 +31,7 @@ from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import Step, pieces_of, read_steps
+from marey.motion.edits.timeline_rows import prompt_after_cuts
 from marey.takes.model_edits import EditGenerator, check_generator, with_prompts
 from marey.takes.reviews import review
 from marey.tenants import DEFAULT_TENANT
@@ -247,7 +248,8 @@ def _check_sources(first: MotionRow, joined: Sequence[MotionRow], generator: Edi
 def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], edit: NewEdit) -> NewItem:
     """Return the item of one resulting motion; it has the name, the tags and the seed of the edited one."""
     source = rows[edit.motion]
-    prompt = prompt_of(source.prompt, steps, lambda step: rows[UUID(step.values["with"])].prompt)
+    prompt, rest = prompt_after_cuts(source.metadata, source.prompt, steps, source.frames, source.fps)
+    prompt = prompt_of(prompt, rest, lambda step: rows[UUID(step.values["with"])].prompt)
     if len(prompt) > MOST_CHARACTERS:
         raise TooLarge(
             f"the prompts of the motions have {len(prompt)} characters together; the most is {MOST_CHARACTERS}",

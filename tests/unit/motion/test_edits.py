@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput, TooLarge
+from marey.items.timeline import timeline_text
 from marey.motion import MotionClip, edit, load_npz
 from marey.motion.arrange import placement_of
 from marey.motion.edits.editing import EditSource
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import pieces_of, read_steps
 from marey.motion.edits.table import OPERATIONS
+from marey.motion.edits.timeline_rows import prompt_after_cuts
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
@@ -203,6 +206,75 @@ def test_each_frame_keeps_its_prompt(first: int, length: int, factor: float):
         assert source[text] <= first + frame * factor + 1e-5 < source[text] + max(factor, 1) + 1e-5
     assert told[0][0] == 0
     assert all(frame < result.frames for frame, _ in told)
+
+
+def with_rows() -> MotionClip:
+    """A motion of three prompts of a second each, and a gap of half a second, with the record of a timeline."""
+    times = ((0.0, 1.0, "a person walks"), (1.0, 2.0, "a person bows"), (2.5, 3.0, "a person waves left"))
+    rows = [
+        {"start": start, "end": end, "prompt": prompt, "rewritten": prompt, "graph": {"of": prompt}, "match": 0.9}
+        for start, end, prompt in times
+    ]
+    spans = {"transitions": [{"start": 1.0, "end": 1.2, "seed": 4}], "gaps": [{"start": 2.0, "end": 2.5}]}
+    text = "0-1 a person walks; 1-2 a person bows; 2.5-3 a person waves left"
+    told = {
+        "prompt": text,
+        "rewritten": text,
+        "scope": {},
+        "prompts": [[0, "a person walks"], [20, "a person bows"], [50, "a person waves left"]],
+        "timeline": {"rows": rows, **spans},
+    }
+    return replace(dance(1, 60), manifest=told)
+
+
+@pytest.mark.parametrize(
+    ("ops", "prompt"),
+    [
+        ([{"op": "trim", "from": 0.5}], "0-0.5 a person walks; 0.5-1.5 a person bows; 2-2.5 a person waves left"),
+        ([{"op": "trim", "to": "f39"}], "0-1 a person walks; 1-2 a person bows"),
+        ([{"op": "trim", "from": "f20", "to": "f39"}], "a person bows"),
+        ([{"op": "trim", "from": "f42", "to": "f47"}], "a person bows"),  # the gap after it
+        ([{"op": "trim", "from": 1}, {"op": "trim", "to": 0.5}], "a person bows"),
+        ([{"op": "fps", "rate": 40}, {"op": "trim", "to": "f79"}], "0-1 a person walks; 1-2 a person bows"),
+        ([{"op": "mirror"}, {"op": "trim", "from": 1}], "0-1 a person bows; 1.5-2 a person waves right"),
+        ([{"op": "trim", "from": 1}, {"op": "mirror"}], "0-1 a person bows; 1.5-2 a person waves right"),
+        ([{"op": "smooth", "hz": 6}], "0-1 a person walks; 1-2 a person bows; 2.5-3 a person waves left"),
+        ([{"op": "trim", "to": "f39"}, {"op": "reverse"}], "0-1 a person walks; 1-2 a person bows"),
+    ],
+)
+def test_a_cut_timeline_says_what_is_left(ops: list[dict[str, Any]], prompt: str):
+    source = with_rows()
+    about = one(source, *ops).manifest
+    assert about["prompt"] == prompt
+    if ";" not in prompt:
+        assert (about["rewritten"], about["graph"]) == (prompt, {"of": prompt})
+        assert not {"timeline", "prompts"} & set(about)
+    elif ops[-1]["op"] != "reverse":
+        assert timeline_text(read_timeline_rows(about["timeline"]["rows"])) == prompt
+        assert [text for _, text in about["prompts"]] == [row["prompt"] for row in about["timeline"]["rows"]]
+    else:
+        assert "timeline" not in about
+    told, rest = prompt_after_cuts(source.manifest, source.manifest["prompt"], read_steps(ops), 60, 20.0)
+    assert prompt_of(told, rest, lambda step: "") == prompt
+
+
+def test_spans_of_a_cut_timeline_are_moved_and_matches_of_whole_rows_dropped():
+    record = one(with_rows(), {"op": "trim", "from": 1.1}).manifest["timeline"]
+    assert [(row["start"], row["end"], row["match"]) for row in record["rows"]] == [(0.0, 0.9, None), (1.4, 1.9, None)]
+    assert record["transitions"] == [{"start": 0.0, "end": 0.1, "seed": 4}]
+    assert record["gaps"] == [{"start": 0.9, "end": 1.4}]
+
+
+def test_a_moment_beyond_the_motion_leaves_the_prompt_to_the_worker():
+    about = with_rows().manifest
+    told, rest = prompt_after_cuts(about, about["prompt"], read_steps([{"op": "trim", "from": 99}]), 60, 20.0)
+    assert (told, len(rest)) == (about["prompt"], 1)
+    cut = read_steps([{"op": "trim", "to": 1}])
+    assert prompt_after_cuts({}, "a person walks", cut, 60, 20.0) == ("a person walks", cut)
+
+
+def read_timeline_rows(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{name: row[name] for name in ("start", "end", "prompt")} for row in rows]
 
 
 def test_pieces_of_a_split_have_their_own_prompts():

@@ -12,12 +12,10 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.joining import faded_in, placed_after
 from marey.motion.edits.place import posed
 from marey.motion.edits.prompt_frames import PROMPTS, prompts_of, resampled, without_repeats
-from marey.motion.edits.prompts import joined
+from marey.motion.edits.prompts import READ_PROMPT, joined
 
 SAME_BONES = 1e-4
 """Metres."""
-READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope")
-"""Keys of a manifest that say how its prompt was read."""
 
 
 def concat(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:

@@ -11,6 +11,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.operation import frame_number
 from marey.motion.edits.place import posed
 from marey.motion.edits.prompt_frames import with_prompts_at
+from marey.motion.edits.timeline_rows import cut_rows
 
 
 def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
@@ -20,7 +21,8 @@ def trim(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
         InvalidInput: a moment is outside the motion, or the second is before the first.
     """
     first, last = frames_of(clip, values["from"], values["to"])
-    return replace(part(clip, first, last), manifest=with_prompts_at(clip.manifest, range(first, last + 1)))
+    told = cut_rows(clip.manifest, first, last, clip.fps)
+    return replace(part(clip, first, last), manifest=with_prompts_at(told, range(first, last + 1)))
 
 
 def frames_of(clip: MotionClip, start: float | str, end: float | str | None) -> tuple[int, int]:

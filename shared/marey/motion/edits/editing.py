@@ -15,11 +15,12 @@ from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import at_origin
 from marey.motion.edits.steps import Step, pieces_of, read_steps
+from marey.motion.edits.timeline_rows import TIMELINE
 
 EDITED_FROM = "edited_from"
 CYCLE = "loop"
 """Key of the record of a loop in a motion's manifest."""
-OUTDATED = ("quality", "selection", "travel", "travel_per_second", "timeline", "constraints")
+OUTDATED = ("quality", "selection", "travel", "travel_per_second", "constraints")
 """Keys of a manifest that describe the frames of the source."""
 
 
@@ -115,6 +116,8 @@ def _apply(
 ) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
+    if not (manifest.get(TIMELINE) or {}).get("rows"):
+        manifest.pop(TIMELINE, None)
     clip = at_origin(replace(source.clip, manifest=manifest))
     sources, done = [source], list[dict[str, Any]]()
     for step in steps:
@@ -138,6 +141,8 @@ def _run(step: Step, clip: MotionClip, values: Mapping[str, Any], model: FrameMo
         raise InvalidInput(
             f"{step.operation.name} generates frames, and no model is given", where=step.where, argument="model"
         )
+    if not step.operation.keeps_rows:
+        clip = replace(clip, manifest={name: value for name, value in clip.manifest.items() if name != TIMELINE})
     if not step.operation.keeps_cycle:
         clip = replace(clip, manifest={name: value for name, value in clip.manifest.items() if name != CYCLE})
     try:

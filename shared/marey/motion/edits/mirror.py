@@ -12,7 +12,7 @@ from marey.core.sides import swap_sides_in
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import PLACEMENT
 
-TEXTS = ("prompt", "prompts", "rewritten", "not_rewritten", "graph", "scope")
+TEXTS = ("prompt", "prompts", "rewritten", "not_rewritten", "graph", "scope", "timeline")
 """Keys of a manifest that say in words what is to be seen."""
 
 

@@ -127,6 +127,7 @@ class Operation:
         metavar: placeholder of the option's value; empty = a flag. Parts in brackets may be left out.
         keeps_cycle: the manifest's record of a loop still holds, or `run` has changed it.
         keeps_place: the result stands where the motion stood, however its first pose faces.
+        keeps_rows: the rows of a timeline in the manifest still hold, or `run` has changed them.
         pieces: one motion becomes several; `marey.motion.edits.steps` writes them as other operations.
         needs_model: a model generates frames; `run` gets it as its third argument.
     """
@@ -138,6 +139,7 @@ class Operation:
     metavar: str = ""
     keeps_cycle: bool = False
     keeps_place: bool = False
+    keeps_rows: bool = False
     pieces: bool = False
     needs_model: bool = False
 

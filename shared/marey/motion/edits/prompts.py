@@ -7,6 +7,9 @@ from collections.abc import Callable, Sequence
 from marey.core.sides import swap_sides
 from marey.motion.edits.steps import Step
 
+READ_PROMPT = ("rewritten", "not_rewritten", "graph", "scope")
+"""Keys of a manifest that say how its prompt was read."""
+
 
 def prompt_of(prompt: str, steps: Sequence[Step], other: Callable[[Step], str]) -> str:
     """Return the prompt of the result of operations.

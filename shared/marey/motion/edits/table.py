@@ -134,6 +134,7 @@ _ALL = (
             Parameter("to", "Last moment to keep; default: the last frame.", moment, None),
         ),
         metavar="A:B",
+        keeps_rows=True,
     ),
     Operation(
         "split",
@@ -184,7 +185,7 @@ _ALL = (
             ),
         ),
     ),
-    Operation("mirror", "Exchange left and right.", f"{_HERE}.mirror:mirror", keeps_cycle=True),
+    Operation("mirror", "Exchange left and right.", f"{_HERE}.mirror:mirror", keeps_cycle=True, keeps_rows=True),
     Operation(
         "speed",
         "Play F times as fast, at the same frame rate.",
@@ -207,6 +208,7 @@ _ALL = (
         ),
         metavar="travel|heading",
         keeps_cycle=True,
+        keeps_rows=True,
     ),
     Operation("reverse", "Play backwards.", f"{_HERE}.timing:reverse"),
     Operation(
@@ -215,6 +217,7 @@ _ALL = (
         f"{_HERE}.smoothing:low_pass",
         (Parameter("hz", "Frequency that is halved in power; higher ones lose more.", number(0.5, 60.0)),),
         metavar="HZ",
+        keeps_rows=True,
     ),
     Operation(
         "fps",
@@ -223,6 +226,7 @@ _ALL = (
         (Parameter("rate", "Frames a second.", number(1.0, 240.0)),),
         metavar="FPS",
         keeps_cycle=True,
+        keeps_rows=True,
     ),
     Operation(
         "feet",
@@ -231,6 +235,7 @@ _ALL = (
         f"{_HERE}.feet:set_feet",
         (Parameter("mode", "lock, free or raw.", choice("lock", "free", "raw")),),
         metavar="lock|free|raw",
+        keeps_rows=True,
     ),
     *_BY_MODEL,
 )

@@ -1,0 +1,98 @@
+"""Rows of a timeline in a manifest, as they follow cuts. Standard library only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from marey.core.frame_rates import frames_at_rate
+from marey.core.sides import swap_sides_in
+from marey.motion.edits.operation import frame_number
+from marey.motion.edits.prompts import READ_PROMPT
+from marey.motion.edits.steps import Step
+
+TIMELINE, PROMPTS = "timeline", "prompts"
+"""Keys of a manifest: the rows, transitions and gaps of a timeline in seconds; the first frame of each prompt."""
+DIGITS = 3
+"""Decimal places of times in a text, as in `marey.items.timeline`."""
+
+
+def cut_rows(manifest: Mapping[str, Any], first: int, last: int, fps: float) -> dict[str, Any]:
+    """Return the manifest of a timeline of which these frames remain: its rows and the text of its prompt are those of
+    what is left. A timeline of which one row is left has its prompt alone; a manifest without rows is unchanged.
+
+    Args:
+        first, last: frames that remain, both included.
+        fps: frames a second.
+    """
+    told = dict(manifest)
+    record: Mapping[str, Any] = told.get(TIMELINE) or {}
+    if not record.get("rows"):
+        return told
+    cut = {name: _left(spans, first, last, fps) for name, spans in record.items()}
+    whole = [(row["start"], row["end"]) for row in record["rows"]]
+    if [(row["start"], row["end"]) for row in cut["rows"]] == whole:
+        return told
+    rows = cut["rows"] or [_before(record["rows"], first / fps)]
+    told = {name: value for name, value in told.items() if name not in (*READ_PROMPT, TIMELINE)}
+    if len(rows) > 1:
+        own = [{**row, "rewritten": row.get("rewritten", row["prompt"])} for row in rows]
+        return {**told, TIMELINE: cut, "prompt": _text(own, "prompt"), "rewritten": _text(own, "rewritten")}
+    del told["prompt"]
+    told.pop(PROMPTS, None)
+    return {**told, **{name: rows[0][name] for name in ("prompt", *READ_PROMPT) if name in rows[0]}}
+
+
+def prompt_after_cuts(
+    about: Mapping[str, Any], prompt: str, steps: Sequence[Step], frames: int, fps: float
+) -> tuple[str, Sequence[Step]]:
+    """Return the prompt of a timeline after the first steps, as far as they leave its rows known, and the steps after
+    these.
+
+    Args:
+        about: manifest of the motion.
+        prompt: of the motion.
+        frames: of the motion.
+        fps: of the motion.
+    """
+    if not prompt or not (about.get(TIMELINE) or {}).get("rows"):
+        return prompt, steps
+    told: dict[str, Any] = {**about, "prompt": prompt}
+    for number, step in enumerate(steps):
+        name, values = step.operation.name, step.values
+        if not step.operation.keeps_rows:
+            return told["prompt"], steps[number:]
+        if name == "mirror":
+            told = {key: swap_sides_in(value) if key in ("prompt", TIMELINE) else value for key, value in told.items()}
+        elif name == "fps":
+            frames, fps = frames_at_rate(frames, fps, values["rate"]), values["rate"]
+        elif name == "trim":
+            first = frame_number(values["from"], fps)
+            last = frames - 1 if values["to"] is None else frame_number(values["to"], fps)
+            if not first <= last < frames:  # the worker refuses it
+                return told["prompt"], steps[number:]
+            told, frames = cut_rows(told, first, last, fps), last - first + 1
+    return told["prompt"], ()
+
+
+def _left(spans: Sequence[Mapping[str, Any]], first: int, last: int, fps: float) -> list[dict[str, Any]]:
+    """Return what is left of spans of time, at least half a frame; a match was of the whole row."""
+    begin, length = first / fps, (last - first + 1) / fps
+    left: list[dict[str, Any]] = []
+    for span in spans:
+        start, end = max(span["start"] - begin, 0.0), min(span["end"] - begin, length)
+        if end - start > 0.5 / fps:
+            changed = {"match": None} if "match" in span else {}
+            left.append({**span, "start": round(start, 6), "end": round(end, 6), **changed})
+    return left
+
+
+def _before(rows: Sequence[Mapping[str, Any]], time: float) -> Mapping[str, Any]:
+    """Return the last row that begins up to a time; else the first."""
+    return next((row for row in reversed(rows) if row["start"] <= time), rows[0])
+
+
+def _text(rows: Sequence[Mapping[str, Any]], field: str) -> str:
+    """Return the text form of rows, as `marey.items.timeline.text_of`."""
+    times = [(round(row["start"], DIGITS), round(row["end"], DIGITS)) for row in rows]
+    return "; ".join(f"{start:g}-{end:g} {row[field]}" for (start, end), row in zip(times, rows, strict=True))
