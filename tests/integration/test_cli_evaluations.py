@@ -88,6 +88,7 @@ def test_waiting_exits_by_how_it_ended_and_8_when_it_is_worse(place: Studio, mar
     many = tmp_path / "many.jsonl"
     many.write_text("".join(json.dumps({"prompt": f"walk {n} steps"}) + "\n" for n in range(100)))
     first = marey("eval", "run", "--bundle", GENERATOR, "--split", many).ok().out.strip()
+    place.judge.timelines = True
     place.work()
     marey("eval", "wait", first, "--fail-on-regression").ok()
     place.judge.forget = 10
@@ -110,7 +111,7 @@ def test_waiting_exits_by_how_it_ended_and_8_when_it_is_worse(place: Studio, mar
             done.set()
             worker.join()
     finally:
-        place.judge.forget = 0
+        place.judge.forget, place.judge.timelines = 0, False
     assert running.returncode == 8, err
     (line,) = map(json.loads, out.splitlines())
     assert (line["state"], line["regressed"]) == ("done", True)
@@ -125,9 +126,15 @@ def _compare(marey: Marey, better: str, worse: str) -> None:
     table = [line.split("\t") for line in marey("eval", "compare", better, worse).ok().out.splitlines()]
     assert table[0][:4] == ["obeyed", "100.00", "90.00", "-10.00"]
     assert table[0][5] == "worse"
+    assert table[1][:4] == ["timeline_rows", "50.00", "45.00", "-5.00"]
+    assert table[1][5] == "worse"
     assert ["made", "100", "90", "-10", "", "not paired"] in table
     (line,) = marey("eval", "compare", better, worse, "--json").ok().lines
-    assert (line["changes"][0]["verdict"], line["regressed"]) == ("worse", True)
+    assert [(change["metric"], change["verdict"]) for change in line["changes"]] == [
+        ("obeyed", "worse"),
+        ("timeline_rows", "worse"),
+    ]
+    assert line["regressed"] is True
     command = ("eval", "compare", better, worse, "--fail-on-regression")
     marey(*command).refused(8, "obeyed fell from 100.0 to 90.0 %", f"marey eval report {worse}")
     marey("eval", "compare", worse, better, "--fail-on-regression").ok()

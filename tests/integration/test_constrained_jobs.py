@@ -189,10 +189,11 @@ def test_a_motion_has_the_terms_of_its_poses(api: LiveApi, loop: Loop, generator
 def test_a_cut_timeline_has_the_prompts_that_are_left(api: LiveApi, loop: Loop, http: httpx2.Client) -> None:
     (item,) = made(api, loop, {"timeline": "0-1.5 a person walks; 1.5-3 a person bows; 3-4.5 a person sits", "seed": 3})
     motion = item["motion"]["id"]
-    for op, wanted in (
+    cuts: tuple[tuple[dict[str, object], str], ...] = (
         ({"op": "trim", "to": "f29"}, "a person walks"),
         ({"op": "trim", "from": 0.5, "to": "f59"}, "0-1 a person walks; 1-2.5 a person bows"),
-    ):
+    )
+    for op, wanted in cuts:
         answer = http.post(f"/v1/motions/{motion}/edits", json={"ops": [op]}, params={"validate_only": "true"})
         assert answer.json()["prompts"] == [wanted]
         (found,) = edited(api, motion, op)

@@ -124,6 +124,7 @@ class ToyEvaluator:
         seen: what it was given.
         problems: raised, one a call, before it answers.
         forget: motions that it leaves out of its count, which is worse than before.
+        timelines: motions count as timelines too; half of the rows of each that does not fail are shown.
     """
 
     queue = EVALUATOR_QUEUE
@@ -134,6 +135,7 @@ class ToyEvaluator:
         self.problems = list(problems)
         self.seconds = seconds
         self.forget = 0
+        self.timelines = False
 
     def load(self, bundle: str) -> None:
         pass
@@ -172,7 +174,10 @@ class ToyEvaluator:
     def _scores(self, summary: dict[str, float | None], made: Sequence[MadeItem]) -> bytes:
         """Scores for a comparison: missing motions count as failed."""
         obeyed = [float(number >= self.forget) for number in range(len(made))]
-        scores = [MotionScore(i.index, i.variant, each, None) for i, each in zip(made, obeyed, strict=True)]
+        scores = [
+            MotionScore(i.index, i.variant, each, None, each / 2 if self.timelines else None)
+            for i, each in zip(made, obeyed, strict=True)
+        ]
         rows = [dataclasses.asdict(score) for score in scores]
         return json.dumps({"schema": SCHEMA, "version": VERSION, **summary, "scores": rows}).encode()
 

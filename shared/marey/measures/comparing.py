@@ -16,8 +16,8 @@ from marey.core.errors import InvalidInput
 from marey.measures.bootstrap import Difference, paired_bootstrap
 from marey.measures.scores import MotionScore
 
-OBEYED, RETRIEVED = "obeyed", "r_precision_3_of_32"
-COMPARED = {OBEYED: "obeyed", RETRIEVED: "retrieved"}
+OBEYED, RETRIEVED, TIMELINE_ROWS = "obeyed", "r_precision_3_of_32", "timeline_rows"
+COMPARED = {OBEYED: "obeyed", RETRIEVED: "retrieved", TIMELINE_ROWS: "rows_shown"}
 """Metrics with a value per motion, and the field of `MotionScore` that holds it. All of them raise alarms."""
 ROUNDS = 10_000
 

@@ -24,15 +24,17 @@ class MotionScore:
         obeyed: 1 if the motion passed its prompt check, else 0.
         retrieved: same-label R-precision of this motion, the share of its pools in which a motion of its prompt's label
             was among the nearest, 0 to 1.
+        rows_shown: share of the judged rows of a timeline that show their prompts, 0 to 1; None for other motions.
     """
 
     index: int
     variant: int
     obeyed: float | None
     retrieved: float | None
+    rows_shown: float | None = None
 
     def __post_init__(self) -> None:
-        for score in (self.obeyed, self.retrieved):
+        for score in (self.obeyed, self.retrieved, self.rows_shown):
             if score is not None and not 0 <= score <= 1:
                 raise InvalidInput(f"a score of {score}", where=f"prompt {self.index}, variant {self.variant}")
 

@@ -10,7 +10,7 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.evaluator.comparing import Earlier, alarms, changes
 from marey.evaluator.report import Baseline, Metric, MotionScore
-from marey.measures.comparing import OBEYED, RETRIEVED
+from marey.measures.comparing import OBEYED, RETRIEVED, TIMELINE_ROWS, compare
 
 METRICS = {
     OBEYED: Metric(OBEYED, "Prompt adherence", "%", "higher", 1),
@@ -68,3 +68,20 @@ def test_runs_of_other_prompts_are_refused() -> None:
     moved = [MotionScore(s.index + 1000, s.variant, s.obeyed, s.retrieved) for s in run(0.9)]
     with pytest.raises(InvalidInput, match="no prompts in common"):
         changes(earlier(moved), run(0.9), seed=0)
+
+
+def test_timelines_are_paired_by_the_share_of_their_rows_that_show_their_prompts() -> None:
+    shares = np.random.default_rng(2).integers(0, 4, (60, 2)) / 4
+    before = [MotionScore(i, k, None, None, float(shares[i, k])) for i in range(60) for k in range(2)]
+    after = [MotionScore(s.index, s.variant, None, None, min((s.rows_shown or 0.0) + 0.25, 1.0)) for s in before]
+    (change,) = compare(before, after, seed=0, where="e1")
+    assert (change.metric, change.verdict, change.prompts, change.motions) == (TIMELINE_ROWS, "better", 60, 120)
+    assert change.after - change.before == pytest.approx(25.0)
+    assert changes(earlier(before), after, seed=0) == ()  # a report has no column of them
+    older = [MotionScore(s.index, s.variant, 1.0, None) for s in before]
+    assert [each.metric for each in compare(older, after, seed=0, where="e1")] == []
+
+
+def test_a_share_beyond_one_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"a score of 1\.5"):
+        MotionScore(0, 0, None, None, 1.5)

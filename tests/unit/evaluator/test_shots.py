@@ -123,6 +123,10 @@ def test_timelines_are_left_out_of_embeddings_and_stay_in_measures_of_joints(
     assert values[RETRIEVED].n == 32
     scores = {score.index: score for score in report.scores}
     assert [scores[index].retrieved for index in TIMELINES] == [None, None]
+    assert report.timelines is not None
+    shown = [scores[index].rows_shown for index in TIMELINES]
+    assert sum(2 * (share or 0.0) for share in shown) == report.timelines.shown  # two rows of each are judged
+    assert scores[SINGLE - 1].rows_shown is None
     assert any(scores[index].retrieved is not None for index in range(SINGLE))
     assert not {each.seed for each in (*report.best, *report.worst)} & set(TIMELINES)
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidFile, InvalidInput
-from marey.evaluator.report import Change, Exhibit, Report, Value, from_json, to_json
+from marey.evaluator.report import Change, Exhibit, MotionScore, Report, Value, from_json, to_json
 from tests.support.reports import sample_report
 
 BASE = sample_report()
@@ -112,6 +112,10 @@ def test_each_motions_scores_are_a_line_and_read_back(report: Report) -> None:
     data = to_json(report)
     assert b'\n    {"index": 0, "variant": 1, "obeyed": 1.0, "retrieved": 0.25},\n' in data
     assert from_json(data).scores == report.scores
+    timeline = (MotionScore(0, 0, None, None, 0.5),)
+    written = to_json(sample_report(scores=timeline))
+    assert b'"retrieved": null, "rows_shown": 0.5}' in written
+    assert from_json(written).scores == timeline
     assert from_json(to_json(sample_report(scores=()))).scores == ()
 
 

@@ -9,7 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from marey.evaluator.report import Baseline, Change, Metric, MotionScore, sentence_of
-from marey.measures.comparing import compare
+from marey.measures.comparing import OBEYED, RETRIEVED, compare
+
+COLUMNS = frozenset({OBEYED, RETRIEVED})
+"""Paired metrics that are columns of a report; rows of timelines have a section of their own."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class Earlier:
 
 
 def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tuple[Change, ...]:
-    """Return the changes of all metrics that can be paired.
+    """Return the changes of the columns that can be paired.
 
     Raises:
         InvalidInput: the runs have no motions in common.
@@ -39,6 +42,7 @@ def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tu
             verdict=change.verdict,
         )
         for change in found
+        if change.metric in COLUMNS
     )
 
 

@@ -36,6 +36,7 @@ from marey.evaluator.report.model import MOST_EXHIBITS, Against
 from marey.evaluator.rows import Ruler, embedded_sets, generated_rows, reconstruction_row, truth_row
 from marey.evaluator.scoring import REPEATS, EmbeddedSet, metrics_of, retrieved
 from marey.evaluator.shot_sections import constraint_section, timeline_section
+from marey.evaluator.shots import rows_shown
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.runtime.scoring import ScoreInput
@@ -139,6 +140,7 @@ def _scores(
             motion.item.variant,
             None if motion.exported.obeyed is None else float(motion.exported.obeyed),
             None if np.isnan(share) else round(float(share), 4),
+            rows_shown(motion.rows),
         )
         for motion, share in zip(measured.motions, found, strict=True)
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -39,6 +39,13 @@ def rows_of(clip: MotionClip) -> tuple[RowReading, ...]:
     """Judge each row of a timeline, from the place where it begins; none if the clip is no timeline."""
     timeline = cast("Mapping[str, Any]", clip.manifest.get("timeline") or {})
     return tuple(_reading(clip, row) for row in timeline.get("rows", ()))
+
+
+def rows_shown(rows: Iterable[RowReading]) -> float | None:
+    """Return the share of the rows of a timeline that the referee judges and that show their prompts; None without
+    any."""
+    judged = [row.shown for row in rows if row.shown is not None]
+    return round(sum(judged) / len(judged), 4) if judged else None
 
 
 def constraints_of(clip: MotionClip) -> tuple[ConstraintError, ...] | None:

@@ -15,7 +15,7 @@ from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import at_origin
 from marey.motion.edits.steps import Step, pieces_of, read_steps
-from marey.motion.edits.timeline_rows import TIMELINE
+from marey.motion.edits.timeline_rows import TIMELINE, has_rows
 
 EDITED_FROM = "edited_from"
 CYCLE = "loop"
@@ -116,7 +116,7 @@ def _apply(
 ) -> MotionClip:
     """Return the result of operations without a split."""
     manifest = {name: value for name, value in source.clip.manifest.items() if name not in OUTDATED}
-    if not (manifest.get(TIMELINE) or {}).get("rows"):
+    if not has_rows(manifest):
         manifest.pop(TIMELINE, None)
     clip = at_origin(replace(source.clip, manifest=manifest))
     sources, done = [source], list[dict[str, Any]]()

@@ -17,6 +17,12 @@ DIGITS = 3
 """Decimal places of times in a text, as in `marey.items.timeline`."""
 
 
+def has_rows(manifest: Mapping[str, Any]) -> bool:
+    """Return True if a manifest has the rows of a timeline."""
+    record: Mapping[str, Any] = manifest.get(TIMELINE) or {}
+    return bool(record.get("rows"))
+
+
 def cut_rows(manifest: Mapping[str, Any], first: int, last: int, fps: float) -> dict[str, Any]:
     """Return the manifest of a timeline of which these frames remain: its rows and the text of its prompt are those of
     what is left. A timeline of which one row is left has its prompt alone; a manifest without rows is unchanged.
@@ -26,9 +32,9 @@ def cut_rows(manifest: Mapping[str, Any], first: int, last: int, fps: float) -> 
         fps: frames a second.
     """
     told = dict(manifest)
-    record: Mapping[str, Any] = told.get(TIMELINE) or {}
-    if not record.get("rows"):
+    if not has_rows(told):
         return told
+    record: Mapping[str, Any] = told[TIMELINE]
     cut = {name: _left(spans, first, last, fps) for name, spans in record.items()}
     whole = [(row["start"], row["end"]) for row in record["rows"]]
     if [(row["start"], row["end"]) for row in cut["rows"]] == whole:
@@ -55,7 +61,7 @@ def prompt_after_cuts(
         frames: of the motion.
         fps: of the motion.
     """
-    if not prompt or not (about.get(TIMELINE) or {}).get("rows"):
+    if not prompt or not has_rows(about):
         return prompt, steps
     told: dict[str, Any] = {**about, "prompt": prompt}
     for number, step in enumerate(steps):

@@ -30,11 +30,16 @@ def to_json(report: Report) -> bytes:
     """Encode the file. Equal reports give equal bytes."""
     # Settings keep all their digits: users type them in again.
     document = {"schema": SCHEMA, "version": VERSION, **_plain(report), "settings": dict(report.settings)}
-    scores = [_text(score) for score in document.pop("scores")]
+    scores = [_text(_score(score)) for score in document.pop("scores")]
     text = _text(document, indent=2).removesuffix("\n}")
     # One line per motion: stored results stay readable, and their differences too.
     lines = "".join(f"\n    {score}," for score in scores).removesuffix(",")
     return f'{text},\n  "scores": [{lines}\n  ]\n}}\n'.encode()
+
+
+def _score(score: dict[str, Any]) -> dict[str, Any]:
+    """Return a score as a row: without the field of timelines, unless it is one; earlier releases do not know it."""
+    return {name: value for name, value in score.items() if name != "rows_shown" or value is not None}
 
 
 def from_json(data: bytes, where: str = "report") -> Report:
