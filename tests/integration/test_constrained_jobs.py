@@ -14,6 +14,7 @@ from marey.client import Client
 from marey.core.settings import Settings
 from marey.generation.handler import GeneratorHandler
 from marey.registry import get_model, model_names
+from marey.vocabulary.scope import ActionLists
 from tests.support.command import Command
 from tests.support.editing import clip_of, edited
 from tests.support.live_api import LiveApi, write_bundle
@@ -29,7 +30,7 @@ TIMELINE = "0-1.5 a person walks; 1.5-3 a person bows"
 @pytest.fixture(scope="module")
 def api_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("api")
-    write_bundle(home / "models", model=MODEL)
+    write_bundle(home / "models", model=MODEL, actions=ActionLists(supported=("walk", "bow")))
     return home
 
 
@@ -198,8 +199,33 @@ def test_a_cut_timeline_has_the_prompts_that_are_left(api: LiveApi, loop: Loop, 
         assert answer.json()["prompts"] == [wanted]
         (found,) = edited(api, motion, op)
         assert found["prompt"] == clip_of(api, found["id"]).manifest["prompt"] == wanted
-    (again,) = edited(api, found["id"], {"op": "trim", "from": 1})
+    (twice,) = edited(api, motion, {"op": "trim", "from": 0.5}, {"op": "trim", "from": 1, "to": "f49"})
+    (again,) = edited(api, twice["id"], {"op": "trim", "to": "f29"})
     assert again["prompt"] == "a person bows"
+
+
+def test_prompts_of_edits_are_examined(api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client) -> None:
+    (item,) = made(api, loop, {"prompt": "a person walks", "seconds": 3, "seed": 4})
+    motion, option = item["motion"]["id"], ("--extend", 1, "--prompt", "asdf qwer", "--force")
+    ops = [{"op": "extend", "seconds": 1, "prompt": "asdf qwer", "force": True}]
+    for validate_only in ("true", "false"):
+        asked = {"validate_only": validate_only}
+        answer = http.post(f"/v1/motions/{motion}/edits", json={"ops": ops}, params=asked).json()
+        assert answer["scope_report"]["unknown"] == 1
+        assert "'asdf qwer': no action that the model knows" in answer["warnings"][0]
+        refused = http.post(f"/v1/motions/{motion}/edits", json={"ops": ops, "scope": "refuse"}, params=asked)
+        assert (refused.status_code, "names an action that the model does not know" in refused.text) == (422, True)
+        silent = http.post(f"/v1/motions/{motion}/edits", json={"ops": ops, "scope": "ignore"}, params=asked).json()
+        assert (silent["scope_report"], silent["warnings"]) == (None, [])
+    own = http.post(f"/v1/motions/{motion}/edits", json={"ops": [{"op": "mirror"}]}).json()
+    assert (own["scope_report"], own["warnings"]) == (None, [])
+    for more in (("--dry-run",), ("--no-wait",)):
+        assert "no action that the model knows" in marey("motions", "edit", motion, *option, *more).ok().err
+        ran = marey("motions", "edit", motion, *option, *more, "--scope", "refuse")
+        assert (ran.code, "names an action that the model does not know" in ran.err) == (2, True)
+    with Client(api.url, api.key) as client:
+        assert client.check_edit(motion, ops).warnings == client.edit(motion, ops).warnings != ()
+        assert client.edit(motion, ops, scope="ignore").warnings == ()
 
 
 def test_pages_of_timelines_and_of_edits_by_a_model(

@@ -17,9 +17,10 @@ from marey.client.rigs import Rigs
 from marey.client.schedules import Schedules
 from marey.client.streams import Streams
 from marey.client.transport import Transport
-from marey.client.types.jobs import CheckedEdit, Job
+from marey.client.types.jobs import CheckedEdit, SubmittedJob
 from marey.client.types.motions import Motion
 from marey.client.webhooks import Webhooks
+from marey.vocabulary.scope import ScopePolicy
 
 
 class Client:
@@ -85,8 +86,9 @@ class Client:
         comment: str | None = None,
         priority: int = 0,
         keep_days: int | None = None,
+        scope: ScopePolicy = "warn",
         idempotency_key: str | None = None,
-    ) -> Job:
+    ) -> SubmittedJob:
         """Edit a stored motion on the server; `jobs.wait` waits, and `motions.list(job=…)` has the results.
 
         Args:
@@ -99,6 +101,7 @@ class Client:
             name, comment: of the job.
             priority: -1000 to 1000; higher runs first.
             keep_days: delete the job with its motions this many days after its end; None = the server's default.
+            scope: prompts with actions that the model does not know: `warn`, `refuse` or `ignore`.
             idempotency_key: of all attempts; None = random.
 
         Raises:
@@ -114,9 +117,10 @@ class Client:
             "comment": comment,
             "priority": priority or None,
             "keep_days": keep_days,
+            "scope": None if scope == "warn" else scope,
         }
         path, body = _edit_request(motion, ops, given)
-        return Job.of(self._transport.post_new(path, body, idempotency_key=idempotency_key))
+        return SubmittedJob.of(self._transport.post_new(path, body, idempotency_key=idempotency_key))
 
     def check_edit(
         self,
@@ -125,16 +129,18 @@ class Client:
         *,
         model: str | None = None,
         settings: Mapping[str, float] | None = None,
+        scope: ScopePolicy = "warn",
     ) -> CheckedEdit:
         """Check what `edit` would submit, and submit nothing; the result has the number of motions and an estimate.
 
         Args:
-            motion, ops, model, settings: see `edit`.
+            motion, ops, model, settings, scope: see `edit`.
 
         Raises:
             NotFound, InvalidInput, TooLarge, QuotaUsedUp, Conflict, Refused, Unreachable: as `edit`.
         """
-        path, body = _edit_request(motion, ops, {"model": model, "settings": settings})
+        given = {"model": model, "settings": settings, "scope": None if scope == "warn" else scope}
+        path, body = _edit_request(motion, ops, given)
         return CheckedEdit.of(self._transport.post(path, body, validate_only=True))
 
     @property

@@ -8,8 +8,8 @@ from marey.bundles.bundle import Bundle
 from marey.bundles.manifest import TextSpec
 from marey.core.errors import InvalidInput
 from marey.items.item import MAX_PROBLEMS, OutOfScope, Problem
-from marey.vocabulary.report import MAX_BUNDLES, refusal, says_known
-from marey.vocabulary.scope import ActionLists, Scope, match_scope
+from marey.vocabulary.report import MAX_BUNDLES, ScopeReport, refusal, says_known
+from marey.vocabulary.scope import ActionLists, Scope, ScopePolicy, match_scope
 
 MEANING_ENCODERS = ("minilm",)
 """Encoders that the limits of `marey.text.meaning` were set for; with others the words decide alone."""
@@ -63,3 +63,21 @@ def refuse_unknown(
     if total:
         knows = " ".join(says_known(name, actions) for name, actions in known.items())
         raise OutOfScope(problems, where=where, total=total, hint=f"{knows} The scope `warn` accepts such prompts.")
+
+
+def examine_prompts(prompts: Iterable[str], bundle: Bundle, policy: ScopePolicy) -> ScopeReport | None:
+    """Return the report on the scopes of prompts by their words, each counted once; None with the policy `ignore`.
+
+    Raises:
+        OutOfScope: policy `refuse`, and prompts name actions that the bundle does not know.
+        InvalidInput: policy `refuse`, and the bundle lists no actions.
+    """
+    if policy == "ignore":
+        return None
+    distinct = dict.fromkeys(prompts)
+    if policy == "refuse":
+        refuse_unknown((None, None, prompt, bundle) for prompt in distinct)
+    report = ScopeReport()
+    for prompt in distinct:
+        report.judge(prompt, bundle.manifest.name, bundle.manifest.actions)
+    return report

@@ -17,15 +17,17 @@ from marey.api.auth import Submitter
 from marey.api.context import Connection, Context, Shared, deadline
 from marey.api.edits.schemas import CheckedEditView, NewEditBody
 from marey.api.jobs.estimates import check_capacity
-from marey.api.jobs.schemas import JobView
+from marey.api.jobs.schemas import SubmittedView, report_fields
 from marey.api.takes.schemas import MotionView
 from marey.bundles import named_by
+from marey.bundles.scope import examine_prompts
 from marey.core import tracing
 from marey.core.errors import InvalidInput, NotFound
 from marey.http.problems import RESPONSES
 from marey.http.schemas import IdempotencyKey
-from marey.motion.edits.steps import read_steps
+from marey.motion.edits.steps import prompts_of_steps, read_steps
 from marey.runtime.logs import logger
+from marey.vocabulary.report import ScopeReport
 
 log = logger(__name__)
 
@@ -35,7 +37,7 @@ router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 @router.post(
     "/{motion}/edits",
     status_code=202,
-    response_model=JobView,
+    response_model=SubmittedView,
     responses={200: {"model": CheckedEditView, "description": "`validate_only`: nothing was written"}},
 )
 @deadline(db.BULK)
@@ -48,7 +50,7 @@ def edit_motion(
     shared: Shared,
     validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,
     idempotency_key: IdempotencyKey = None,
-) -> JobView | Response:
+) -> SubmittedView | Response:
     """Edit a motion: cut, join, loop, mirror, retime or smooth it, or let a model generate frames of it. The motion
     itself does not change.
 
@@ -62,10 +64,11 @@ def edit_motion(
         idempotency_key=idempotency_key,
         body_sha256=_sha256(motion, body) if idempotency_key else None,
         traceparent=tracing.current(),
-        **body.model_dump(exclude={"ops", "model", "settings"}),
+        **body.model_dump(exclude={"ops", "model", "settings", "scope"}),
     )
+    report = _examine(body, new)
     if validate_only:
-        return JSONResponse(_check(conn, new).model_dump(mode="json"))
+        return JSONResponse(_check(conn, new, report).model_dump(mode="json"))
     submitted = takes.submit_edit(conn, new)
     row = jobs.get_job(conn, key.tenant, submitted.id)
     response.headers["Location"] = f"/v1/jobs/{submitted.id}"
@@ -74,7 +77,7 @@ def edit_motion(
     else:
         note(conn, key, "motion.edit", motion, job=str(row.id), items=row.total)
     log.info("submitted", job=str(row.id), tenant=key.tenant, items=row.total, replayed=submitted.replayed)
-    return JobView.of(row)
+    return SubmittedView.with_report(row, report)
 
 
 @router.post("/{motion}/revert")
@@ -88,7 +91,19 @@ def revert_motion(motion: UUID, conn: Connection, key: Submitter) -> MotionView:
     return MotionView.of(source)
 
 
-def _check(conn: Connection, new: takes.NewEdit) -> CheckedEditView:
+def _examine(body: NewEditBody, new: takes.NewEdit) -> ScopeReport | None:
+    """Return the report on the scopes of the prompts that the model reads; None if there are none to examine.
+
+    Raises:
+        OutOfScope: scope `refuse`, and prompts name actions that the model does not know.
+    """
+    prompts = prompts_of_steps(read_steps(body.ops))
+    if new.generator is None or not prompts:
+        return None
+    return examine_prompts(prompts, new.generator.capabilities.bundle, body.scope)
+
+
+def _check(conn: Connection, new: takes.NewEdit, report: ScopeReport | None) -> CheckedEditView:
     items = takes.check_edit(conn, new)
     by_bundle = Counter((item.model, item.bundle) for item in items)
     return CheckedEditView(
@@ -97,6 +112,7 @@ def _check(conn: Connection, new: takes.NewEdit) -> CheckedEditView:
         bundles=sorted({item.bundle for item in items}),
         prompts=[item.prompt for item in items],
         **check_capacity(conn, new.tenant, by_bundle, parsed=new.generator is not None),
+        **report_fields(report),
     )
 
 

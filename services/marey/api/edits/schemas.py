@@ -8,13 +8,14 @@ from typing import Annotated, Any
 from pydantic import Field, WithJsonSchema
 
 from marey.api.jobs.estimates import EstimateView
-from marey.api.jobs.schemas import CommonJobFields
+from marey.api.jobs.schemas import SCOPE, CommonJobFields, ScopeReportView
 from marey.http.fields import MAX_MODEL, SAMPLING
 from marey.http.problems import QuotaBody
 from marey.http.schemas import View
 from marey.items.item import MODEL
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
+from marey.vocabulary.scope import ScopePolicy
 
 
 def _schema() -> Mapping[str, Any]:
@@ -45,6 +46,7 @@ class NewEditBody(CommonJobFields):
     settings: dict[str, float] = Field(
         default_factory=dict[str, float], description="Of sampling, for the model.", json_schema_extra=SAMPLING
     )
+    scope: ScopePolicy = Field("warn", description=SCOPE)
     ops: list[EditOperation] = Field(
         min_length=1,
         max_length=MOST,
@@ -66,3 +68,7 @@ class CheckedEditView(View):
         description="The tenant's quotas of queued items and of bytes, with the capacity left."
     )
     waiting: int = Field(description="Items of all tenants that wait for the same workers.")
+    scope_report: ScopeReportView | None = Field(
+        description="Of prompts that the operations have; null with scope `ignore`, and without a model."
+    )
+    warnings: list[str]

@@ -32,6 +32,7 @@ def edit(
     model: options.Model = None,
     bundle: options.BundleOrFolder = None,
     sampling: options.Sampling = None,
+    scope: options.Scope = options.ScopeOption.WARN,
     export: ExportOptions = PLAIN,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
@@ -43,7 +44,8 @@ def edit(
 
     del operations  # `given_operations` has them in their order
     steps = given_operations(context, ops)
-    editor = model_for(steps, bundle or model, options.settings_of(sampling or ()))
+    editor, warnings = model_for(steps, bundle or model, options.settings_of(sampling or ()), scope.value)
+    console.warn_all(warnings)
     made = edit_files(sources, output, steps, model=editor, file_format=file_format, export=export, overwrite=overwrite)
     for line in made:
         _report(line)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
     from marey.motion.edits.editing import EditSource, FrameModel
+    from marey.vocabulary.scope import ScopePolicy
 
 
 def edit_files(
@@ -67,32 +68,40 @@ def edit_files(
         yield _line(source, path, clip)
 
 
-def model_for(ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Mapping[str, float]) -> FrameModel | None:
-    """Load the model of operations; None if they need none.
+def model_for(
+    ops: Sequence[Mapping[str, Any]], bundle: str | None, settings: Mapping[str, float], scope: ScopePolicy = "warn"
+) -> tuple[FrameModel | None, Sequence[str]]:
+    """Load the model of operations, None if they need none; return it with warnings of prompts that it does not know.
 
     Args:
         ops: as of `marey.motion.edit`.
         bundle: model, bundle or folder; None = the default model.
         settings: of sampling.
+        scope: prompts with actions that the model does not know: warned of, refused, or not examined.
 
     Raises:
+        OutOfScope: such prompts, with scope `refuse`.
         InvalidInput: an unknown operation or setting, or a model that cannot generate frames around others.
         NotFound, InvalidBundle: of the bundle.
     """
-    from marey.motion.edits.steps import read_steps
+    from marey.motion.edits.steps import prompts_of_steps, read_steps
 
-    if not any(step.operation.needs_model for step in read_steps(ops)):
-        return None
+    steps = read_steps(ops)
+    if not any(step.operation.needs_model for step in steps):
+        return None, ()
     try:
         from marey.bundles import choose_bundle
         from marey.bundles.limits import edit_settings
+        from marey.bundles.scope import examine_prompts
         from marey.core.settings import settings as settings_of_process
         from marey.generate.oneshot import OneShot
     except ImportError as error:
         raise needs_extra("worker", error) from error
     config = settings_of_process()
     chosen = choose_bundle(bundle or config.default_model, config=config)
-    return OneShot(chosen, config).editor(edit_settings(chosen, settings))
+    report = examine_prompts(prompts_of_steps(steps), chosen, scope) if prompts_of_steps(steps) else None
+    editor = OneShot(chosen, config).editor(edit_settings(chosen, settings))
+    return editor, () if report is None else report.warnings()
 
 
 def loop(clip: MotionClip, where: str) -> MotionClip:

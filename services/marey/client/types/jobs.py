@@ -278,6 +278,9 @@ class CheckedEdit(Result):
     quotas: tuple[Quota, ...] = ()
     waiting: int = 0
     """Items of all tenants that wait for the same workers now."""
+    scope_report: ScopeReport | None = None
+    """Of prompts that the operations have; None with scope `ignore`, and without a model."""
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

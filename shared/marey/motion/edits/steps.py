@@ -56,6 +56,11 @@ def read_steps(ops: object, *, where: str = "ops") -> tuple[Step, ...]:
     return tuple(_read(row, f"{where}.{number}") for number, row in enumerate(rows))
 
 
+def prompts_of_steps(steps: Sequence[Step]) -> list[str]:
+    """Return the prompts that a model reads, in the order of the steps that have one of their own."""
+    return [step.values["prompt"] for step in steps if step.operation.needs_model and step.values.get("prompt")]
+
+
 def pieces_of(steps: Sequence[Step]) -> tuple[tuple[Step, ...], ...]:
     """Return the operations of each resulting motion: one list, or two for each split, which becomes two trims.
 
