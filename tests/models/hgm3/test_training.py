@@ -21,7 +21,7 @@ from marey.models.hgm3.config import TINY, HGM3Config, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.generate import Generator
 from marey.models.hgm3.memory import masked_memory, residual_memory
-from marey.models.hgm3.stage_masked import EARLY, MaskedStage
+from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
 from marey.nn.devices import fast_bf16
@@ -77,19 +77,6 @@ def test_all_stages_end_in_a_bundle_that_generates(prepared: PreparedData, run: 
     (made,) = generator.generate([Request(text_features(0), 1, 40)])
     assert made is not None
     assert made.features.shape == (40, 263)
-
-
-def test_a_share_of_samples_is_masked_as_in_the_first_passes(prepared: PreparedData) -> None:
-    clips = np.zeros(400, np.int64)
-
-    def progress(early: float) -> torch.Tensor:
-        stage = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, early=early)))
-        return stage.sample(clips, np.random.default_rng(5)).progress
-
-    assert float(progress(1.0).max()) <= EARLY
-    uniform, half = (progress(early) for early in (0.0, 0.5))
-    assert float(uniform.max()) > 0.9
-    assert 0.6 < float((half <= EARLY).float().mean()) < 0.8  # 0.5 and 0.4 of the other half
 
 
 def test_training_all_stages_again_after_a_kill_does_only_what_is_left(prepared: PreparedData, tmp_path: Path) -> None:

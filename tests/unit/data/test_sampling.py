@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from marey.data.manifest import Clip, Measured
-from marey.data.sampling import ACT_WEIGHT, author_table, classes_of, draw_captions, sampling_weights
+from marey.data.sampling import ACT_WEIGHT, Draws, author_table, classes_of, draw_captions, sampling_weights
 from marey.training.tokenizing import SHARES, tokenizer_weights
 
 STILL = Measured(seconds=1, path=0, turn=0, speed=0, steps=0, side="")
@@ -44,6 +44,22 @@ def test_a_class_is_drawn_by_the_root_of_its_clips_whatever_set_they_come_from()
     clips = [clip("kneel", "one")] * 8 + [clip("kneel", "two")] * 8 + [clip("sit", "one")] * 4
     mass = mass_of(clips)
     assert mass["kneel"] / mass["sit"] == pytest.approx(2)
+
+
+@pytest.mark.parametrize(("power", "ratio"), [(1.0, 16), (0.5, 4), (0.0, 1)])
+def test_a_power_decides_how_far_classes_with_many_clips_are_drawn_more_often(power: float, ratio: float) -> None:
+    clips = [clip("kneel")] * 32 + [clip("sit")] * 2
+    weights = sampling_weights(clips, Draws(power))
+    assert weights[:32].sum() / weights[32:].sum() == pytest.approx(ratio)
+
+
+def test_sequences_have_their_share_whatever_their_number() -> None:
+    pair = clip("walk - bow").model_copy(update={"acts": ("cmu", "cmu")})
+    for share in (0.1, 0.3):
+        weights = sampling_weights([clip("sit")] * 3 + [pair] * 9, Draws(sequences=share))
+        # pairs have 0.36 of the 0.46 of the sequences; the absent triples' part goes to all others
+        pairs = share * 0.36 / 0.46
+        assert weights[3:].sum() == pytest.approx(pairs)
 
 
 def test_a_clip_with_several_actions_belongs_to_each_in_equal_parts() -> None:

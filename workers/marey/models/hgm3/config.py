@@ -87,9 +87,6 @@ class MiningConfig:
     conditions: Literal["all", "motion", "action", "specific"] = field(default="all", metadata=ADDED)
     """Levels of condition that are trained: all, or one alone for the ablation (Tab. 3); "specific" is the full one."""
     levels_per_step: Literal[1, 3] = 3  # 1 = one condition drawn per sample: a third of the cost, unbiased
-    early: Share = field(default=0.0, metadata=ADDED)
-    """Ours: share of samples that are masked as in the first passes of decoding, whose tokens the prompt alone decides:
-    their τ is at most `EARLY`."""
     replace_random: Share = 0.0  # MoMask: share of masked tokens that show a random token instead of [MASK]
     replace_mask: Share = 1.0  # MoMask: share of the rest that shows [MASK]; the others stay as they are
 
@@ -227,9 +224,6 @@ OPEN = replace(
     # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
     phases=1,
     speeds=False,
-    # An action of one take was drawn 3,000 times in all, too seldom to be learned; a walk 80,000 times.
-    class_power=0.2,
-    sequences=0.3,
     residual=replace(STARTER.residual, layers=6, feedforward=768),
     # Decoding reads the whole condition from the first pass on; hard masks cost a third of a step.
     mining=replace(STARTER.mining, conditions="specific", mask="random"),

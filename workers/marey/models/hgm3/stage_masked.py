@@ -62,10 +62,6 @@ class MaskedSample:
         return MaskedSample(**{**fields, "level": torch.full_like(self.level, level)})
 
 
-EARLY = 0.4
-"""τ up to which more than 80 % of the tokens are masked: half of the passes of decoding."""
-
-
 class MaskedModule(nn.Module):
     """Student F and G, and the teacher of G (eq. 6)."""
 
@@ -221,18 +217,11 @@ class MaskedStage(MaskedObjective):
             tokens[..., 0],
             lengths,
             self.captions.graphs(captions),
-            torch.from_numpy(self._progress(rng, len(clips))).to(device),
+            torch.from_numpy(rng.random(len(clips), np.float32)).to(device),
             torch.from_numpy(rng.random(tokens.shape[:2], np.float32)).to(device),
             torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop * drop).to(device),
             torch.from_numpy(rng.choice(LEVELS, size=len(clips), p=EVEN)).to(device),
         )
-
-    def _progress(self, rng: np.random.Generator, count: int) -> NDArray[np.float32]:
-        """Draw τ of each sample (B,)."""
-        progress = rng.random(count, np.float32)
-        if not self.config.mining.early:
-            return progress
-        return np.where(rng.random(count) < self.config.mining.early, progress * EARLY, progress).astype(np.float32)
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:
