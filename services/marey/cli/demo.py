@@ -24,6 +24,8 @@ INTERRUPTED = 130
 START_SECONDS = 120.0
 """Time to create the database, import torch and load the model: 15 s, longer with a slow disk."""
 JOB_SECONDS = 240.0
+CANDIDATES = 4
+"""Motions that are drawn of each prompt, where the model can; the best is kept."""
 PROMPTS = (
     {"prompt": "a person walks forward", "name": "walk", "seconds": 4, "seed": 1},
     {"prompt": "someone runs forward in a hurry", "name": "run", "seconds": 3, "seed": 2},
@@ -123,10 +125,20 @@ def _run() -> list[dict[str, Any]]:
     from marey.cli.commands.fetch import fetch_job
     from marey.client import Client
 
+    candidates = {"settings": {"best_of": CANDIDATES}} if _chooses() else {}
     with Client() as client:
-        job = client.jobs.submit(PROMPTS, name="demo")
+        job = client.jobs.submit([prompt | candidates for prompt in PROMPTS], name="demo")
         watch_job(client, job.id, timeout=JOB_SECONDS)
         return fetch_job(client, job.id, OUT, template="{name}", overwrite=True)
+
+
+def _chooses() -> bool:
+    """Return True if the default model draws several motions of a prompt and keeps the best."""
+    from marey.bundles import choose_bundle
+    from marey.core.settings import settings
+    from marey.registry import get_model
+
+    return get_model(choose_bundle(settings().default_model, verify=False).manifest.model).best_of
 
 
 def _draw(lines: list[dict[str, Any]]) -> None:
@@ -148,14 +160,18 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
     if random:
         title = f"RANDOM WEIGHTS ({title}): these motions show the machinery, not the prompts"
     table = Table(title=title, title_justify="left")
-    for column in ("prompt", "state", "length", "seed", "took", "files"):
-        table.add_column(column, no_wrap=column != "prompt")
+    for column in ("prompt", "state", "length", "quality", "files"):
+        table.add_column(column, no_wrap=column not in {"prompt", "quality"})
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
-        took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""
         files = f"{line['name']}.*" if line["files"] else ""
-        table.add_row(line["prompt"], line["state"], length, str(line["seed"]), took, files)
+        table.add_row(line["prompt"], line["state"], length, _quality(line), files)
     console.drawing(sys.stdout).print(table)
+
+
+def _quality(line: dict[str, Any]) -> str:
+    record = line["quality"]
+    return "" if record is None else ", ".join(record["flags"]) or "ok"
 
 
 if __name__ == "__main__":
