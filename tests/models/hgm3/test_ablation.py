@@ -10,7 +10,6 @@ import pytest
 import torch
 
 from marey.bundles import Bundle, find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
 from marey.generation.port import Request
 from marey.models.hgm3 import ablation
@@ -23,10 +22,10 @@ from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.spec import SPEC
 from marey.models.hgm3.train import train_stage
 from marey.registry import resolve
-from marey.training import ablation as shared
 from marey.training.budget import Budget
 from marey.training.motions import TokenData
 from marey.training.staging import TrainOptions
+from tests.support.ablations import judge_by_two_prompts
 from tests.support.prepared import text_features
 
 
@@ -67,9 +66,7 @@ def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(
 def test_each_ablation_trains_its_networks_once_and_judges_every_row(
     prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = evaluation_prompts()[:2]
-    monkeypatch.setattr(ablation, "evaluation_prompts", lambda: two)
-    monkeypatch.setattr(shared, "evaluation_prompts", lambda: two)
+    judge_by_two_prompts(monkeypatch)
     trained: list[str] = []
 
     def train(*arguments: object) -> dict[str, float]:

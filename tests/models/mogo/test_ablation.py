@@ -10,7 +10,6 @@ import pytest
 import torch
 
 from marey.bundles import find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
 from marey.models.mogo import ablation
 from marey.models.mogo.ablation import (
@@ -28,10 +27,10 @@ from marey.models.mogo.ablation import (
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.config import PAPER, TINY, MOGOConfig
 from marey.models.mogo.train import train_stage
-from marey.training import ablation as shared
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
+from tests.support.ablations import judge_by_two_prompts
 
 from .networks import columns, prompts
 
@@ -93,9 +92,7 @@ def test_an_ablation_goes_on_where_it_stopped(
 def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
     prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = evaluation_prompts()[:2]
-    monkeypatch.setattr(ablation, "evaluation_prompts", lambda: two)
-    monkeypatch.setattr(shared, "evaluation_prompts", lambda: two)
+    judge_by_two_prompts(monkeypatch)
     monkeypatch.setattr(ablation, "LEVELS", {name: LEVELS[name] for name in ("1 levels", "2 levels")})
     arguments = (prepared.path, str(options.run / "bundle"), tmp_path)
     shown = ablate_levels(*arguments, steps=1, batch=4, seeds=1, threads=1)

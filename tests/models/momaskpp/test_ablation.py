@@ -10,7 +10,6 @@ import pytest
 import torch
 
 from marey.bundles import Bundle, find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.data.prepared import PreparedData
 from marey.models.momaskpp import ablation
 from marey.models.momaskpp.ablation import ATTENTION, CONDITIONING, SCALES, NetworkVariant, train_variant
@@ -21,9 +20,9 @@ from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.train import train_stage
 from marey.registry import resolve
-from marey.training import ablation as shared
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
+from tests.support.ablations import judge_by_two_prompts
 
 PARTS = ("tokenizer", "masked", "refiner", "length")
 
@@ -66,9 +65,7 @@ def test_a_variant_trains_its_stages_alone(
 def test_every_row_is_judged_and_kept(
     prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = evaluation_prompts()[:2]
-    monkeypatch.setattr(ablation, "evaluation_prompts", lambda: two)
-    monkeypatch.setattr(shared, "evaluation_prompts", lambda: two)
+    judge_by_two_prompts(monkeypatch)
     trained: list[Path] = []
 
     def train(bundle: str, stages: tuple[str, ...], options: TrainOptions[MoMaskPPConfig]) -> dict[str, float]:

@@ -13,7 +13,7 @@ from marey.checks.prompts import evaluation_prompts
 from marey.checks.rates import mean_quality
 from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
-from marey.training.adherence import measure
+from marey.training.adherence import measure, pipeline_of
 
 DECIDES = "all but kick, punch, slash, dance"
 """Rate of `judge` that compares variants."""
@@ -25,6 +25,15 @@ def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -
     physical = mean_quality(t.quality for t in report.trials)
     rates = {name: rate.share for name, rate in report.summary.items()}
     return rates | {"foot skate": physical.skate, "jerk": physical.jerk}
+
+
+def evaluation_texts(generator: Generator[S]) -> list[TextFeatures]:
+    """Read the evaluation prompts for `judge`, as the bundle reads prompts.
+
+    Raises:
+        InvalidBundle: the bundle declares no text pipeline.
+    """
+    return pipeline_of(generator).features([prompt.text for prompt in evaluation_prompts()])
 
 
 def compare(

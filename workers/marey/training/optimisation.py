@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
@@ -42,3 +43,12 @@ def with_learning_rate(config: C, stage: str, rate: float | None) -> C:
     if not 0 < rate <= 1:
         raise InvalidInput(f"{rate:g} is not in (0, 1]", where="--learning-rate")
     return replace(config, **{name: replace(getattr(config, name), learning_rate=rate)})
+
+
+def with_batch(config: C, stages: Sequence[str], batch: int | None) -> C:
+    """Return a model's configuration with another number of samples a step for these stages; None leaves it
+    unchanged."""
+    if batch is None:
+        return config
+    names = [f"train_{stage}" for stage in stages]
+    return replace(config, **{name: replace(getattr(config, name), batch=batch) for name in names})

@@ -18,17 +18,16 @@ from pathlib import Path
 from typing import Any
 
 from marey.bundles import find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.models.hgm3.assembly import assemble, unpack
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.generate import Generator, SamplingSettings
 from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import compare, judge
-from marey.training.adherence import pipeline_of
+from marey.training.ablation import compare, evaluation_texts, judge
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
+from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
 
 METRICS = "metrics.json"
@@ -149,13 +148,11 @@ def ablate(
         InvalidBundle: the bundle declares no text pipeline.
     """
     given = find_bundle(bundle)
-    config = HGM3Config.from_dict(given.manifest.parameters)
-    if batch is not None:
-        config = replace(config, train_masked=replace(config.train_masked, batch=batch))
+    config = with_batch(HGM3Config.from_dict(given.manifest.parameters), ["masked"], batch)
 
     @cache
     def texts() -> list[TextFeatures]:
-        return pipeline_of(Generator.load(given, threads=threads)).features([p.text for p in evaluation_prompts()])
+        return evaluation_texts(Generator.load(given, threads=threads))
 
     def trained(network: str, seed: int) -> Path:
         folder = output / "networks" / f"{network}.{seed}"

@@ -25,16 +25,15 @@ import torch
 from torch import Tensor, nn
 
 from marey.bundles import Bundle, find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.models.mogo.assembly import RECIPE, assemble, unpack
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
-from marey.training.ablation import compare, judge
-from marey.training.adherence import pipeline_of
+from marey.training.ablation import compare, evaluation_texts, judge
 from marey.training.budget import Budget
+from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions, finish, use_threads
 
 V = TypeVar("V")
@@ -155,8 +154,7 @@ def train_both(fields: Mapping[str, Any], options: TrainOptions[MOGOConfig]) -> 
 def judged(bundle: Bundle, threads: int) -> dict[str, float]:
     """Judge a bundle on the evaluation prompts."""
     generator = Generator.load(bundle, threads=threads)
-    texts = pipeline_of(generator).features([p.text for p in evaluation_prompts()])
-    return judge(generator, texts, generator.settings({}))
+    return judge(generator, evaluation_texts(generator), generator.settings({}))
 
 
 def ablate_tokenizer(data: Path, bundle: str, output: Path, **options: Any) -> str:
@@ -204,12 +202,7 @@ def _ablate(
     """Train and measure each variant with each seed, and return the table; see `marey.training.ablation.compare`."""
     use_threads(threads)
     config = MOGOConfig.from_dict(find_bundle(bundle).manifest.parameters)
-    if batch is not None:
-        config = replace(
-            config,
-            train_tokenizer=replace(config.train_tokenizer, batch=batch),
-            train_transformer=replace(config.train_transformer, batch=batch),
-        )
+    config = with_batch(config, ["tokenizer", "transformer"], batch)
 
     def measured(name: str, seed: int) -> dict[str, float]:
         run = output / f"{about}-{list(variants).index(name)}-{seed}"

@@ -20,17 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from marey.bundles import find_bundle
-from marey.checks.prompts import evaluation_prompts
 from marey.models.momaskpp.assembly import assemble, unpack
 from marey.models.momaskpp.config import MoMaskPPConfig
 from marey.models.momaskpp.generate import Generator
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import compare, judge
-from marey.training.adherence import pipeline_of
+from marey.training.ablation import compare, evaluation_texts, judge
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
+from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
 
 
@@ -99,17 +98,11 @@ def ablate(
         InvalidBundle: the bundle declares no text pipeline.
     """
     given = find_bundle(bundle)
-    config = MoMaskPPConfig.from_dict(given.manifest.parameters)
-    if batch is not None:
-        config = replace(
-            config,
-            train_tokenizer=replace(config.train_tokenizer, batch=batch),
-            train_masked=replace(config.train_masked, batch=batch),
-        )
+    config = with_batch(MoMaskPPConfig.from_dict(given.manifest.parameters), ["tokenizer", "masked"], batch)
 
     @cache
     def texts() -> list[TextFeatures]:
-        return pipeline_of(Generator.load(given, threads=threads)).features([p.text for p in evaluation_prompts()])
+        return evaluation_texts(Generator.load(given, threads=threads))
 
     def measured(row: str, seed: int) -> dict[str, float]:
         run = output / "networks" / f"{name}-{list(variants).index(row)}.{seed}"
