@@ -10,14 +10,18 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from marey.cli import console
 from marey.cli.children import ends_with_parent, marey
 from marey.cli.watching import watch_job
 from marey.client.health import is_healthy
+from marey.client.manifest import flags_of
 from marey.client.place import find_server
 from marey.core.errors import MareyError, NotFound, TimedOut, Unreachable
+
+if TYPE_CHECKING:
+    from marey.bundles import Bundle
 
 OUT = Path("out/demo")
 INTERRUPTED = 130
@@ -49,12 +53,12 @@ def main() -> int:
     try:
         shutil.rmtree(OUT, ignore_errors=True)  # every run begins anew
         OUT.mkdir(parents=True, exist_ok=True)
-        random = _ensure_bundle(home)
+        bundle = _ensure_bundle(home)
         with _server(home):
-            lines = _run()
+            lines = _run(bundle)
         _draw(lines)
         shutil.rmtree(home)  # after a failure it stays, with its logs
-        _show(lines, random=random)
+        _show(lines, random=bundle.manifest.random)
     except MareyError as error:
         console.say(f"make demo: {error}")
         return error.exit_code
@@ -67,8 +71,8 @@ def main() -> int:
     return 6 if failed else 0
 
 
-def _ensure_bundle(home: Path) -> bool:
-    """Return True if the default model has random weights; make such a bundle if there is no model at all."""
+def _ensure_bundle(home: Path) -> Bundle:
+    """Return the bundle of the default model; make one with random weights if there is none."""
     os.environ["MAREY_HOME"] = str(home)
     from marey.bundles import choose_bundle
     from marey.cli.roles.generating import make_random_bundle
@@ -76,11 +80,11 @@ def _ensure_bundle(home: Path) -> bool:
 
     model = settings().default_model
     try:
-        return choose_bundle(model, verify=False).manifest.random
+        return choose_bundle(model, verify=False)
     except NotFound:
         console.say("There is no trained bundle in models/: making a tiny one with random weights.")
         make_random_bundle(model, home / "models" / f"{model}-random")
-        return True
+        return choose_bundle(model, verify=False)
 
 
 @contextlib.contextmanager
@@ -121,24 +125,16 @@ def _is_ready() -> bool:
         return False
 
 
-def _run() -> list[dict[str, Any]]:
+def _run(bundle: Bundle) -> list[dict[str, Any]]:
     from marey.cli.commands.fetch import fetch_job
     from marey.client import Client
+    from marey.registry import get_model
 
-    candidates = {"settings": {"best_of": CANDIDATES}} if _chooses() else {}
+    candidates = {"settings": {"best_of": CANDIDATES}} if get_model(bundle.manifest.model).best_of else {}
     with Client() as client:
         job = client.jobs.submit([prompt | candidates for prompt in PROMPTS], name="demo")
         watch_job(client, job.id, timeout=JOB_SECONDS)
         return fetch_job(client, job.id, OUT, template="{name}", overwrite=True)
-
-
-def _chooses() -> bool:
-    """Return True if the default model draws several motions of a prompt and keeps the best."""
-    from marey.bundles import choose_bundle
-    from marey.core.settings import settings
-    from marey.registry import get_model
-
-    return get_model(choose_bundle(settings().default_model, verify=False).manifest.model).best_of
 
 
 def _draw(lines: list[dict[str, Any]]) -> None:
@@ -165,13 +161,8 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
         files = f"{line['name']}.*" if line["files"] else ""
-        table.add_row(line["prompt"], line["state"], length, _quality(line), files)
+        table.add_row(line["prompt"], line["state"], length, flags_of(line), files)
     console.drawing(sys.stdout).print(table)
-
-
-def _quality(line: dict[str, Any]) -> str:
-    record = line["quality"]
-    return "" if record is None else ", ".join(record["flags"]) or "ok"
 
 
 if __name__ == "__main__":

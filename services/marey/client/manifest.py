@@ -64,7 +64,7 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
         **paths,
         "tags": join_tags(item["tags"]),
-        "quality": _quality(motion),
+        "quality": flags_of(motion),
         "review": review.get("verdict"),
         "comment": review.get("comment"),
         "error": item["error"] and item["error"].get("message"),
@@ -80,7 +80,8 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(values))}
 
 
-def _quality(motion: Mapping[str, Any]) -> str | None:
+def flags_of(motion: Mapping[str, Any]) -> str | None:
+    """Return the flags of a motion, "ok" where it has none; None if its quality was not measured."""
     quality: Mapping[str, Any] | None = motion.get("quality")
     return None if quality is None else "; ".join(quality["flags"]) or "ok"
 
