@@ -10,7 +10,8 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from marey.core.errors import InvalidInput, Unreachable
@@ -61,13 +62,14 @@ def paraphrase(
     """
     captures = CaptureSet.own(folder)
     ours = next((file.captions for file in captures.caption_files if file.name == FILE), {})
-    authors = [file.captions for file in captures.caption_files if file.name != FILE]
+    written_by_people = replace(
+        captures, caption_files=tuple(file for file in captures.caption_files if file.name != FILE)
+    )
     told = {
-        row.id: tuple(dict.fromkeys([*row.captions, *(text for author in authors for text in author.get(row.id, ()))]))
+        row.id: tuple(dict.fromkeys(chain(*authors)))
         for row in captures.rows
-        if row.action != UNUSED
+        if row.action != UNUSED and (authors := written_by_people.captions_of(row))
     }
-    told = {clip: captions for clip, captions in told.items() if captions}
     if not told:
         raise InvalidInput("no clip has captions to rephrase", where=str(folder), hint="Write some into index.csv.")
     done = dict(ours)

@@ -54,8 +54,8 @@ def sampling_weights(clips: Sequence[Clip], draws: Draws = Draws()) -> NDArray[n
     The training split has 1,064 raised hands and one kick. A class has the weight count^`power`, distributed within it
     by count^-0.5 of the style: with a power of 0.5 a class with 100 times fewer clips is drawn 10 times less often, not
     100 times; some actions count more (`ACT_WEIGHT`). A class is an action in all data sets; a clip
-    whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences have a fixed share
-    (`SEQUENCE_SHARE`) and are drawn evenly, since they were composed by weights. Made clips are at most half of the
+    whose label names several (`walk; turn-left`) belongs to each in equal parts. Sequences have the share `sequences`
+    and are drawn evenly, since they were composed by weights. Made clips are at most half of the
     draws of a class.
     """
     weights = np.zeros(len(clips))
