@@ -8,6 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+Peak = Callable[[Callable[[], nn.Module], Callable[[nn.Module], Iterable[Tensor]]], int]
+"""Measures a peak, as `peak_of_steps` does."""
+
 
 def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], Iterable[Tensor]]) -> int:
     """Largest number of bytes in use during two steps of training (AdamW) on a CPU.
@@ -29,3 +32,26 @@ def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], I
     events = profile.profiler.kineto_results.events()  # type: ignore[union-attr]
     changes = sorted((e.start_ns(), e.nbytes()) for e in events if e.name() == "[memory]")  # pyright: ignore[reportAttributeAccessIssue]
     return max(np.cumsum([change for _, change in changes]))
+
+
+def peak_on_gpu(build: Callable[[], nn.Module], parts: Callable[[nn.Module], Iterable[Tensor]]) -> int:
+    """The same on a CUDA device, with matrices in bfloat16; networks and samples are made there."""
+    torch.cuda.empty_cache()
+    before = torch.cuda.memory_allocated()
+    torch.cuda.reset_peak_memory_stats()
+    with torch.device("cuda"):
+        module = build()
+        trained = [each for each in module.parameters() if each.requires_grad]
+        optimizer = torch.optim.AdamW(trained, fused=True)
+        for _ in range(2):
+            made = iter(parts(module))
+            while True:
+                with torch.autocast("cuda", torch.bfloat16):
+                    loss = next(made, None)
+                if loss is None:
+                    break
+                loss.backward()
+                del loss
+            optimizer.step()
+            optimizer.zero_grad(set_to_none=True)
+    return torch.cuda.max_memory_allocated() - before

@@ -15,7 +15,7 @@ from marey.models.hgm3.model import ResidualTransformer
 from marey.models.hgm3.stage_masked import MaskedModule, MaskedObjective
 from marey.models.hgm3.stage_residual import piece_losses
 from marey.training.memory import MemoryEstimate
-from tests.support.allocator import peak_of_steps
+from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
 
 
 def small(layers: int, width: int) -> HGM3Config:
@@ -31,7 +31,7 @@ def small(layers: int, width: int) -> HGM3Config:
     )
 
 
-def measured_masked(config: HGM3Config, samples: int) -> int:
+def measured_masked(config: HGM3Config, samples: int, peak: Peak = peak_of_steps) -> int:
     def parts(module: torch.nn.Module) -> Iterator[torch.Tensor]:
         assert isinstance(module, MaskedModule)
         for _ in range(2):
@@ -39,16 +39,16 @@ def measured_masked(config: HGM3Config, samples: int) -> int:
             yield (losses * masked).sum() / masked.sum() + ranking.mean()
             del losses, ranking
 
-    return peak_of_steps(lambda: MaskedModule(config).train(), parts)
+    return peak(lambda: MaskedModule(config).train(), parts)
 
 
-def measured_residual(config: HGM3Config, samples: int) -> int:
+def measured_residual(config: HGM3Config, samples: int, peak: Peak = peak_of_steps) -> int:
     def parts(module: torch.nn.Module) -> Iterator[torch.Tensor]:
         assert isinstance(module, ResidualTransformer)
         for _ in range(2):
             yield piece_losses(module, longest_residual(config, samples))[0].sum()
 
-    return peak_of_steps(lambda: ResidualTransformer(config).train(), parts)
+    return peak(lambda: ResidualTransformer(config).train(), parts)
 
 
 def check(estimate: MemoryEstimate, found: int) -> None:
@@ -61,6 +61,13 @@ def test_the_estimates_are_within_a_tenth_of_what_is_used(layers: int, width: in
     torch.manual_seed(0)
     check(masked_memory(config, bf16=False).estimate(samples), measured_masked(config, samples))
     check(residual_memory(config, bf16=False).estimate(samples), measured_residual(config, samples))
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+def test_the_estimates_at_the_published_size_are_within_a_tenth_of_what_a_gpu_uses() -> None:
+    check(masked_memory(PAPER).estimate(64), measured_masked(PAPER, 64, peak_on_gpu))
+    check(residual_memory(PAPER).estimate(64), measured_residual(PAPER, 64, peak_on_gpu))
 
 
 def test_the_stage_that_needs_most_is_shown_with_all_conditions_of_a_step() -> None:

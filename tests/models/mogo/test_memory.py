@@ -22,7 +22,7 @@ from marey.training.motions import MotionData, TokenData
 from marey.training.sentences import SentenceData
 from marey.training.staging import set_recompute
 from marey.training.texts import CaptionTexts
-from tests.support.allocator import peak_of_steps
+from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
 
 PLAIN = replace(
     TINY,
@@ -95,7 +95,7 @@ def small(layers: int, width: int) -> MOGOConfig:
     )
 
 
-def measured(config: MOGOConfig, samples: int, *, recompute: bool) -> int:
+def measured(config: MOGOConfig, samples: int, *, recompute: bool, peak: Peak = peak_of_steps) -> int:
     """Largest number of bytes in use during a step of two parts."""
 
     def build() -> RQHCTransformer:
@@ -109,7 +109,7 @@ def measured(config: MOGOConfig, samples: int, *, recompute: bool) -> int:
             yield piece_losses(model, longest_samples(config, samples), 1.0)[0].loss(1.0)
 
     torch.manual_seed(0)
-    return peak_of_steps(build, parts)
+    return peak(build, parts)
 
 
 @pytest.mark.parametrize(
@@ -119,6 +119,15 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int,
     config = small(layers, width)
     found = measured(config, samples, recompute=recompute)
     estimate = memory_model(config, bf16=False).estimate(samples, recompute=recompute)
+    assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@pytest.mark.parametrize(("samples", "recompute"), [(4, False), (16, True)])
+def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses(samples: int, recompute: bool) -> None:
+    found = measured(PAPER, samples, recompute=recompute, peak=peak_on_gpu)
+    estimate = memory_model(PAPER).estimate(samples, recompute=recompute)
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 

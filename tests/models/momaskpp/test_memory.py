@@ -12,7 +12,7 @@ from marey.models.momaskpp.config import PAPER, Conditioning, MoMaskPPConfig, Tr
 from marey.models.momaskpp.memory import longest_samples, memory_model
 from marey.models.momaskpp.model import ScaleTransformer
 from marey.models.momaskpp.stage_masked import masked_losses
-from tests.support.allocator import peak_of_steps
+from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
 
 
 def small(layers: int, width: int, conditioning: Conditioning) -> MoMaskPPConfig:
@@ -27,14 +27,14 @@ def small(layers: int, width: int, conditioning: Conditioning) -> MoMaskPPConfig
     )
 
 
-def measured(config: MoMaskPPConfig, samples: int) -> int:
+def measured(config: MoMaskPPConfig, samples: int, peak: Peak = peak_of_steps) -> int:
     def parts(module: torch.nn.Module) -> Iterator[torch.Tensor]:
         assert isinstance(module, ScaleTransformer)
         for _ in range(2):
             sample = longest_samples(config, samples)
             yield masked_losses(module, sample, sample.tokens)[0]
 
-    return peak_of_steps(lambda: ScaleTransformer(config).train(), parts)
+    return peak(lambda: ScaleTransformer(config).train(), parts)
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,13 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(
     torch.manual_seed(0)
     estimate = memory_model(config, bf16=False).estimate(samples)
     assert estimate.total == pytest.approx(measured(config, samples), rel=0.1), dict(estimate.parts)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses() -> None:
+    estimate = memory_model(PAPER).estimate(64)
+    assert estimate.total == pytest.approx(measured(PAPER, 64, peak_on_gpu), rel=0.1), dict(estimate.parts)
 
 
 def test_a_step_is_a_batch() -> None:
