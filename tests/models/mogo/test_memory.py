@@ -124,10 +124,9 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int,
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
-@pytest.mark.parametrize(("samples", "recompute"), [(4, False), (16, True)])
-def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses(samples: int, recompute: bool) -> None:
-    found = measured(PAPER, samples, recompute=recompute, peak=peak_on_gpu)
-    estimate = memory_model(PAPER).estimate(samples, recompute=recompute)
+def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses() -> None:
+    found = measured(PAPER, 4, recompute=False, peak=peak_on_gpu)
+    estimate = memory_model(PAPER).estimate(4)
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 

@@ -101,6 +101,31 @@ def test_attention_in_training_equals_that_of_inference() -> None:
         torch.testing.assert_close(model.train()(x, valid)[row, :size], model.eval()(x, valid)[row, :size])
 
 
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@pytest.mark.parametrize(("width", "heads", "size"), [(256, 4, 80), (256, 4, 139), (192, 4, 64)])
+@pytest.mark.parametrize("bf16", [False, True])
+def test_gradients_on_a_gpu_are_those_of_the_processor(width: int, heads: int, size: int, bf16: bool) -> None:
+    """The fused attention of a GPU, with masks of each sequence and the first rows of the output alone."""
+    torch.manual_seed(0)
+    model = Transformer(2, width, heads, 2 * width, 0.0, norm_first=True).train()
+    x, wanted = torch.randn(2, 16, size, width)
+    valid = torch.arange(size) < torch.randint(size // 2, size + 1, (16, 1))
+
+    def gradients(device: str) -> dict[str, torch.Tensor]:
+        there = Transformer(2, width, heads, 2 * width, 0.0, norm_first=True).train().to(device)
+        there.load_state_dict(model.state_dict())
+        with torch.autocast(device, torch.bfloat16, enabled=bf16 and device == "cuda"):
+            found = there(x.to(device), valid.to(device), size - 10)
+        (found * wanted[:, : size - 10].to(device)).mean().backward()
+        return {name: each.grad.cpu() for name, each in there.named_parameters() if each.grad is not None}
+
+    here, there = gradients("cpu"), gradients("cuda")
+    for name, gradient in here.items():
+        error = (there[name] - gradient).norm() / gradient.norm()
+        assert error < (0.05 if bf16 else 1e-3), f"{name}: {error:.3g}"
+
+
 def test_dropout_zeroes_its_share_and_keeps_the_mean() -> None:
     torch.manual_seed(0)
     x = torch.ones(1000, 103)
