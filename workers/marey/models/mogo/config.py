@@ -186,6 +186,9 @@ STARTER = MOGOConfig(
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
 )
 
+OPEN = replace(STARTER, name="open")
+"""`starter` on the open data sets."""
+
 TINY = MOGOConfig(
     name="tiny",
     float_logits=True,
@@ -205,7 +208,7 @@ TINY = MOGOConfig(
     train_transformer=StageConfig(batch=4, learning_rate=1e-3, ema=0.9),
 )
 
-CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, PAPER_KIT, STARTER, TINY)}
+CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, PAPER_KIT, STARTER, OPEN, TINY)}
 
 
 def named_config(name: str) -> MOGOConfig:
