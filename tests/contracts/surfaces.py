@@ -19,7 +19,7 @@ from marey.registry import get_model, model_names
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
 DEFINE_ERRORS = (
-    *("marey.client.text_files", "marey.items.item", "marey.jobs.errors", "marey.embedded.server"),
+    *("marey.client.text_files", "marey.items.problems", "marey.jobs.errors", "marey.embedded.server"),
     *("marey.runtime.faults", "marey.streams.redis", "marey.text.rewriters"),
 )
 """Modules that add to the tree of errors."""

@@ -15,7 +15,8 @@ from marey.cli.options import ExtraColumns, settings_of
 from marey.cli.references import FORMS, find
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed
 from marey.items.evaluation_prompts import PromptCheck
-from marey.items.item import Problem, outside_range
+from marey.items.problems import Problem
+from marey.items.values import outside_range
 
 if TYPE_CHECKING:
     from marey.client import Client, Comparison, Evaluation, EvaluationDetail, Model

@@ -11,7 +11,7 @@ import typer
 
 from marey.client.names import DEFAULT_TEMPLATE
 from marey.core.errors import InvalidInput
-from marey.items.item import MAX_BEST_OF, MAX_REDRAWS, read_setting
+from marey.items.settings import MAX_BEST_OF, MAX_REDRAWS, read_setting
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:

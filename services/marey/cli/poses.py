@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from marey.cli.references import find, whole_id
 from marey.core.errors import InvalidInput, NotFound
 from marey.items.constraints import MAX_FILE, named_motions, parse_constraints
-from marey.items.item import Problem
+from marey.items.problems import Problem
 from marey.motion.files import read_limited
 from marey.motion.keyframes import PoseFiles
 

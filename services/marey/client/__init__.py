@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from marey.client.evaluation_requests import EvaluationOptions
     from marey.client.fetching import FetchObserver
     from marey.client.frames import Frame
-    from marey.client.jobs import Defaults, FetchedItem, JobChanges, Progress
+    from marey.client.job_requests import Defaults, JobChanges
+    from marey.client.job_results import FetchedItem, Progress
     from marey.client.place import Server
     from marey.client.results import Result
     from marey.client.schedules import ScheduleChanges
@@ -104,7 +105,8 @@ if TYPE_CHECKING:
         Unreachable,
     )
     from marey.items.evaluation_prompts import EvaluationPrompt
-    from marey.items.item import InvalidItems, Item, OutOfScope, Problem
+    from marey.items.item import Item
+    from marey.items.problems import InvalidItems, OutOfScope, Problem
 
     __version__: str
 
@@ -115,7 +117,8 @@ __getattr__ = lazy_names(
         "marey.client.evaluation_requests": "EvaluationOptions",
         "marey.client.fetching": "FetchObserver",
         "marey.client.frames": "Frame",
-        "marey.client.jobs": "Defaults FetchedItem JobChanges Progress",
+        "marey.client.job_requests": "Defaults JobChanges",
+        "marey.client.job_results": "FetchedItem Progress",
         "marey.client.place": "Server",
         "marey.client.results": "Result",
         "marey.client.schedules": "ScheduleChanges",
@@ -145,7 +148,8 @@ __getattr__ = lazy_names(
             "Unreachable"
         ),
         "marey.items.evaluation_prompts": "EvaluationPrompt",
-        "marey.items.item": "InvalidItems Item OutOfScope Problem",
+        "marey.items.item": "Item",
+        "marey.items.problems": "InvalidItems OutOfScope Problem",
     },
 )
 

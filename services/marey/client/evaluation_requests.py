@@ -15,7 +15,7 @@ from marey.client.text_files import where_of
 from marey.client.types.evaluations import Evaluation
 from marey.core.characters import escape
 from marey.items.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 
 Split = Literal["test", "compositional", "test+compositional"]
 Prompt = EvaluationPrompt | Mapping[str, object] | str

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypedDict, Unpack
+from typing import Any, Literal, Unpack
 
 from marey.client.fetching import FetchObserver, fetch_job
+from marey.client.job_requests import Defaults, JobChanges, JobOptions, Row, raw_items, sent_options, sent_scope
+from marey.client.job_results import FetchCounter, FetchedItem, OnFetched, OnProgress, Progress, progress_of
 from marey.client.lines import Lines
 from marey.client.names import DEFAULT_TEMPLATE, check_template
 from marey.client.resources import Resource, identifier
@@ -16,7 +16,6 @@ from marey.client.rows import Format, PromptReader, defaults_of, read_file, read
 from marey.client.tables import ExtraColumns
 from marey.client.types.jobs import (
     CheckedJob,
-    Counters,
     Erasure,
     Job,
     JobEvent,
@@ -27,87 +26,10 @@ from marey.client.types.jobs import (
 )
 from marey.client.watching import follow_job
 from marey.core.errors import ItemsFailed
-from marey.items.item import Item
 from marey.motion.export_options import BvhRoot, ExportOptions, InPlace, Names, Placement, RestPose
 from marey.vocabulary.scope import ScopePolicy
 
-Row = Item | Mapping[str, object] | str
-"""A prompt, a dict with the columns of a file, or an `Item`."""
 WAIT_HINT = "Wait again with a longer timeout, or cancel the job."
-
-
-class Defaults(TypedDict, total=False):
-    """Fields of rows that do not set them."""
-
-    model: str | None
-    bundle: str | None
-    seconds: float | None
-    seed: int | None
-    variants: int | None
-    fps: float | None
-    best_of: int | None
-    redraws: int | None
-    variety: str | None
-    tags: Sequence[str] | None
-    settings: Mapping[str, float] | None
-
-
-class JobOptions(TypedDict, total=False):
-    """Options of a new job."""
-
-    name: str | None
-    comment: str | None
-    priority: int
-    fail_early: float | None
-    keep_days: int | None
-    scope: ScopePolicy
-
-
-class JobChanges(TypedDict, total=False):
-    """Changes of a job; None removes the comment or the limit of failures."""
-
-    priority: int
-    comment: str | None
-    fail_early: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Progress:
-    """The progress of a job.
-
-    Attributes:
-        state: of the job.
-        done: number of items that have ended.
-        total: number of items.
-        counters: number of items in each state.
-        event: the event that changed it; None = the server was asked for the job.
-        job: the job as the server described it last, which may be older than the event.
-    """
-
-    state: str
-    done: int
-    total: int
-    counters: Counters
-    event: JobEvent | None = None
-    job: Job
-
-
-@dataclass(frozen=True, kw_only=True)
-class FetchedItem:
-    """An item of a fetched job.
-
-    Attributes:
-        item: with its motion, if it has one.
-        files: paths by format; empty where no motion was made.
-    """
-
-    item: JobItem
-    files: Mapping[str, Path]
-
-
-OnProgress = Callable[[Progress], None]
-OnFetched = Callable[[int, int], None]
-"""Called with the numbers of fetched files and of all files."""
 
 
 class Jobs(Resource):
@@ -149,14 +71,14 @@ class Jobs(Resource):
             TooLarge, Busy, QuotaUsedUp, Refused, Unreachable: as the server says.
         """
         return self._submit(
-            read_rows(_raws(rows), defaults_of(**defaults)),
+            read_rows(raw_items(rows), defaults_of(**defaults)),
             idempotency_key,
             name=name,
             comment=comment,
             priority=priority or None,
             fail_early=fail_early,
             keep_days=keep_days,
-            scope=_scope(scope),
+            scope=sent_scope(scope),
         )
 
     def submit_file(
@@ -195,7 +117,7 @@ class Jobs(Resource):
             priority=priority or None,
             fail_early=fail_early,
             keep_days=keep_days,
-            scope=_scope(scope),
+            scope=sent_scope(scope),
         )
 
     def submit_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> SubmittedJob:
@@ -205,15 +127,15 @@ class Jobs(Resource):
             lines: one item a line, as JSON.
             options: name, comment, priority, fail_early, keep_days, scope.
         """
-        return SubmittedJob.of(self._transport.submit(lines, **_given(options)))
+        return SubmittedJob.of(self._transport.submit(lines, **sent_options(options)))
 
     def check_lines(self, lines: Lines, **options: Unpack[JobOptions]) -> CheckedJob:
         """Check what `submit_lines` would submit, and submit nothing."""
-        return CheckedJob.of(self._transport.submit(lines, validate_only=True, **_given(options)))
+        return CheckedJob.of(self._transport.submit(lines, validate_only=True, **sent_options(options)))
 
     def check(self, rows: Iterable[Row], **defaults: Unpack[Defaults]) -> CheckedJob:
         """Check prompts as `submit` does, and submit nothing; the result has the number of motions and an estimate."""
-        return CheckedJob.of(self._send(read_rows(_raws(rows), defaults_of(**defaults)), validate_only=True))
+        return CheckedJob.of(self._send(read_rows(raw_items(rows), defaults_of(**defaults)), validate_only=True))
 
     def check_file(
         self,
@@ -331,7 +253,7 @@ class Jobs(Resource):
             Unreachable: the server was away for three minutes.
         """
         for view, event in follow_job(self._transport, identifier(job), timeout=timeout, hint=WAIT_HINT):
-            yield _progress(view, event)
+            yield progress_of(view, event)
 
     def wait(
         self, job: Job | str, *, timeout: float | None = None, on_progress: OnProgress | None = None, check: bool = True
@@ -351,7 +273,7 @@ class Jobs(Resource):
         for view, event in follow_job(self._transport, identifier(job), timeout=timeout, hint=WAIT_HINT):
             ended = view
             if on_progress is not None:
-                on_progress(_progress(view, event))
+                on_progress(progress_of(view, event))
         found = Job.of(ended)
         if check and found.state != "succeeded":
             of_each = found.counters
@@ -447,7 +369,7 @@ class Jobs(Resource):
                 names=names,
                 body=body,
             ),
-            observer=_Counting(on_progress) if callable(on_progress) else on_progress,
+            observer=FetchCounter(on_progress) if callable(on_progress) else on_progress,
         )
         return [
             FetchedItem(item=JobItem.of(item), files={file.format: file.path for file in files})
@@ -468,50 +390,5 @@ class Jobs(Resource):
         return Job.of(self._transport.post(f"{_path(job)}/{verb}", **params))
 
 
-class _Counting(FetchObserver):
-    """An observer that counts fetched files."""
-
-    def __init__(self, on_progress: OnFetched) -> None:
-        self._on_progress = on_progress
-        self._lock = threading.Lock()
-        self._done = self._total = 0
-
-    def planned(self, total: int) -> None:
-        self._total = total
-        self._on_progress(0, total)
-
-    def fetched(self, path: Path) -> None:
-        with self._lock:
-            self._done += 1
-            self._on_progress(self._done, self._total)
-
-
-def _given(options: JobOptions) -> dict[str, Any]:
-    """Return the parameters of a request; priority 0 and scope `warn` are the defaults and are not sent."""
-    return {**options, "priority": options.get("priority") or None, "scope": _scope(options.get("scope", "warn"))}
-
-
-def _scope(policy: ScopePolicy) -> ScopePolicy | None:
-    return None if policy == "warn" else policy
-
-
-def _raws(rows: Iterable[Row]) -> Iterator[object]:
-    for row in rows:
-        if isinstance(row, str):
-            yield {"prompt": row}
-        else:
-            yield row.as_json() if isinstance(row, Item) else row
-
-
 def _path(job: Job | str) -> str:
     return f"/v1/jobs/{identifier(job)}"
-
-
-def _progress(view: Mapping[str, Any], event: Mapping[str, Any] | None) -> Progress:
-    now = view if event is None else event["data"]
-    counters = Counters.of(now["counters"])
-    done = counters.succeeded + counters.failed + counters.dead + counters.cancelled
-    change = None if event is None else JobEvent.of(event)
-    return Progress(
-        state=now["state"], done=done, total=view["total"], counters=counters, event=change, job=Job.of(view)
-    )

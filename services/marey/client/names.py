@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from marey.core.characters import MARKS, is_printable
 from marey.core.errors import InvalidInput
-from marey.items.item import RESERVED
+from marey.items.values import RESERVED
 
 DEFAULT_TEMPLATE = "{index:05}_{name}_{seed}"
 MAX_SLUG = 48

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.errors import InvalidInput
-from marey.items.item import Problem
+from marey.items.problems import Problem
 from marey.motion.keyframes import PoseFiles
 
 

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from marey.core.errors import InvalidInput
-from marey.items.item import Problem, outside_range
+from marey.items.problems import Problem
 from marey.items.timeline import TIMELINE_HINT, no_timelines
+from marey.items.values import outside_range
 from marey.registry import ModelSpec, find_model
 
 

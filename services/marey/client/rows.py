@@ -17,23 +17,9 @@ from marey.client.text_files import GZIP_ENDING, UnreadableLine, open_text, wher
 from marey.core.errors import InvalidInput
 from marey.items.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
 from marey.items.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
-from marey.items.item import (
-    BEST_OF,
-    CHECKS,
-    COLUMNS,
-    MAX_BODY_BYTES,
-    MAX_PROBLEMS,
-    OUTPUT_FPS,
-    REDRAWS,
-    InvalidItems,
-    Item,
-    OutOfScope,
-    Problem,
-    check_count,
-    names_model,
-    read_json,
-    read_values,
-)
+from marey.items.item import CHECKS, COLUMNS, MAX_BODY_BYTES, Item, check_count, names_model, read_json, read_values
+from marey.items.problems import MAX_PROBLEMS, InvalidItems, OutOfScope, Problem
+from marey.items.settings import BEST_OF, OUTPUT_FPS, REDRAWS
 
 Format = Literal["csv", "jsonl", "txt"]
 STAND_IN = "a person walks"

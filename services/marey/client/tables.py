@@ -14,7 +14,8 @@ from marey.client import manifest
 from marey.client.csv_cells import TAG_SEPARATOR, restore, split_tags
 from marey.core.characters import find_forbidden
 from marey.core.errors import InvalidInput
-from marey.items.item import Unreadable, read_settings
+from marey.items.item import Unreadable
+from marey.items.settings import read_settings
 
 Rows = Iterator[tuple[int | None, object]]
 Lines = Iterator[tuple[int, str]]

@@ -34,7 +34,7 @@ from marey.core.errors import (
     Unreachable,
 )
 from marey.core.tls import trusting_context
-from marey.items.item import InvalidItems, OutOfScope, Problem
+from marey.items.problems import InvalidItems, OutOfScope, Problem
 
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0

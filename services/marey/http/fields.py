@@ -1,4 +1,4 @@
-"""JSON Schema of fields that `marey.items.item` validates, from the constants of its checks; for the reference
+"""JSON Schema of fields that `marey.items` validates, from the constants of its checks; for the reference
 alone."""
 
 from __future__ import annotations
@@ -9,23 +9,21 @@ from pydantic.config import JsonDict
 
 from marey.core.characters import LINE_PATTERN
 from marey.items.expected import ACTIONS, JOIN, MAX_ACTIONS, SIDED, STRAIGHT
-from marey.items.item import (
+from marey.items.prompts import MAX_CHARACTERS
+from marey.items.settings import (
     BEST_OF,
     MAX_BEST_OF,
-    MAX_NAME,
     MAX_OUTPUT_FPS,
     MAX_REDRAWS,
     MAX_SETTING,
     MAX_SETTINGS,
-    MAX_TAG_LENGTH,
     MIN_OUTPUT_FPS,
-    MODEL,
     OUTPUT_FPS,
     REDRAWS,
     SETTING,
 )
-from marey.items.prompts import MAX_CHARACTERS
 from marey.items.timeline import MAX_ROWS, MAX_TIMELINE_CHARACTERS
+from marey.items.values import MAX_NAME, MAX_TAG_LENGTH, MODEL
 
 MAX_MODEL = 165
 """Characters: a name of 100, `@` and 64 hexadecimal digits."""

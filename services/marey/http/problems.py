@@ -24,7 +24,7 @@ from marey.core.errors import (
     Unauthenticated,
     Unreachable,
 )
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 from marey.tenants import QuotaHeadroom
 
 TYPE_PREFIX = "urn:marey:problem:"

@@ -26,7 +26,7 @@ from marey.evaluations import (
     store_prompts,
 )
 from marey.evaluations.requests import plan_evaluation, scoring_job
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 from marey.jobs import ItemState, JobState, list_items, submit
 from marey.jobs.states import ENDED
 from marey.runtime.logs import logger

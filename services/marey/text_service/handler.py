@@ -9,7 +9,7 @@ from marey.bundles import Bundle, TextSpec, find_bundle
 from marey.bundles.limits import seconds_of
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
-from marey.items.item import UnknownAction
+from marey.items.problems import UnknownAction
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import TEXT_QUEUE, ClaimedItem
 from marey.jobs.leases import PromptScope

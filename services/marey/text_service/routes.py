@@ -19,8 +19,8 @@ from marey.core.errors import InvalidInput, Unauthenticated, Unreachable
 from marey.core.settings import Settings
 from marey.http.fields import PROMPT
 from marey.http.problems import RESPONSES
-from marey.items.item import MODEL
 from marey.items.prompts import check_prompt
+from marey.items.values import MODEL
 from marey.text.keys import as_served
 from marey.text_service.limits import Ticket, WordLimit
 from marey.vocabulary.scope import match_scope

@@ -9,9 +9,12 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.items.constraints import ROOT_PATH, for_clip, frames_to_last, last_frame
-from marey.items.item import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS, Item, Rows, outside_range
+from marey.items.constraint_frames import for_clip, frames_to_last, last_frame
+from marey.items.constraints import ROOT_PATH
+from marey.items.item import Item, Rows
+from marey.items.settings import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS
 from marey.items.timeline import TIMELINE_HINT, no_timelines, timeline_seconds
+from marey.items.values import outside_range
 from marey.motion.edits.licences import terms_with
 from marey.registry import Setting, find_model
 from marey.vocabulary.lengths import stated_length

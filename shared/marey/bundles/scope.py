@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from marey.bundles.bundle import Bundle
 from marey.bundles.manifest import TextSpec
 from marey.core.errors import InvalidInput
-from marey.items.item import MAX_PROBLEMS, OutOfScope, Problem
+from marey.items.problems import MAX_PROBLEMS, OutOfScope, Problem
 from marey.vocabulary.report import MAX_BUNDLES, ScopeReport, refusal, says_known
 from marey.vocabulary.scope import ActionLists, Scope, ScopePolicy, match_scope
 

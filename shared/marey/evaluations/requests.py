@@ -14,7 +14,9 @@ from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.evaluations import TEST_SPLIT, EvaluationRequest, EvaluationRow
 from marey.items.evaluation_prompts import EvaluationPrompt
-from marey.items.item import MAX_ITEMS, MAX_PROBLEMS, MAX_SEED, InvalidItems, Item, Problem
+from marey.items.item import MAX_ITEMS, Item
+from marey.items.problems import MAX_PROBLEMS, InvalidItems, Problem
+from marey.items.values import MAX_SEED
 from marey.jobs import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, NewItem, NewJob
 from marey.jobs.generators import GeneratorCapabilities, capabilities_of, new_items
 

@@ -15,7 +15,8 @@ from marey.core.characters import WHITESPACE, check_text
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.constraints import named_motions, read_constraints
 from marey.items.expected import read_expected
-from marey.items.item import CHECKS, Problem, Rows, checked, complete_timeline, read_fields
+from marey.items.item import CHECKS, Rows, checked, complete_timeline, read_fields
+from marey.items.problems import Problem
 from marey.items.timeline import timeline_text
 
 COLUMNS = ("prompt", "seconds", "expected", "timeline")

@@ -25,8 +25,9 @@ from marey.bundles.limits import (
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
-from marey.items.item import MAX_SEED, Item, Rows
+from marey.items.item import Item, Rows
 from marey.items.timeline import prompts_with_rows
+from marey.items.values import MAX_SEED
 from marey.jobs import NewItem
 from marey.text.keys import as_served, feature_key, resolve, scope_key
 from marey.text.several import several_key

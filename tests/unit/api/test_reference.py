@@ -28,7 +28,9 @@ from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.settings import Settings
 from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, TAGS
 from marey.items.expected import read_expected
-from marey.items.item import BEST_OF, MAX_TAG_LENGTH, OUTPUT_FPS, REDRAWS, read_item
+from marey.items.item import read_item
+from marey.items.settings import BEST_OF, OUTPUT_FPS, REDRAWS
+from marey.items.values import MAX_TAG_LENGTH
 from marey.text_service.routes import ParseBody
 
 BODIES = {

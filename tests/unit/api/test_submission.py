@@ -15,7 +15,8 @@ from marey.api.jobs.schemas import JobFields
 from marey.api.jobs.service import MAX_MODELS, Submission, read_document, read_ndjson
 from marey.core.errors import NotFound, TooLarge
 from marey.core.settings import Settings
-from marey.items.item import MAX_UNKNOWN, InvalidItems
+from marey.items.item import MAX_UNKNOWN
+from marey.items.problems import InvalidItems
 from marey.jobs.generators import GeneratorCapabilities
 from tests.support.live_api import write_bundle
 

@@ -10,7 +10,7 @@ from marey.client import transport
 from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 from tests.support.scripted import Scripted, problem, scripted_servers
 
 

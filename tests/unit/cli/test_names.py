@@ -19,7 +19,8 @@ from marey.client.names import (
 )
 from marey.core.characters import find_forbidden
 from marey.core.errors import InvalidInput
-from marey.items.item import NAME, RESERVED, read_item
+from marey.items.item import read_item
+from marey.items.values import NAME, RESERVED
 
 
 def naming(name: str = "wave") -> Naming:

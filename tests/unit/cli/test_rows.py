@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from marey.client.rows import defaults_of, items_from_file, read_arguments, read_evaluation_prompts, right_items
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
-from marey.items.item import InvalidItems, Item
+from marey.items.item import Item
+from marey.items.problems import InvalidItems
 from tests.support.models import NOT_KEEPING
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from marey.client.rows import read_file, right_items
 from marey.client.tables import ExtraColumns, csv_rows, delimiter_of
-from marey.items.item import COLUMNS, InvalidItems, Item, Unreadable
+from marey.items.item import COLUMNS, Item, Unreadable
+from marey.items.problems import InvalidItems
 
 
 def items(path: Path, extra: ExtraColumns = "refuse", **options: Any) -> list[Item]:

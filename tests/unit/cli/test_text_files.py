@@ -14,7 +14,8 @@ from marey.client import rows
 from marey.client.rows import items_from_file, read_evaluation_prompts
 from marey.client.text_files import MAX_LINE
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, TooLarge
-from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
+from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, Item
+from marey.items.problems import InvalidItems
 
 CSV = b"prompt,seed\na person walks,1\na person bows,2\n"
 PACKED = gzip.compress(CSV, mtime=0)

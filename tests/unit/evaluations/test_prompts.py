@@ -12,7 +12,7 @@ from marey.checks.judge import Act, Side
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
 from marey.items.expected import ACTIONS, SIDED, TRAVELS, ExpectedAction, format_expected, read_expected
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 
 actions = st.one_of(
     st.builds(ExpectedAction, st.sampled_from(TRAVELS), st.just(""), st.booleans()),

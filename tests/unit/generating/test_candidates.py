@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from marey.generation import candidates
 from marey.generation.candidates import DrawPlan, best_clips, candidate_seed, split_settings
 from marey.generation.port import Request
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.quality.selection import read_selection
 

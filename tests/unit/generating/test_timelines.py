@@ -19,8 +19,8 @@ from marey.generation.export import finish
 from marey.generation.port import Limits, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
 from marey.generation.shots.timelines import even_parts, gaps_of, generate_timelines, plan_timeline
-from marey.items.item import MAX_SEED
 from marey.items.timeline import read_timeline, timeline_rows
+from marey.items.values import MAX_SEED
 from marey.registry import get_model, model_names, resolve
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph

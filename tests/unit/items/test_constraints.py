@@ -11,15 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
-from marey.items.constraints import (
-    EFFECTORS,
-    FASTEST,
-    check_clip,
-    last_frame,
-    named_motions,
-    parse_constraints,
-    read_constraints,
-)
+from marey.items.constraint_frames import check_clip, last_frame
+from marey.items.constraints import EFFECTORS, FASTEST, named_motions, parse_constraints, read_constraints
 from marey.items.item import read_item
 
 PATH = {"type": "root_path", "frames": [0, 10, 20], "positions_xz": [[0, 0], [0, 0.5], [0.2, 1]]}

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.core.extras import needs_extra
 from marey.generate.oneshot import OneShot, Wanted
-from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, REDRAWS, Item, Problem, read_items
+from marey.items.item import Item, read_items
+from marey.items.problems import Problem
+from marey.items.settings import BEST_OF, OUTPUT_FPS, REDRAWS
+from marey.items.values import MAX_SEED
 from marey.registry import find_model, model_names
 
 if TYPE_CHECKING:

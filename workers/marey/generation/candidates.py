@@ -15,7 +15,8 @@ from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, NoControl, Request, S
 from marey.generation.shots.dispatch import generate_any
-from marey.items.item import BEST_OF, MAX_SEED, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
+from marey.items.settings import BEST_OF, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
+from marey.items.values import MAX_SEED
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
 from marey.quality.record import SHOWN, Flag, read_quality

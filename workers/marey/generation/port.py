@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidInput
 from marey.generation.timed import TimedText
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.motion.features import FeatureLayout
 from marey.nn.devices import choose_device, fast_bf16
 from marey.nn.motion_tokenizer import MotionTokenizer

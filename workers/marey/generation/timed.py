@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.text.features import TextFeatures
 
 

@@ -12,7 +12,7 @@ from marey.api.jobs.schemas import SCOPE, CommonJobFields, ScopeReportView
 from marey.http.fields import MAX_MODEL, SAMPLING
 from marey.http.problems import QuotaBody
 from marey.http.schemas import View
-from marey.items.item import MODEL
+from marey.items.values import MODEL
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
 from marey.vocabulary.scope import ScopePolicy

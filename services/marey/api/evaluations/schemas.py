@@ -15,7 +15,7 @@ from marey.evaluations import EvaluationEvent, EvaluationJob, EvaluationRequest,
 from marey.http.fields import EXPECTED, PROMPT, SAMPLING, TIMELINE
 from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
 from marey.items.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
-from marey.items.item import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
+from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
 from marey.jobs.states import JobState
 
 BUNDLE = rf"^{MODEL.pattern}$"

@@ -18,7 +18,8 @@ from marey.core.errors import InvalidInput, NotFound
 from marey.core.settings import Settings
 from marey.evaluations.requests import EvaluationPlan, plan_evaluation
 from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
-from marey.items.item import CHECKS, InvalidItems, Problem
+from marey.items.item import CHECKS
+from marey.items.problems import InvalidItems, Problem
 
 OWN_PROMPTS = "prompts"
 """Default name of custom prompts."""

@@ -14,7 +14,8 @@ from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, N
 from marey.db import transaction
 from marey.exporters.registry import CANONICAL
 from marey.items.constraints import named_motions
-from marey.items.item import InvalidItems, Item, Problem
+from marey.items.item import Item
+from marey.items.problems import InvalidItems, Problem
 from marey.jobs import MotionRow, asset_key, find_motions
 from marey.motion.edits.licences import LICENCE
 from marey.motion.keyframes import beyond, with_pose

@@ -13,8 +13,9 @@ from marey.api.takes.schemas import MotionView
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS, TIMELINE
 from marey.http.problems import QuotaBody
 from marey.http.schemas import Comment, Name, View
-from marey.items.item import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from marey.items.item import MAX_ITEMS
 from marey.items.timeline import MAX_TIMELINE_SECONDS, MIN_ROW_SECONDS
+from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from marey.jobs import (
     MAX_KEEP_DAYS,
     PRIORITY_LIMIT,

@@ -17,7 +17,8 @@ from marey.api.jobs.schemas import JobFields
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
-from marey.items.item import InvalidItems, Item, Problem, read_item, read_items, read_json
+from marey.items.item import Item, read_item, read_items, read_json
+from marey.items.problems import InvalidItems, Problem
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items

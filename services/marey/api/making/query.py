@@ -14,7 +14,7 @@ from pydantic import Field as Bounds
 
 from marey.core.errors import InvalidInput
 from marey.http.schemas import FreeText
-from marey.items.item import MAX_OUTPUT_FPS, MIN_OUTPUT_FPS
+from marey.items.settings import MAX_OUTPUT_FPS, MIN_OUTPUT_FPS
 from marey.motion.export_options import ExportOptions
 
 

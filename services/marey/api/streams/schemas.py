@@ -17,7 +17,7 @@ from marey.bundles.body import body_of
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from marey.http.problems import ProblemBody
 from marey.http.schemas import View
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.motion.skeleton import Skeleton
 from marey.streams import StreamPrompt, StreamRow, StreamState
 from marey.vocabulary.report import warn_of

@@ -17,7 +17,8 @@ from marey.api.streams.schemas import BundleFacts, NewStreamBody, StreamDetailVi
 from marey.bundles import named_by
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
 from marey.db import transaction
-from marey.items.item import MAX_SEED, Item, read_item
+from marey.items.item import Item, read_item
+from marey.items.values import MAX_SEED
 from marey.jobs.generators import GeneratorCapabilities
 from marey.registry import find_model, streaming_models
 from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, prompts_with_rewrites

@@ -42,7 +42,7 @@ from marey.core.disposition import download_name
 from marey.exporters import extension_of
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
-from marey.items.item import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
+from marey.items.values import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 

@@ -16,8 +16,10 @@ from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.core.extras import needs_extra
-from marey.items.item import MAX_SEED, Item, Problem
+from marey.items.item import Item
+from marey.items.problems import Problem
 from marey.items.timeline import prompts_with_rows
+from marey.items.values import MAX_SEED
 from marey.motion.export_options import PLAIN, ExportOptions
 
 OFF_PROMPT = "off-prompt"

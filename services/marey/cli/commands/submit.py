@@ -13,7 +13,7 @@ from marey.cli.poses import StoredMotions
 from marey.client import rows
 from marey.client.names import check_template
 from marey.core.errors import InvalidInput, MareyError
-from marey.items.item import InvalidItems
+from marey.items.problems import InvalidItems
 from marey.items.timeline import timeline_gaps
 from marey.motion.export_options import ExportOptions
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from marey.client import CheckedEdit, CheckedJob, Client
-    from marey.client.jobs import Defaults, JobOptions
+    from marey.client.job_requests import Defaults, JobOptions
     from marey.client.lines import Lines
     from marey.items.item import Item
 

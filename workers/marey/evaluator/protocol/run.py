@@ -21,7 +21,7 @@ from marey.evaluator.protocol.metrics import METRICS, measure, measure_variety
 from marey.evaluator.protocol.samples import Sample, draw_samples
 from marey.evaluator.reconstruction import BATCH, rebuilt
 from marey.generation.port import Generator, Request
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.motion.files import write_atomically
 from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.text.features import TextFeatures

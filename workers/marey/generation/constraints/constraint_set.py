@@ -9,12 +9,8 @@ from typing import Any
 import numpy as np
 
 from marey.core.errors import InvalidInput
-from marey.items.constraints import (
-    EFFECTOR_TARGET,
-    POSE_KEYFRAME,
-    ROOT_PATH,
-    frames_of,
-)
+from marey.items.constraint_frames import frames_of
+from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH
 from marey.motion.hands import arms
 from marey.motion.rotations import Array, normalize
 from marey.motion.skeleton import Skeleton

@@ -14,7 +14,7 @@ from marey.generation.port import GenerationControl, Generator, KeepingGenerator
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, FrameGap, Window, crossfaded, fill, most_frames, no_text
 from marey.generation.software import origin_of
-from marey.items.item import MAX_SEED
+from marey.items.values import MAX_SEED
 from marey.motion.body import NamedBody
 from marey.motion.clip import MotionClip
 from marey.motion.edits.cuts import part
