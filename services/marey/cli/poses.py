@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from marey.cli.references import find, whole_id
 from marey.core.errors import InvalidInput, NotFound
-from marey.items.constraints import MAX_FILE, named_motions, parse_constraints
+from marey.items.constraints import named_motions, parse_constraints
 from marey.items.problems import Problem
-from marey.motion.files import read_limited
-from marey.motion.keyframes import PoseFiles
+from marey.motion.keyframes import read_constraints_file
 
 if TYPE_CHECKING:
     from marey.client.rows import PromptReader
@@ -28,13 +27,8 @@ class StoredMotions:
         self._ids: dict[str, str] = {}
 
     def read_file(self, file: Path) -> Constraints:
-        """Return the constraints of a JSON file; motion files that they name are found from its folder.
-
-        Raises:
-            NotFound, TooLarge: the file cannot be read.
-            InvalidInput: constraints that cannot be used, or a motion that is not there, with the field.
-        """
-        return self._with_ids(PoseFiles(file.parent).fill(parse_constraints(read_limited(file, MAX_FILE))))
+        """Return the constraints of a JSON file, with whole ids; see `read_constraints_file`."""
+        return read_constraints_file(file, lambda content: self._with_ids(parse_constraints(content)))
 
     def in_items(self, reader: PromptReader, items: Iterable[Item]) -> Iterator[Item]:
         """Yield the items of a reader with whole ids; motions that are not there are problems of it."""
@@ -46,7 +40,8 @@ class StoredMotions:
                 yield replace(item, constraints=None)
 
     def _with_ids(self, constraints: Constraints) -> Constraints:
-        ids = {where: self._id(named["id"], f"{where}.id") for where, named in named_motions(constraints)}
+        named = named_motions(constraints)
+        ids = {where: self._id(motion["id"], f"{where}.id") for where, motion in named if "id" in motion}
         return [
             {**each, "motion": {**each["motion"], "id": ids[where]}}
             if (where := f"constraints.{number}.motion") in ids

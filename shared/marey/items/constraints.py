@@ -38,8 +38,6 @@ SIDED = ("wrist", "ankle", "foot")
 EFFECTORS = (*(f"{side}_{joint}" for joint in SIDED for side in ("left", "right")), "head", "pelvis")
 """Joints that can have a target; `foot` is the joint at the toes."""
 MAX_CONSTRAINTS = 64
-MAX_FILE = 4 * 2**20
-"""Bytes of a file of constraints."""
 FASTEST = 8.0
 """Metres a second between two points of a path."""
 AGREE = 0.03

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 from marey.core.errors import InvalidInput, MareyError
 from marey.core.extras import needs_extra
 from marey.motion.edits.licences import LICENCE
+from marey.motion.files import read_limited
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
 
+MAX_FILE = 4 * 2**20
+"""Bytes of a file of constraints."""
 KEPT_FILES = 16
 """Motion files that stay in memory, for the next constraint that names one."""
 
@@ -57,6 +60,25 @@ class PoseFiles:
             missing.hint = "pip install 'marey[motion]', or name a motion of the server by its `id`."
             raise missing from error
         return load_npz(self._folder / name)
+
+
+def read_constraints_file(
+    file: Path, read: Callable[[bytes], Sequence[Mapping[str, Any]]]
+) -> Sequence[Mapping[str, Any]]:
+    """Return the constraints of a file; motion files that they name are found from its folder.
+
+    Args:
+        read: returns the checked constraints of its content, or raises `InvalidInput` with the field in `where`.
+
+    Raises:
+        NotFound, TooLarge: the file cannot be read.
+        InvalidInput: of `read`, or a motion file that cannot be used; with the file and the field.
+    """
+    content = read_limited(file, MAX_FILE)
+    try:
+        return PoseFiles(file.parent).fill(read(content))
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where=f"{file}: {error.where}", hint=error.hint) from None
 
 
 def pose_of(clip: MotionClip, frame: int) -> dict[str, Any]:

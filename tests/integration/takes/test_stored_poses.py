@@ -184,7 +184,7 @@ def test_submit_reads_files_and_short_references(
     ):
         file.write_text(json.dumps([{**named, "motion": wrong}]))
         ran = marey("submit", "a person walks", "--constraints", file)
-        assert (ran.code, words in ran.err) == (2, True), ran.err
+        assert (ran.code, f"{file}: {words}" in ran.err) == (2, True), ran.err
 
 
 def test_rows_name_motions_too(api: LiveApi, http: httpx2.Client, marey: Command, tmp_path: Path) -> None:

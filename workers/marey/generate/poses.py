@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.errors import InvalidInput
-from marey.items.constraints import MAX_FILE, named_motions, parse_constraints
+from marey.items.constraints import named_motions, parse_constraints
 from marey.items.item import Item
-from marey.motion.keyframes import PoseFiles
+from marey.motion.keyframes import PoseFiles, read_constraints_file
 
 
 def with_poses(constraints: Sequence[Mapping[str, Any]], folder: Path) -> list[dict[str, Any]]:
@@ -23,14 +23,7 @@ def with_poses(constraints: Sequence[Mapping[str, Any]], folder: Path) -> list[d
         InvalidInput: a motion that only a server knows, a frame that it does not have, or a file that cannot be read;
             with the field in `where`.
     """
-    for where, named in named_motions(constraints):
-        if "id" in named:
-            raise InvalidInput(
-                "a motion of a server cannot be read here",
-                where=f"{where}.id",
-                hint='Fetch its npz and write {"file": "pose.npz", "frame": 0}, or submit to the server.',
-            )
-    return PoseFiles(folder).fill(constraints)
+    return PoseFiles(folder).fill(_without_ids(constraints))
 
 
 def constraints_of(item: Item, given: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
@@ -39,18 +32,18 @@ def constraints_of(item: Item, given: Sequence[Mapping[str, Any]]) -> Sequence[M
 
 
 def read_file(file: Path | None) -> Sequence[Mapping[str, Any]]:
-    """Return the constraints of a JSON file; motion files that they name are found from its folder.
-
-    Raises:
-        NotFound, TooLarge: the file cannot be read.
-        InvalidInput: constraints that cannot be used, with the file and the field.
-    """
+    """Return the constraints of a JSON file, or none without a file; see `read_constraints_file`."""
     if file is None:
         return ()
-    from marey.motion.files import read_limited
+    return read_constraints_file(file, lambda content: _without_ids(parse_constraints(content)))
 
-    content = read_limited(file, MAX_FILE)
-    try:
-        return with_poses(parse_constraints(content), file.parent)
-    except InvalidInput as error:
-        raise InvalidInput(error.message, where=f"{file}: {error.where}", hint=error.hint) from None
+
+def _without_ids(constraints: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
+    for where, named in named_motions(constraints):
+        if "id" in named:
+            raise InvalidInput(
+                "a motion of a server cannot be read here",
+                where=f"{where}.id",
+                hint='Fetch its npz and write {"file": "pose.npz", "frame": 0}, or submit to the server.',
+            )
+    return constraints
