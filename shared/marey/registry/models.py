@@ -99,7 +99,7 @@ class Ablation:
     Attributes:
         name: unique among the model's.
         help: one line.
-        run: `(data, bundle, output, *, steps, batch, seeds, threads) -> Markdown table`.
+        run: `(marey.training.ablation.AblationRequest) -> Markdown table`.
     """
 
     name: str

@@ -22,6 +22,7 @@ from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.spec import SPEC
 from marey.models.hgm3.train import train_stage
 from marey.registry import resolve
+from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
 from marey.training.motions import TokenData
 from marey.training.staging import TrainOptions
@@ -67,6 +68,7 @@ def test_each_ablation_trains_its_networks_once_and_judges_every_row(
     prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judge_by_two_prompts(monkeypatch)
+    request = AblationRequest(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, threads=1)
     trained: list[str] = []
 
     def train(*arguments: object) -> dict[str, float]:
@@ -84,12 +86,12 @@ def test_each_ablation_trains_its_networks_once_and_judges_every_row(
         if each.name not in expected:
             continue
         run = resolve(each.run)
-        shown = run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1)
+        shown = run(request)
         assert trained == expected[each.name]
         assert len(shown.splitlines()) == 2 + rows[each.name]
         assert (tmp_path / f"{each.name}.md").read_text() == shown
         trained.clear()
-        assert run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1) == shown
+        assert run(request) == shown
         assert not trained
     assert (tmp_path / "networks" / "alpha-0-0.5.0" / "bundle" / "manifest.json").is_file()
 

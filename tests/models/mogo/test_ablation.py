@@ -27,6 +27,7 @@ from marey.models.mogo.ablation import (
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.config import PAPER, TINY, MOGOConfig
 from marey.models.mogo.train import train_stage
+from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
@@ -80,13 +81,13 @@ def test_an_ablation_goes_on_where_it_stopped(
         return {"local_mm": float(len(trained))}
 
     monkeypatch.setattr(ablation, "train_tokenizer", train)
-    arguments = (prepared.path, str(options.run / "bundle"), tmp_path)
+    request = AblationRequest(prepared.path, str(options.run / "bundle"), tmp_path, steps=1, threads=1)
     with pytest.raises(KeyboardInterrupt):
-        ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1)
-    shown = ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1)
+        ablate_tokenizer(request)
+    shown = ablate_tokenizer(request)
     assert trained == [*SCALES.values()][:2] + [*SCALES.values()][1:]
     assert shown.count("|\n") >= len(SCALES)
-    assert ablate_tokenizer(*arguments, steps=1, batch=None, seeds=1, threads=1) == shown
+    assert ablate_tokenizer(request) == shown
 
 
 def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
@@ -94,8 +95,8 @@ def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
 ) -> None:
     judge_by_two_prompts(monkeypatch)
     monkeypatch.setattr(ablation, "LEVELS", {name: LEVELS[name] for name in ("1 levels", "2 levels")})
-    arguments = (prepared.path, str(options.run / "bundle"), tmp_path)
-    shown = ablate_levels(*arguments, steps=1, batch=4, seeds=1, threads=1)
+    request = AblationRequest(prepared.path, str(options.run / "bundle"), tmp_path, steps=1, batch=4, threads=1)
+    shown = ablate_levels(request)
     head, _, *rows = shown.splitlines()
     assert {"local_mm", "error_mm", "validation loss", "foot skate"} <= {cell.strip() for cell in head.split("|")}
     assert [row.split(" | ")[0] for row in rows] == ["| 1 levels", "| 2 levels"]
@@ -103,7 +104,7 @@ def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
         made = find_bundle(str(tmp_path / f"levels-{number}-0" / "bundle"))
         wanted = replace(TINY.tokenizer, levels=levels)
         assert MOGOConfig.from_dict(made.manifest.parameters).tokenizer == wanted
-    assert ablate_levels(*arguments, steps=1, batch=4, seeds=1, threads=1) == shown
+    assert ablate_levels(request) == shown
 
 
 def test_the_sizes_of_the_papers_tables() -> None:

@@ -20,6 +20,7 @@ from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.train import train_stage
 from marey.registry import resolve
+from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.ablations import judge_by_two_prompts
@@ -66,6 +67,7 @@ def test_every_row_is_judged_and_kept(
     prepared: PreparedData, bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judge_by_two_prompts(monkeypatch)
+    request = AblationRequest(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, threads=1)
     trained: list[Path] = []
 
     def train(bundle: str, stages: tuple[str, ...], options: TrainOptions[MoMaskPPConfig]) -> dict[str, float]:
@@ -75,12 +77,12 @@ def test_every_row_is_judged_and_kept(
     monkeypatch.setattr(ablation, "train_variant", train)
     assert [each.name for each in SPEC.ablations] == ["scales", "attention", "conditioning"]
     (run,) = (resolve(each.run) for each in SPEC.ablations if each.name == "conditioning")
-    shown = run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1)
+    shown = run(request)
     assert [path.name for path in trained] == ["conditioning-0.0", "conditioning-1.0"]
     assert len(shown.splitlines()) == 2 + len(CONDITIONING)
     assert "foot skate" in shown
     trained.clear()
-    assert run(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, seeds=1, threads=1) == shown
+    assert run(request) == shown
     assert not trained
 
 

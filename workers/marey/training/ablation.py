@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, stdev
 
@@ -14,9 +15,38 @@ from marey.checks.rates import mean_quality
 from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
 from marey.training.adherence import measure, pipeline_of
+from marey.training.budget import Budget
+from marey.training.staging import C, TrainOptions
 
 DECIDES = "all but kick, punch, slash, dance"
 """Rate of `judge` that compares variants."""
+
+
+@dataclass(frozen=True)
+class AblationRequest:
+    """The request of an ablation: `marey train ablate`.
+
+    Attributes:
+        data: prepared data.
+        bundle: gives the configuration and the parts that no variant trains.
+        output: folder of runs, numbers and tables.
+        steps: of each training.
+        batch: clips a step; None = as configured.
+        seeds: training seeds of each variant; see `compare`.
+        threads: 0 = PyTorch's default.
+    """
+
+    data: Path
+    bundle: str
+    output: Path
+    steps: int
+    batch: int | None = None
+    seeds: int = 1
+    threads: int = 0
+
+    def training(self, run: Path, config: C, seed: int) -> TrainOptions[C]:
+        """Return the options of the training of a variant."""
+        return TrainOptions(self.data, run, config, Budget(steps=self.steps), seed=seed, threads=self.threads)
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:

@@ -218,7 +218,9 @@ def ablate(
             hint=f"Known: {'; '.join(f'{each.name} ({each.help})' for each in known.values()) or 'none'}.",
         )
     try:
+        from marey.training.ablation import AblationRequest
+
         run = resolve(known[name].run)
     except ImportError as error:
         raise needs_extra("train", error) from error
-    return run(data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads)
+    return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads))

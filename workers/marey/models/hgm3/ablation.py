@@ -24,8 +24,7 @@ from marey.models.hgm3.generate import Generator, SamplingSettings
 from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import compare, evaluation_texts, judge
-from marey.training.budget import Budget
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
 from marey.training.motions import TOKENS
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
@@ -110,66 +109,54 @@ def train_variant(
     return found
 
 
-def ablate_masks(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_masks(request: AblationRequest) -> str:
     """Compare hard and random masks, each decoded in three ways; see `ablate`."""
-    return ablate("masks", MASKS, data, bundle, output, **options)
+    return ablate("masks", MASKS, request)
 
 
-def ablate_conditions(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_conditions(request: AblationRequest) -> str:
     """Compare the full condition alone, a network for each condition, and one for all (Tab. 3); see `ablate`."""
-    return ablate("conditions", CONDITIONS, data, bundle, output, **options)
+    return ablate("conditions", CONDITIONS, request)
 
 
-def ablate_alphas(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_alphas(request: AblationRequest) -> str:
     """Compare the four settings of α (Tab. 4); see `ablate`."""
-    return ablate("alphas", ALPHAS, data, bundle, output, **options)
+    return ablate("alphas", ALPHAS, request)
 
 
-def ablate_passes(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_passes(request: AblationRequest) -> str:
     """Compare numbers of passes under each condition (App. D); see `ablate`."""
-    return ablate("passes", PASSES, data, bundle, output, **options)
+    return ablate("passes", PASSES, request)
 
 
-def ablate(
-    name: str,
-    variants: Mapping[str, DecodedVariant],
-    data: Path,
-    bundle: str,
-    output: Path,
-    *,
-    steps: int,
-    batch: int | None,
-    seeds: int,
-    threads: int,
-) -> str:
+def ablate(name: str, variants: Mapping[str, DecodedVariant], request: AblationRequest) -> str:
     """Train what variants decode, judge each, and return the table; see `marey.training.ablation.compare`.
 
     Raises:
         InvalidBundle: the bundle declares no text pipeline.
     """
-    given = find_bundle(bundle)
-    config = with_batch(HGM3Config.from_dict(given.manifest.parameters), ["masked"], batch)
+    given = find_bundle(request.bundle)
+    config = with_batch(HGM3Config.from_dict(given.manifest.parameters), ["masked"], request.batch)
 
     @cache
     def texts() -> list[TextFeatures]:
-        return evaluation_texts(Generator.load(given, threads=threads))
+        return evaluation_texts(Generator.load(given, threads=request.threads))
 
     def trained(network: str, seed: int) -> Path:
-        folder = output / "networks" / f"{network}.{seed}"
+        folder = request.output / "networks" / f"{network}.{seed}"
         if not (folder / METRICS).is_file():
             own = replace(config, mining=replace(config.mining, **TRAININGS[network]))
-            options = TrainOptions(data, folder, own, Budget(steps=steps), seed=seed, threads=threads)
-            train_variant(data, bundle, folder, own, options)
+            train_variant(request.data, request.bundle, folder, own, request.training(folder, own, seed))
         return folder
 
     def measured(row: str, seed: int) -> dict[str, float]:
         variant = variants[row]
         folders = [trained(network, seed) for network in variant.networks]
-        generators = [Generator.load(str(folder / "bundle"), threads=threads) for folder in folders]
+        generators = [Generator.load(str(folder / "bundle"), threads=request.threads) for folder in folders]
         generator = generators[-1]
         if len(generators) > 1:
             generator.base = SeparateTransformers([each.networks.masked for each in generators])
         validation = json.loads((folders[-1] / METRICS).read_text(encoding="utf-8"))
         return {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts(), variant.settings)
 
-    return compare(list(variants), measured, output, name, seeds=seeds)
+    return compare(list(variants), measured, request.output, name, seeds=request.seeds)

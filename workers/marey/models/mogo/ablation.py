@@ -18,7 +18,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
@@ -31,8 +30,7 @@ from marey.models.mogo.generate import Generator
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
-from marey.training.ablation import compare, evaluation_texts, judge
-from marey.training.budget import Budget
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions, finish, use_threads
 
@@ -157,57 +155,50 @@ def judged(bundle: Bundle, threads: int) -> dict[str, float]:
     return judge(generator, evaluation_texts(generator), generator.settings({}))
 
 
-def ablate_tokenizer(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_tokenizer(request: AblationRequest) -> str:
     """Compare the scales of MoSA; see `_ablate`."""
-    return _ablate("tokenizer", SCALES, train_tokenizer, data, bundle, output, **options)
+    return _ablate("tokenizer", SCALES, train_tokenizer, request)
 
 
-def ablate_transformer(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_transformer(request: AblationRequest) -> str:
     """Compare the ways of levels and depth; see `_ablate`."""
 
     def train(variant: Variant, run: TrainOptions[MOGOConfig]) -> dict[str, float]:
-        return train_transformer(bundle, variant, run)
+        return train_transformer(request.bundle, variant, run)
 
-    return _ablate("transformer", VARIANTS, train, data, bundle, output, **options)
+    return _ablate("transformer", VARIANTS, train, request)
 
 
-def ablate_scaling(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_scaling(request: AblationRequest) -> str:
     """Compare learnable scaling with none at three sizes of codebooks (Tab. 3); see `_ablate`."""
-    return _ablate("scaling", SCALING, train_both, data, bundle, output, **options)
+    return _ablate("scaling", SCALING, train_both, request)
 
 
-def ablate_levels(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_levels(request: AblationRequest) -> str:
     """Compare numbers of levels (Tab. 4); see `_ablate`."""
-    return _ablate("levels", LEVELS, train_both, data, bundle, output, **options)
+    return _ablate("levels", LEVELS, train_both, request)
 
 
-def ablate_codebooks(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_codebooks(request: AblationRequest) -> str:
     """Compare sizes of codebooks (Tab. 5); see `_ablate`."""
-    return _ablate("codebooks", CODEBOOKS, train_both, data, bundle, output, **options)
+    return _ablate("codebooks", CODEBOOKS, train_both, request)
 
 
 def _ablate(
     about: str,
     variants: Mapping[str, V],
     train: Callable[[V, TrainOptions[MOGOConfig]], dict[str, float]],
-    data: Path,
-    bundle: str,
-    output: Path,
-    *,
-    steps: int,
-    batch: int | None,
-    seeds: int,
-    threads: int,
+    request: AblationRequest,
 ) -> str:
     """Train and measure each variant with each seed, and return the table; see `marey.training.ablation.compare`."""
-    use_threads(threads)
-    config = MOGOConfig.from_dict(find_bundle(bundle).manifest.parameters)
-    config = with_batch(config, ["tokenizer", "transformer"], batch)
+    use_threads(request.threads)
+    config = MOGOConfig.from_dict(find_bundle(request.bundle).manifest.parameters)
+    config = with_batch(config, ["tokenizer", "transformer"], request.batch)
 
     def measured(name: str, seed: int) -> dict[str, float]:
-        run = output / f"{about}-{list(variants).index(name)}-{seed}"
+        run = request.output / f"{about}-{list(variants).index(name)}-{seed}"
         shutil.rmtree(run, ignore_errors=True)
         run.mkdir(parents=True)
-        return train(variants[name], TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads))
+        return train(variants[name], request.training(run, config, seed))
 
-    return compare(list(variants), measured, output, about, seeds=seeds)
+    return compare(list(variants), measured, request.output, about, seeds=request.seeds)

@@ -16,7 +16,6 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from marey.bundles import find_bundle
@@ -26,8 +25,7 @@ from marey.models.momaskpp.generate import Generator
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import compare, evaluation_texts, judge
-from marey.training.budget import Budget
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
 from marey.training.motions import TOKENS
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
@@ -64,56 +62,43 @@ CONDITIONING = {
 }
 
 
-def ablate_scales(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_scales(request: AblationRequest) -> str:
     """Compare multi-scale with full-scale tokens; see `ablate`."""
-    return ablate("scales", SCALES, ("tokenizer", "masked"), data, bundle, output, **options)
+    return ablate("scales", SCALES, ("tokenizer", "masked"), request)
 
 
-def ablate_attention(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_attention(request: AblationRequest) -> str:
     """Compare tokenizers with and without attention; see `ablate`."""
-    return ablate("attention", ATTENTION, ("tokenizer", "masked"), data, bundle, output, **options)
+    return ablate("attention", ATTENTION, ("tokenizer", "masked"), request)
 
 
-def ablate_conditioning(data: Path, bundle: str, output: Path, **options: Any) -> str:
+def ablate_conditioning(request: AblationRequest) -> str:
     """Compare ways to read the words; see `ablate`."""
-    return ablate("conditioning", CONDITIONING, ("masked",), data, bundle, output, **options)
+    return ablate("conditioning", CONDITIONING, ("masked",), request)
 
 
-def ablate(
-    name: str,
-    variants: Mapping[str, NetworkVariant],
-    stages: tuple[str, ...],
-    data: Path,
-    bundle: str,
-    output: Path,
-    *,
-    steps: int,
-    batch: int | None,
-    seeds: int,
-    threads: int,
-) -> str:
+def ablate(name: str, variants: Mapping[str, NetworkVariant], stages: tuple[str, ...], request: AblationRequest) -> str:
     """Train the `stages` of each variant, judge it, and return the table; see `marey.training.ablation.compare`.
 
     Raises:
         InvalidBundle: the bundle declares no text pipeline.
     """
-    given = find_bundle(bundle)
-    config = with_batch(MoMaskPPConfig.from_dict(given.manifest.parameters), ["tokenizer", "masked"], batch)
+    given = find_bundle(request.bundle)
+    config = with_batch(MoMaskPPConfig.from_dict(given.manifest.parameters), ["tokenizer", "masked"], request.batch)
 
     @cache
     def texts() -> list[TextFeatures]:
-        return evaluation_texts(Generator.load(given, threads=threads))
+        return evaluation_texts(Generator.load(given, threads=request.threads))
 
     def measured(row: str, seed: int) -> dict[str, float]:
-        run = output / "networks" / f"{name}-{list(variants).index(row)}.{seed}"
+        run = request.output / "networks" / f"{name}-{list(variants).index(row)}.{seed}"
         own = variants[row].of(config)
-        options = TrainOptions(data, run, own, Budget(steps=steps), seed=seed, threads=threads)
         found = {"tokens of the longest motion": float(Scales.of(own).total(own.max_tokens))}
-        found |= train_variant(bundle, stages, options)
-        generator = Generator.load(str(run / "bundle"), threads=threads)
+        found |= train_variant(request.bundle, stages, request.training(run, own, seed))
+        generator = Generator.load(str(run / "bundle"), threads=request.threads)
         return found | judge(generator, texts(), generator.settings({}))
 
-    return compare(list(variants), measured, output, name, seeds=seeds)
+    return compare(list(variants), measured, request.output, name, seeds=request.seeds)
 
 
 def train_variant(bundle: str, stages: tuple[str, ...], options: TrainOptions[MoMaskPPConfig]) -> dict[str, float]:
