@@ -9,7 +9,7 @@ from pathlib import Path
 from marey.core.errors import InvalidInput
 from marey.motion.body import NamedBody, travel_scale
 from marey.motion.body_files import read_body
-from marey.motion.clip import MotionClip
+from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.feet import clean_feet, find_contacts
 from marey.motion.files import stamp_of
 from marey.motion.finish import CLEANED
@@ -17,9 +17,6 @@ from marey.motion.hands import join_hands, wrist_distance
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import aim_bones
 from marey.motion.skeleton import HUMANML3D
-
-MEASURED = "quality"
-"""Key of a manifest whose record is of the body that the motion had."""
 
 
 def load_shape(given: str | Path) -> NamedBody:
@@ -63,7 +60,7 @@ def change_body(clip: MotionClip, body: NamedBody) -> MotionClip:
         joints, contacts = clean_feet(joints, skeleton, clip.fps)
         joints = join_hands(joints, scale * wrist_distance(clip.joints.astype("float64"), own), skeleton)
         rotations, root = aim_bones(joints, rotations, skeleton), joints[:, 0]
-    manifest = {name: value for name, value in clip.manifest.items() if name != MEASURED} | {"body": body.describe()}
+    manifest = {name: value for name, value in clip.manifest.items() if name != QUALITY} | {"body": body.describe()}
     return MotionClip.of(skeleton, rotations, root, contacts, clip.fps, manifest=manifest)
 
 

@@ -28,6 +28,8 @@ from marey.motion.skeleton import Skeleton, skeleton_of
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
+QUALITY, SELECTION = "quality", "selection"
+"""Keys of a manifest: the records of the quality of a motion, and of its choice among candidates (`marey.quality`)."""
 MAX_UNPACKED = 2**30  # bytes; an hour of 22 joints at 120 fps takes 0.4 GiB
 KEYS = (
     "joints",

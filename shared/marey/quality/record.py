@@ -8,14 +8,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from marey.motion.clip import QUALITY
 from marey.quality.constraints import ConstraintError
 from marey.vocabulary.entries import Support
 
 VERSION = 1
-KEY = "quality"
-"""Key of the record in a motion's manifest."""
-
-
 SHOWN = 0.5
 """Value of a match from which on a motion shows the actions of its prompt."""
 
@@ -93,6 +90,6 @@ class MotionQuality(BaseModel):
 def read_quality(manifest: Mapping[str, Any]) -> MotionQuality | None:
     """Return the record of a motion's manifest; None if it has none, or one of another version."""
     try:
-        return MotionQuality.model_validate(manifest.get(KEY))
+        return MotionQuality.model_validate(manifest.get(QUALITY))
     except ValidationError:
         return None

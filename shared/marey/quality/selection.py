@@ -7,10 +7,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from marey.motion.clip import SELECTION
 from marey.quality.record import Flag
-
-KEY = "selection"
-"""Key of the record in a motion's manifest."""
 
 
 class Candidate(BaseModel):
@@ -41,6 +39,6 @@ class Selection(BaseModel):
 def read_selection(manifest: Mapping[str, Any]) -> Selection | None:
     """Return the record of a motion's manifest; None if it was not chosen among several, or of another version."""
     try:
-        return Selection.model_validate(manifest.get(KEY))
+        return Selection.model_validate(manifest.get(SELECTION))
     except ValidationError:
         return None

@@ -24,6 +24,7 @@ from marey.jobs.journal import LockedJob, NewEvent, lock_job_of, record
 from marey.jobs.states import ENDED
 from marey.jobs.submit import TEXTS_LOCK
 from marey.jobs.types import NO_TEXT
+from marey.motion.clip import QUALITY, SELECTION
 from marey.motion.edits.editing import EDITED_FROM
 from marey.takes.assets import keep_content, write_content
 from marey.takes.edits import edit_jobs_of
@@ -37,7 +38,7 @@ ROUND = 200
 """Jobs or files per round."""
 KEPT = (
     *("model", "bundle", "weights_sha256", "random_weights", "licence", "seed", "settings", "software"),
-    *("feet_cleaned", "stream", "quality", "selection"),
+    *("feet_cleaned", "stream", QUALITY, SELECTION),
     *("placement", "loop", "travel", "travel_per_second", EDITED_FROM),
 )
 """Manifest keys other than the prompt that are kept. All others are removed: a new key is removed until it is listed

@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any, cast
 
 from marey.core.errors import InvalidInput
-from marey.motion.clip import MotionClip
+from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.prompt_frames import prompts_of
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
-from marey.quality.record import KEY, PromptMatch
+from marey.quality.record import PromptMatch
 from marey.selector.records import match_of
 from marey.text.actions import split_actions
 from marey.text.graph import SemanticGraph
@@ -24,7 +24,7 @@ def judged(clip: MotionClip) -> MotionClip:
     if quality is None:
         return clip
     record = quality.with_match(_match(clip)).model_dump(mode="json")
-    return replace(clip, manifest={**about, KEY: record})
+    return replace(clip, manifest={**about, QUALITY: record})
 
 
 def _match(clip: MotionClip) -> PromptMatch:

@@ -18,9 +18,9 @@ from marey.generation.shots.dispatch import generate_any
 from marey.items.settings import BEST_OF, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
 from marey.items.values import MAX_SEED
 from marey.motion.body import NamedBody
-from marey.motion.clip import MotionClip
+from marey.motion.clip import SELECTION, MotionClip
 from marey.quality.record import SHOWN, Flag, read_quality
-from marey.quality.selection import KEY, Candidate, Selection
+from marey.quality.selection import Candidate, Selection
 
 
 @dataclass(frozen=True)
@@ -166,4 +166,4 @@ class _Draw:
             chosen=self._chosen,
             candidates=self._candidates,
         )
-        return replace(self.best, manifest={**self.best.manifest, KEY: selection.model_dump(mode="json")})
+        return replace(self.best, manifest={**self.best.manifest, SELECTION: selection.model_dump(mode="json")})

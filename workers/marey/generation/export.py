@@ -9,11 +9,11 @@ from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
-from marey.motion.clip import MotionClip
+from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.finish import CLEANED, finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
-from marey.quality.record import KEY, PromptMatch
+from marey.quality.record import PromptMatch
 from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
 
@@ -81,7 +81,7 @@ def judged(clip: MotionClip, request: Request) -> MotionClip:
     if quality is None:
         return clip
     quality = quality.with_match(_match(clip, request))
-    return replace(clip, manifest={**clip.manifest, KEY: quality.model_dump(mode="json")})
+    return replace(clip, manifest={**clip.manifest, QUALITY: quality.model_dump(mode="json")})
 
 
 def _prompts(request: Request) -> list[str]:

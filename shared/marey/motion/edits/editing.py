@@ -10,7 +10,7 @@ from importlib.metadata import version
 from typing import Any, Protocol
 
 from marey.core.errors import InvalidInput
-from marey.motion.clip import MotionClip, load_npz
+from marey.motion.clip import QUALITY, SELECTION, MotionClip, load_npz
 from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import at_origin
@@ -20,7 +20,7 @@ from marey.motion.edits.timeline_rows import TIMELINE, has_rows
 EDITED_FROM = "edited_from"
 CYCLE = "loop"
 """Key of the record of a loop in a motion's manifest."""
-OUTDATED = ("quality", "selection", "travel", "travel_per_second", "constraints")
+OUTDATED = (QUALITY, SELECTION, "travel", "travel_per_second", "constraints")
 """Keys of a manifest that describe the frames of the source."""
 
 

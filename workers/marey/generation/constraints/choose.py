@@ -11,9 +11,9 @@ from marey.generation.constraints.fit import fit_clip
 from marey.generation.constraints.measure import constraint_errors
 from marey.generation.export import judged
 from marey.generation.port import Request
-from marey.motion.clip import MotionClip
+from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.place import at_origin
-from marey.quality.record import KEY, SHOWN, Flag, MotionQuality, PromptMatch, read_quality
+from marey.quality.record import SHOWN, Flag, MotionQuality, PromptMatch, read_quality
 from marey.quality.selection import Candidate
 
 SLIDING, JERKING = 2.0, 0.3
@@ -50,7 +50,9 @@ def fit_candidate(clip: MotionClip, request: Request, asked: ConstraintSet, misf
     match = None if quality.match is None else quality.match.value
     cost = misfit + SLIDING * quality.skate + JERKING * float(np.log(_jerk(made) / _jerk(clip)))
     rank = (met, match is None or match >= SHOWN, sound, -cost)
-    return Fitted(replace(made, manifest={**made.manifest, KEY: quality.model_dump(mode="json")}), rank, request.seed)
+    return Fitted(
+        replace(made, manifest={**made.manifest, QUALITY: quality.model_dump(mode="json")}), rank, request.seed
+    )
 
 
 def candidate_of(index: int, fitted: Fitted) -> Candidate:

@@ -23,10 +23,10 @@ from marey.generation.shots.timelines import plan_timeline
 from marey.items.constraint_frames import for_clip, frames_to_last, last_frame
 from marey.items.constraints import ROOT_PATH
 from marey.motion.body import NamedBody, standard_body, travel_scale
-from marey.motion.clip import MotionClip
+from marey.motion.clip import SELECTION, MotionClip
 from marey.motion.edits.licences import LICENCE, terms_with
 from marey.motion.skeleton import Skeleton
-from marey.quality.selection import KEY, Selection
+from marey.quality.selection import Selection
 
 CANDIDATES = 8
 """Candidates of a motion, unless its `best_of` asks for more."""
@@ -200,7 +200,7 @@ def _best(generator: Generator[S], row: _Drawn, settings: S, plan: DrawPlan, bod
         "seed": row.request.seed,
         LICENCE: terms_with(generator.bundle.manifest.licence, row.constraints),
         CONSTRAINTS: [dict(each) for each in row.constraints],
-        KEY: selection.model_dump(mode="json"),
+        SELECTION: selection.model_dump(mode="json"),
     }
     clip = fitted[chosen].clip
     return replace(clip, manifest={**clip.manifest, **about})
