@@ -6,6 +6,7 @@ import io
 import json
 from pathlib import Path
 from typing import Any
+from uuid import UUID, uuid4
 
 import pytest
 
@@ -79,3 +80,24 @@ def test_unknown_fields_without_end_are_told_in_one(catalogue: Counting) -> None
         submit(catalogue, item)
     assert raised.value.total == MAX_UNKNOWN + 1
     assert "has 5000 unknown fields" in raised.value.problems[-1].message
+
+
+def test_terms_of_poses_are_checked_without_reading_the_body_again(catalogue: Counting) -> None:
+    closed, shared = uuid4(), uuid4()
+    poses = {
+        (motion, 0): {"joint_rotations": {}, "root_height": 0.9, "licence": licence}
+        for motion, licence in ((closed, "CC-BY-NC-4.0"), (shared, "CC-BY-SA-4.0"))
+    }
+
+    def key(motion: UUID, frame: int) -> dict[str, Any]:
+        return {"type": "pose_keyframe", "frame": frame, "motion": {"id": str(motion), "frame": 0}}
+
+    rows = [[key(closed, 9)], [key(closed, 9), key(shared, 19)]]
+    lines = [{"prompt": "a person walks", "constraints": row} for row in rows]
+    body = io.BytesIO("\n".join(map(json.dumps, [*lines, {"prompt": "a person bows"}])).encode())
+    submission = read_ndjson(body, JobFields(), catalogue)
+    body.close()
+    with pytest.raises(InvalidItems) as raised:
+        submission.with_poses(poses)
+    ((line, where),) = [(problem.line, problem.field) for problem in raised.value.problems]
+    assert (line, where) == (2, "constraints.1.licence")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 from uuid import UUID
 
@@ -17,7 +17,7 @@ from marey.items.constraints import named_motions
 from marey.items.item import Item
 from marey.items.problems import InvalidItems, Problem
 from marey.jobs import MotionRow, asset_key, find_motions
-from marey.motion.edits.licences import LICENCE
+from marey.motion.edits.licences import LICENCE, terms_with
 from marey.motion.keyframes import beyond, with_pose
 from marey.tenants import ApiKey
 
@@ -31,17 +31,40 @@ Place = tuple[int | None, str]
 """Line and field that name a frame first, as `constraints.0.motion`."""
 
 
+@dataclass(frozen=True)
+class PosedItem:
+    """An item whose constraints name motions.
+
+    Attributes:
+        line: of the body.
+        model: as the item names it.
+        constraints: the fields of each that decide its terms.
+    """
+
+    line: int | None
+    model: str | None
+    constraints: Sequence[Mapping[str, Any]]
+
+
 class NamedPoses:
-    """The frames of stored motions that a body names."""
+    """The frames of stored motions that a body names, and the items that name them."""
 
     def __init__(self) -> None:
         self.frames: dict[UUID, dict[int, Place]] = {}
+        self.items: list[PosedItem] = []
         self._keyframes = self._frames = 0
         self._refused: set[str] = set()
 
-    def add(self, constraints: Sequence[Mapping[str, Any]], line: int | None) -> Iterator[Problem]:
-        """Note the frames that checked constraints name, and yield the problems with them; a limit is reported once."""
-        for where, named in named_motions(constraints):
+    def add(
+        self, constraints: Sequence[Mapping[str, Any]], line: int | None, model: str | None = None
+    ) -> Iterator[Problem]:
+        """Note the frames that the checked constraints of an item name, and yield the problems with them; a limit is
+        reported once."""
+        motions = [*named_motions(constraints)]
+        if motions and self._keyframes < MOST_KEYFRAMES:
+            terms = [{name: each[name] for name in ("motion", LICENCE) if name in each} for each in constraints]
+            self.items.append(PosedItem(line, model, terms))
+        for where, named in motions:
             if "file" in named:
                 hint = "write the `id` of a stored motion, or `joint_rotations`"
                 yield Problem(line, f"{where}.file", f"a server reads no files: {hint}")
@@ -108,6 +131,15 @@ def posed(item: Item, poses: Poses) -> Item:
         return item
     filled = [_filled(each, poses) for each in item.constraints or ()]
     return replace(item, constraints=filled)
+
+
+def check_terms(item: PosedItem, poses: Poses, licence: str | None) -> None:
+    """Check the terms of the poses that an item names against those of the weights.
+
+    Raises:
+        InvalidInput: no licence satisfies both; with the field in `where`.
+    """
+    terms_with(licence, [_filled(each, poses) for each in item.constraints])
 
 
 def _filled(constraint: Mapping[str, Any], poses: Poses) -> Mapping[str, Any]:

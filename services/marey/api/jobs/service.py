@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
-from marey.api.jobs.poses import NamedPoses, Poses, posed
+from marey.api.jobs.poses import NamedPoses, Poses, check_terms, posed
 from marey.api.jobs.schemas import JobFields
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
@@ -22,7 +22,6 @@ from marey.items.problems import InvalidItems, Problem
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import NewItem
 from marey.jobs.generators import GeneratorCapabilities, new_items
-from marey.motion.edits.licences import terms_with
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import Scope
 
@@ -59,29 +58,15 @@ class Submission:
         Raises:
             InvalidItems: no licence satisfies the terms of a pose and of the bundle.
         """
-        filled = replace(self, _poses=poses)
-        if poses:
-            filled.check_terms()
-        return filled
-
-    def check_terms(self) -> None:
-        """Check the terms of the poses against those of the bundles; the body is read again.
-
-        Raises:
-            InvalidItems: with each that excludes its bundle.
-        """
         problems: list[Problem] = []
-        for line, raw in self._raws():
-            item, _ = read_item(raw, line)
-            if item is None or item.constraints is None:
-                continue
-            licence = self._generators[item.model].bundle.manifest.licence
+        for item in self.named.items if poses else ():
             try:
-                terms_with(licence, posed(item, self._poses).constraints or ())
+                check_terms(item, poses, self._generators[item.model].bundle.manifest.licence)
             except InvalidInput as error:
-                problems.append(_problem(error, line, "constraints"))
+                problems.append(_problem(error, item.line, "constraints"))
         if problems:
             raise InvalidItems(problems)
+        return replace(self, _poses=poses)
 
     @property
     def bundles(self) -> list[str]:
@@ -216,7 +201,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
                 yield _problem(error, line, name)
         if (constraints := values.get("constraints")) is not None:
             yield from _beyond(generator, values, line)
-            yield from named.add(constraints, line)
+            yield from named.add(constraints, line, model)
 
     for item in read_items(counted(), check=check):
         bundle = generators[item.model].bundle
