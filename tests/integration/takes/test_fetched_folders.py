@@ -45,7 +45,7 @@ def rejected_after_a_fetch(marey: Command, job: str, folder: Path) -> list[str]:
     """A folder of kept takes, three of which are rejected then; the others' names."""
     ids = {m["name"]: m["id"] for m in marey("motions", "list", "--job", job, "--json").ok().lines}
     marey("motions", "keep", *ids.values()).ok()
-    marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok()
+    marey("fetch", job, "-o", folder, "--review", "kept", *NAMES).ok()
     marey("motions", "reject", *(ids[f"take{n:02}"] for n in range(3))).ok()
     return sorted(ids)[3:]
 
@@ -58,17 +58,17 @@ def test_files_of_takes_that_are_not_chosen_any_more_are_told_and_pruned(
     for own in ("take00.txt", "mine.npz", "take00.npz.bak"):
         (folder / own).write_text("mine")
     for _ in range(2):  # said until they are gone, though the manifest has forgotten them
-        ran = marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok()
+        ran = marey("fetch", job, "-o", folder, "--review", "kept", *NAMES).ok()
         assert f"6 files of earlier fetches of job {job}" in ran.err
         assert "--prune" in ran.err
         assert [row["name"] for row in manifest(folder)] == kept
         assert len(files(folder)) == 41
-    ran = marey("fetch", job, "-o", folder, "--only", "kept", "--prune", *NAMES).ok()
+    ran = marey("fetch", job, "-o", folder, "--review", "kept", "--prune", *NAMES).ok()
     assert "6 files of earlier fetches" in ran.err
     assert files(folder) == sorted(["mine.npz", *(f"{name}.{kind}" for name in kept for kind in ("npz", "bvh"))])
     assert {"take00.txt", "take00.npz.bak", "manifest.csv"} < {path.name for path in folder.iterdir()}
     assert not (folder / RECORD).exists()
-    assert "earlier" not in marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok().err
+    assert "earlier" not in marey("fetch", job, "-o", folder, "--review", "kept", *NAMES).ok().err
 
 
 def test_every_option_of_an_export_reaches_the_files(marey: Command, api: LiveApi, tmp_path: Path) -> None:
@@ -86,10 +86,10 @@ def test_one_call_may_fetch_and_prune_and_a_take_that_is_kept_again_is_not_left(
     marey: Command, job: str, tmp_path: Path
 ) -> None:
     rejected_after_a_fetch(marey, job, tmp_path)
-    marey("fetch", job, "-o", tmp_path, "--only", "kept", *NAMES).ok()
+    marey("fetch", job, "-o", tmp_path, "--review", "kept", *NAMES).ok()
     assert "earlier" not in marey("fetch", job, "-o", tmp_path, *NAMES).ok().err
     assert not (tmp_path / RECORD).exists()
-    marey("fetch", job, "-o", tmp_path, "--only", "kept", "--prune", *NAMES).ok()
+    marey("fetch", job, "-o", tmp_path, "--review", "kept", "--prune", *NAMES).ok()
     assert len(files(tmp_path)) == 34
 
 
@@ -100,7 +100,7 @@ def test_clips_of_another_job_in_the_folder_are_not_pruned(
     api.work()
     marey("fetch", other, "-o", tmp_path, *NAMES).ok()
     marey("fetch", job, "-o", tmp_path, *NAMES).ok()
-    marey("fetch", job, "-o", tmp_path, "--only", "kept", "--prune", *NAMES).ok()
+    marey("fetch", job, "-o", tmp_path, "--review", "kept", "--prune", *NAMES).ok()
     assert files(tmp_path) == ["a-person-hops.bvh", "a-person-hops.npz"]
     assert [row["job"] for row in manifest(tmp_path)] == [other]
 

@@ -54,7 +54,7 @@ def test_kept_motions_alone_are_fetched_with_a_manifest(marey: Command, job: str
     ids = {m["name"]: m["id"] for m in motions(marey, job)}
     marey("motions", "keep", "-", "--comment", "good", stdin=f"{ids['walk']}\n{ids['bow']}\n").ok()
     marey("motions", "reject", ids["wave"]).ok()
-    marey("fetch", job, "-o", tmp_path / "k", "--only", "kept", "--name-template", "{name}_{seed}").ok()
+    marey("fetch", job, "-o", tmp_path / "k", "--review", "kept", "--name-template", "{name}_{seed}").ok()
     assert sorted(path.name for path in (tmp_path / "k").iterdir()) == [
         "bow_7.bvh", "bow_7.npz", "manifest.csv", "walk_5.bvh", "walk_5.npz",
     ]  # fmt: skip
@@ -69,7 +69,7 @@ def test_kept_motions_alone_are_fetched_with_a_manifest(marey: Command, job: str
     assert [m["name"] for m in motions(marey, job, "--review", "rejected", "--review", "new")] == ["wave"]
     marey("motions", "clear", ids["wave"]).ok()
     assert [m["name"] for m in motions(marey, job, "--review", "new")] == ["wave"]
-    said = marey("fetch", job, "-o", tmp_path / "none", "--only", "rejected").ok().err
+    said = marey("fetch", job, "-o", tmp_path / "none", "--review", "rejected").ok().err
     assert "is rejected" in said
 
 
@@ -130,7 +130,7 @@ def test_tags_name_files_where_every_item_has_them(marey: Command, job: str, tmp
     marey("fetch", job, "-o", tmp_path / "a", "--name-template", template).refused(2, "has no tag show=…")
     for motion in motions(marey, job, "--tag", "show=nox"):
         marey("motions", "keep", motion["id"]).ok()
-    marey("fetch", job, "-o", tmp_path / "b", "--only", "kept", "--name-template", template, "--format", "npz").ok()
+    marey("fetch", job, "-o", tmp_path / "b", "--review", "kept", "--name-template", template, "--format", "npz").ok()
     assert sorted(p.stem for p in (tmp_path / "b").glob("*.npz")) == ["nox_010_walk", "nox_020_wave"]
 
 

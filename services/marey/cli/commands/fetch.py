@@ -36,7 +36,7 @@ def fetch(
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
     export: ExportOptions = PLAIN,
-    only: Annotated[FetchReviewOption | None, typer.Option("--only", help="Only motions with this review.")] = None,
+    review: Annotated[FetchReviewOption | None, typer.Option("--review", help="Only motions with this review.")] = None,
     prune: Annotated[
         bool,
         typer.Option("--prune", help="Remove files of earlier fetches that are no longer part of the job's selection."),
@@ -58,7 +58,7 @@ def fetch(
             folder = output if len(found) == 1 else output / job.id
             write_job(
                 client, job.id, folder, formats,
-                template=name_template, only=only, prune=prune, overwrite=overwrite, export=export, as_json=as_json,
+                template=name_template, review=review, prune=prune, overwrite=overwrite, export=export, as_json=as_json,
             )  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def write_job(
     formats: Sequence[str] | None,
     *,
     template: str = options.TEMPLATE,
-    only: FetchReviewOption | None = None,
+    review: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
     export: ExportOptions = PLAIN,
@@ -77,7 +77,7 @@ def write_job(
 ) -> None:
     """Fetch the files that a job has so far and print a line for each of its items, in input order."""
     lines = fetch_job(
-        client, job, folder, formats, template=template, only=only, prune=prune, overwrite=overwrite, export=export
+        client, job, folder, formats, template=template, review=review, prune=prune, overwrite=overwrite, export=export
     )
     for line in lines:
         if as_json:
@@ -88,8 +88,8 @@ def write_job(
     waiting = sum(line["state"] in ("ready", "leased") for line in lines)
     if waiting:
         console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
-    if only is not None and not lines:
-        console.say(f"no motion of job {job} is {only.value}: `marey motions keep ID…` marks motions as kept.")
+    if review is not None and not lines:
+        console.say(f"no motion of job {job} is {review.value}: `marey motions keep ID…` marks motions as kept.")
 
 
 def fetch_job(
@@ -99,7 +99,7 @@ def fetch_job(
     formats: Sequence[str] | None = None,
     *,
     template: str = options.TEMPLATE,
-    only: FetchReviewOption | None = None,
+    review: FetchReviewOption | None = None,
     prune: bool = False,
     overwrite: bool = False,
     export: ExportOptions = PLAIN,
@@ -107,7 +107,7 @@ def fetch_job(
     """Fetch the files that a job has so far, with a progress bar, and return the output lines of its items.
 
     Args:
-        only: items whose motion has this review.
+        review: items whose motion has this review.
         prune: remove files that earlier manifests named for the job and this one does not.
         export: options of the files.
     """
@@ -137,8 +137,9 @@ def fetch_job(
         left: list[str] = []
         fetched = client.jobs.fetch(
             job, folder,
-            formats=formats or None, name_template=template, review=None if only is None else only.value, prune=prune,
-            overwrite=overwrite, on_progress=Observer(), **export.values,
+            formats=formats or None, name_template=template,
+            review=None if review is None else review.value, prune=prune, overwrite=overwrite,
+            on_progress=Observer(), **export.values,
         )  # fmt: skip
     for message in left:
         console.say(message)

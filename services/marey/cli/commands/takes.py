@@ -78,7 +78,7 @@ def list_motions(
 
 @app.command()
 def keep(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
-    """Mark motions as kept: `marey fetch --only kept` fetches them."""
+    """Mark motions as kept: `marey fetch --review kept` fetches them."""
     _review(motions, "kept", comment, as_json)
 
 
