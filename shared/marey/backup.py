@@ -12,13 +12,15 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 from sqlalchemy import exc
 from sqlalchemy.dialects.postgresql import insert
 
-from marey.core.errors import Conflict, InvalidFile
+from marey.core.errors import Conflict, InvalidFile, InvalidInput
 from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among
+from marey.items.constraints import named_motions, read_constraints
+from marey.items.timeline import read_timeline
 from marey.jobs import tables
 from marey.jobs.leases import AssetDigest
 from marey.jobs.states import ENDED, ItemStage, JobControl, JobKind, Review
-from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
+from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, Edits
 from marey.vocabulary.scope import ScopePolicy
 
 CHUNK = 1000  # rows per statement
@@ -86,6 +88,24 @@ class ItemRecord(_Record):
     constraints: list[dict[str, Any]] | None = None
     edited_from: list[UUID] = Field(default_factory=list[UUID])
     motion: MotionRecord | None
+
+    @model_validator(mode="after")
+    def _fits_its_request(self) -> ItemRecord:
+        try:
+            if self.timeline is not None:
+                read_timeline(self.timeline)
+            named = [] if self.constraints is None else [*named_motions(read_constraints(self.constraints))]
+        except InvalidInput as error:
+            raise ValueError(f"item {self.id}: {error}") from None
+        if named:  # a server puts their poses in their place before it stores them
+            raise ValueError(f"item {self.id} names a motion in {named[0][0]}, not a pose")
+        try:
+            edits = Edits.of(self.edits)
+        except (KeyError, TypeError, ValueError, AttributeError):
+            raise ValueError(f"item {self.id} has edits that cannot be read") from None
+        if (not edits.sources or set(edits.sources) - {*self.edited_from}) if edits else self.edited_from:
+            raise ValueError(f"item {self.id} was edited from other motions than its edits name")
+        return self
 
 
 class EventRecord(_Record):
@@ -212,7 +232,7 @@ def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
 
     Raises:
         Conflict: another tenant has a job of this id, or the garbage collector took a file: announce and PUT again.
-        InvalidFile: the database refuses it.
+        InvalidFile: an item was edited from a motion of another tenant, or the database refuses it.
     """
     job = backup.job
     there = conn.execute(sa.select(tables.job.c.tenant_id).where(tables.job.c.id == job.id)).scalar_one_or_none()
@@ -220,12 +240,28 @@ def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
         return False
     if there is not None:
         raise Conflict("another tenant has this job", where=f"job {job.id}")
+    _check_sources(conn, tenant, backup)
     try:
         _write_job(conn, tenant, backup)
     except (exc.DataError, exc.IntegrityError) as error:
         reason = (str(error.orig).splitlines() or ["?"])[0]
         raise InvalidFile(f"the database refuses it: {reason}", where=f"job {job.id}") from error
     return True
+
+
+def _check_sources(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:
+    """Check that no item was edited from a motion of another tenant. Motions that are not there may be: they were
+    deleted, or are restored later.
+
+    Raises:
+        InvalidFile: one was.
+    """
+    named = {source for item in backup.items for source in item.edited_from}
+    table = tables.motion.c
+    query = sa.select(table.id).where(among(table.id, sorted(named)), table.tenant_id != tenant).limit(1)
+    foreign = conn.execute(query).scalar_one_or_none() if named else None
+    if foreign is not None:
+        raise InvalidFile(f"an edit is of motion {foreign}, which another tenant has", where=f"job {backup.job.id}")
 
 
 def _write_job(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:

@@ -149,14 +149,16 @@ def _items(conn: sa.Connection, edit: NewEdit, steps: Sequence[Step]) -> list[Ne
     return [_item(number, piece, rows, edit) for number, piece in enumerate(pieces)]
 
 
-def edit_jobs_of(conn: sa.Connection, job: UUID) -> Sequence[UUID]:
-    """Return the jobs of edits that were made from motions of a job, directly or through other edits; oldest first."""
+def edit_jobs_of(conn: sa.Connection, tenant: str, job: UUID) -> Sequence[UUID]:
+    """Return the tenant's jobs of edits that were made from motions of a job, directly or through other edits; oldest
+    first."""
     item, motion, made = tables.item.c, tables.motion.c, tables.edited_from
     query = (
         sa.select(item.job_id)
         .join(made, made.c.item_id == item.id)
         .join(tables.motion, motion.id == made.c.source_id)
-        .where(motion.job_id == job)
+        .join(tables.job, tables.job.c.id == item.job_id)
+        .where(motion.job_id == job, tables.job.c.tenant_id == tenant)
         .distinct()
         .order_by(item.job_id)
     )

@@ -226,7 +226,7 @@ def _lock_ended(conn: sa.Connection, tenant: str, job: UUID) -> LockedJob:
 def _lock_edits(conn: sa.Connection, tenant: str, job: UUID) -> list[LockedJob]:
     """Lock the jobs of all edits of a locked job's motions; a submit that edits one of their motions then waits."""
     locked: dict[UUID, LockedJob] = {}
-    while new := [edit for edit in edit_jobs_of(conn, job) if edit not in locked]:
+    while new := [edit for edit in edit_jobs_of(conn, tenant, job) if edit not in locked]:
         locked |= {edit: _lock_ended(conn, tenant, edit) for edit in new}
     return list(locked.values())
 

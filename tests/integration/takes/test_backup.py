@@ -75,7 +75,9 @@ def studio(engine: sa.Engine, store: FolderStore) -> list[UUID]:
     """A job with a failed item, a verdict and a re-roll; one that was cancelled before its prompts were read."""
     rows = [{"start": 0.0, "end": 3.0, "prompt": "walk"}]
     items = [new_item(k, name=f"n{k}", tags=(f"shot={k}",)) for k in range(4)]
-    items[0] = replace(items[0], timeline=rows, constraints=[{"type": "root_path"}])
+    items[0] = replace(
+        items[0], timeline=rows, constraints=[{"type": "root_path", "frames": [0], "positions_xz": [[0.0, 1.0]]}]
+    )
     rich = submit_items(engine, items, name="rich")
     parse_texts(engine)
     work(engine, store, fail=1)
@@ -242,6 +244,60 @@ def test_another_tenants_job_is_not_overwritten_and_a_folder_with_something_in_i
         assert list_jobs(conn, "other").rows == ()
 
 
+def test_an_edit_of_another_tenants_motion_is_not_imported(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    source, stranger = (submit_items(engine, 1) for _ in range(2))
+    parse_texts(engine)
+    work(engine, folder_store)
+    work(engine, folder_store)
+    with transaction(engine) as conn:
+        made = submit_edit(conn, NewEdit(motion_in(engine, source), [{"op": "mirror"}])).id
+    work(engine, folder_store, queue=EDIT_QUEUE)
+    export_tenant(engine, folder_store, "default", tmp_path / "b")
+    theirs = motion_in(engine, stranger)
+    with engine.begin() as conn:
+        conn.execute(sa.text("INSERT INTO tenant (id) VALUES ('other')"))
+        conn.execute(sa.text("DELETE FROM job WHERE id <> :job"), {"job": stranger})
+    forge_sources(tmp_path / "b", made, theirs)
+    with pytest.raises(InvalidFile, match=f"an edit is of motion {theirs}, which another tenant has"):
+        import_tenant(engine, folder_store, "other", tmp_path / "b")
+    with transaction(engine) as conn:
+        assert list_jobs(conn, "other").rows == ()
+
+
+def test_an_erasure_leaves_jobs_of_other_tenants_alone(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    source = submit_items(engine, 1)
+    parse_texts(engine)
+    work(engine, folder_store)
+    with transaction(engine) as conn:
+        made = submit_edit(conn, NewEdit(motion_in(engine, source), [{"op": "mirror"}])).id
+    work(engine, folder_store, queue=EDIT_QUEUE)
+    with engine.begin() as conn:  # a link that no import writes any more
+        conn.execute(sa.text("INSERT INTO tenant (id) VALUES ('other')"))
+        conn.execute(sa.text("UPDATE motion SET tenant_id = 'other' WHERE job_id = :job"), {"job": made})
+        conn.execute(sa.text("UPDATE job SET tenant_id = 'other' WHERE id = :job"), {"job": made})
+    with transaction(engine) as conn:
+        assert erase(conn, "default", source, by="ann").edits == ()
+        assert get_job(conn, "other", made).erased is None
+
+
+def forge_sources(folder: Path, job: UUID, motion: UUID) -> None:
+    """Leave one job in a backup, and let its edits be of a motion."""
+    manifest = BackupManifest.model_validate_json((folder / "manifest.json").read_bytes())
+    path = folder / "jobs" / f"{job}.jsonl"
+    lines = [json.loads(line) for line in path.read_bytes().splitlines()]
+    for line in lines:
+        if "item" in line:
+            line["item"]["edits"]["sources"] = line["item"]["edited_from"] = [str(motion)]
+    data = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
+    path.write_bytes(data)
+    assert job in manifest.jobs
+    edit_manifest(folder, jobs={str(job): {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}})
+
+
 def edit_manifest(folder: Path, **changes: object) -> None:
     document = json.loads((folder / "manifest.json").read_text())
     (folder / "manifest.json").write_text(json.dumps(document | changes))
@@ -276,6 +332,10 @@ def link_away(folder: Path) -> None:
     (folder / "outside").write_bytes(path.read_bytes())
     path.unlink()
     path.symlink_to(folder / "outside")
+
+
+NOBODY = b"00000000-0000-7000-8000-000000000000"
+NAMED_MOTION = b'"constraints":[{"type":"pose_keyframe","frame":0,"motion":{"id":"%s","frame":0}}]' % NOBODY
 
 
 DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
@@ -330,6 +390,36 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
         lambda b: edit_rigs(b, lambda d: re.sub(rb'"sha256":"\w{64}","size"', b'"sha256":"%064d","size"' % 0, d)),
         InvalidFile,
         "is missing",
+    ),
+    "a constraint that is none": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"root_path"', b'"root_paht"', 1)),
+        InvalidFile,
+        "constraints.0.type",
+    ),
+    "a constraint that names a motion": (
+        lambda b: edit_job(b, lambda d: re.sub(rb'"constraints":\[\{.*?\}\]', NAMED_MOTION, d, count=1)),
+        InvalidFile,
+        "names a motion in constraints.0.motion",
+    ),
+    "a timeline that is none": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"end":3.0', b'"end":0.5', 1)),
+        InvalidFile,
+        "row 1",
+    ),
+    "sources of an item that is no edit": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"edited_from":[]', b'"edited_from":["%s"]' % NOBODY, 1)),
+        InvalidFile,
+        "edited from other motions",
+    ),
+    "edits that hide their source": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"edits":null', b'"edits":{"ops":[],"sources":["%s"]}' % NOBODY, 1)),
+        InvalidFile,
+        "edited from other motions",
+    ),
+    "edits of another form": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"edits":null', b'"edits":{"ops":[]}', 1)),
+        InvalidFile,
+        "edits that cannot be read",
     ),
     "what no text can hold": (
         lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),
