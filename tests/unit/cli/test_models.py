@@ -14,10 +14,35 @@ from tests.support.live_api import BUNDLE, write_bundle
 
 def test_a_bundle_is_shown_with_its_actions(capsys: pytest.CaptureFixture[str]) -> None:
     models.show("hgm3-starter", local=True)
-    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("actions ")]
-    assert lines == [
-        "actions      supported: walk, walk-backward, run, turn, wave, raise-arm, bow",
-        "actions      tried: kick, punch, slash, dance",
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[5:8] == [
+        "Supported actions, and words that ask for them:",
+        "  walk           walk, stroll, stride, march",
+        "  walk-backward  walk backward, walk backwards, walk back, step back",
+    ]
+    assert [line.split()[0] for line in lines[6:13]] == [
+        *("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow")
+    ]
+    assert lines[13:16] == ["", "Tried actions, which may come out wrong:", "  kick, punch, slash, dance"]
+
+
+def test_actions_of_few_captures_and_those_that_this_release_does_not_know_are_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    tried = [f"action-{number}" for number in range(9)]
+    assert [*models._actions({"supported": ["bow"], "single_take": ["fly"], "tried": tried})] == [
+        "",
+        "Supported actions, and words that ask for them:",
+        "  bow  bow, take a bow, bow down, bend forward in greeting",
+        "",
+        "Supported, but learned from few captures, and words that ask for them:",
+        "  fly",
+        "",
+        "Tried actions, which may come out wrong:",
+        "  action-0, action-1, action-2,",
+        "  action-3, action-4, action-5,",
+        "  action-6, action-7, action-8",
     ]
 
 

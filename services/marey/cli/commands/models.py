@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +14,8 @@ from marey.cli import console
 
 app = typer.Typer(help="Model bundles and weights.", no_args_is_help=True)
 
+WORDS = 4
+"""Words that are shown for a supported action."""
 Local = Annotated[bool, typer.Option("--local", help="Show the bundles of this machine, not the server's.")]
 
 
@@ -39,21 +43,13 @@ def show(
     local: Local = False,
     as_json: console.Json = False,
 ) -> None:
-    """Show one bundle: what its model can do, terms, data and settings; figures with --metrics."""
+    """Show one bundle: the actions that it supports, terms, data and settings; figures with --metrics."""
     found = _local_model(name) if local or not _server_named() else _server_model(name)
     if as_json:
         console.result_json(found)
         return
-    for field in ("name", "bundle", "model", "version", "config", "skeleton", "fps", "encoder", "licence"):
-        console.result(f"{field:<12} {found[field]}")
-    console.result(f"{'length':<12} {_length(found)}")
-    console.result(f"{'weights':<12} {_weights(found)}")
-    for source in found["data"]:
-        console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
-    for line in found.get("about", "").splitlines():  # an older server does not send it
-        console.result(f"{'about':<12} {line}")
-    for line in _actions(found.get("actions")):
-        console.result(f"{'actions':<12} {line}")
+    for line in _described(found):
+        console.result(line)
     for setting in found.get("settings", []):
         kind = "whole, " if setting["whole"] else ""
         shown = f"{setting['name']} = {setting['default']:g} ({kind}{setting['minimum']:g} to {setting['maximum']:g})"
@@ -164,14 +160,46 @@ def _length(model: Mapping[str, Any]) -> str:
     return f"{model['min_seconds']:g} to {model['max_seconds']:g} s"
 
 
+def _described(found: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines about a bundle, without settings and metrics: first what a prompt may ask for."""
+    facts = {**found, "length": _length(found), "weights": _weights(found)}
+    for field in ("name", "licence", "length", "weights"):
+        yield f"{field:<12} {facts[field]}"
+    yield from _actions(found.get("actions"))
+    yield ""
+    for field in ("bundle", "model", "version", "config", "skeleton", "fps", "encoder"):
+        yield f"{field:<12} {facts[field]}"
+    for source in found["data"]:
+        yield f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}"
+    for line in found.get("about", "").splitlines():  # an older server does not send it
+        yield f"{'about':<12} {line}"
+
+
 def _actions(lists: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield a line for each list of actions that is not empty."""
+    """Yield lines about the lists of actions: a supported one has a line with words that ask for it."""
     if lists is None:
-        yield "not listed: prompts are not compared with what it supports"
+        yield f"{'actions':<12} not listed: prompts are not compared with what it supports"
         return
-    for field, kind in (("supported", "supported"), ("single_take", "supported, of few takes"), ("tried", "tried")):
-        if names := lists.get(field):
-            yield f"{kind}: {', '.join(names)}"
+    supported, few, tried = (lists.get(field, ()) for field in ("supported", "single_take", "tried"))
+    width = max(map(len, (*supported, *few)), default=0)
+    for title, names in (("Supported actions", supported), ("Supported, but learned from few captures", few)):
+        if names:
+            yield from ("", f"{title}, and words that ask for them:")
+            yield from (f"  {name:<{width}}  {_words_for(name)}".rstrip() for name in names)
+    if tried:
+        columns = shutil.get_terminal_size((100, 24)).columns
+        yield from ("", "Tried actions, which may come out wrong:")
+        yield from textwrap.wrap(
+            ", ".join(tried), max(columns, 40), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+        )
+
+
+def _words_for(action: str) -> str:
+    """Return the first words of the vocabulary for an action; none if this release does not know it."""
+    from marey.vocabulary.entries import load_vocabulary
+
+    known = load_vocabulary().actions.get(action)
+    return "" if known is None else ", ".join(known.verbs[:WORDS])
 
 
 def _weights(model: Mapping[str, Any]) -> str:
