@@ -201,23 +201,12 @@ def read_file(
         file_format: for `-` and other endings; stdin is otherwise guessed from its first line.
         defaults: fields of lines that do not set them.
         extra_columns: treatment of unknown columns of a table.
+
+    Raises:
+        InvalidFile, TooLarge, NotFound, InvalidInput: as `rows_of_file`, while the items are read.
     """
     lines = rows_of_file(path, file_format, extra_columns=extra_columns)
     return PromptReader(((number, _completed(raw, defaults)) for number, raw in lines), where_of(path))
-
-
-def items_from_file(
-    path: str, file_format: Format | None = None, defaults: Mapping[str, object] = NO_DEFAULTS
-) -> Iterator[Item]:
-    """Items of a file (`read_file`), which count only once all are read.
-
-    Raises:
-        InvalidItems: after the last one, with every problem of every line.
-        InvalidFile: not UTF-8, or not of that format at all.
-        TooLarge: over `MAX_BODY_BYTES` of text, or over `MAX_ITEMS` motions; it is not read further.
-        NotFound, InvalidInput: no such file, or no way to tell its format.
-    """
-    return right_items(read_file(path, file_format, defaults))
 
 
 def right_items(reader: PromptReader) -> Iterator[Item]:
@@ -244,7 +233,8 @@ def read_evaluation_prompts(
         check: returns further problems of a row that can be used.
 
     Raises:
-        InvalidItems, InvalidFile, TooLarge, NotFound, InvalidInput: as `items_from_file`.
+        InvalidItems: with every problem of every line.
+        InvalidFile, TooLarge, NotFound, InvalidInput: as `rows_of_file`.
     """
     lines: list[int | None] = []
 
@@ -265,7 +255,9 @@ def rows_of_file(
     """Iterate over the lines of a file with their numbers; only the columns of a table are checked.
 
     Raises:
-        InvalidItems, InvalidFile, NotFound, TooLarge, InvalidInput: as `items_from_file`.
+        InvalidFile: not UTF-8, or not of that format at all.
+        TooLarge: over `MAX_BODY_BYTES` of text; it is not read further.
+        NotFound, InvalidInput: no such file, or no way to tell its format.
     """
     with open_text(path, limit=MAX_BODY_BYTES) as text:
         lines = enumerate(text, 1)

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from marey.client import manifest
 from marey.client.csv_cells import join_tags, protect, restore, split_tags, write_csv
 from marey.client.manifest import COLUMNS, NAME, NUMBERS, RAW_COLUMNS, row_of, write_manifest
-from marey.client.rows import items_from_file
 from marey.core.characters import find_forbidden
 from marey.core.errors import Conflict
 from marey.items.item import Item, read_item
+from tests.support.rows import items_of
 
 TEXT = st.text(st.one_of(st.sampled_from("=+-@\t\r\n'\",;x "), st.characters(exclude_categories=["Cs"])), max_size=20)
 FORMULAS = ("=", "+", "-", "@", "\t", "\r")
@@ -91,7 +91,7 @@ def test_a_manifest_submitted_again_asks_for_the_same(
     write_manifest(
         folder, "job", [{**row, "tags": join_tags(each.tags)} for row, each in zip(rows, wanted, strict=True)]
     )
-    assert list(items_from_file(str(folder / NAME))) == wanted
+    assert items_of(str(folder / NAME)) == wanted
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ BEFORE = (
 def test_a_manifest_of_the_release_before_is_read_as_it_is_and_carried_on(tmp_path: Path) -> None:
     path = tmp_path / NAME
     path.write_bytes(BEFORE.encode())
-    assert list(items_from_file(str(path))) == [
+    assert items_of(str(path)) == [
         Item("'=walks and runs", "walk", seed=7, model="hgm3", tags=("shot=010", "day")),
         Item("-walks", seed=8, model="hgm3"),
     ]
@@ -150,7 +150,7 @@ def test_a_manifest_has_a_column_of_each_other_format_that_there_is(tmp_path: Pa
     first = (folder / NAME).read_text().splitlines()[0]
     assert first == ",".join((*COLUMNS, "file:seed", "file:usd"))
     assert [row["file:usd"] for row in manifest._read(folder / NAME)] == ["walk.usd", ""]
-    assert len(list(items_from_file(str(folder / NAME)))) == 2  # it is still ours to submit again
+    assert len(items_of(str(folder / NAME))) == 2  # it is still ours to submit again
     for name in files.values():
         (folder / name).write_text("clip")
     left = write_manifest(folder, "job", [without])

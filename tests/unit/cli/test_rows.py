@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.client.rows import defaults_of, items_from_file, read_arguments, read_evaluation_prompts, right_items
+from marey.client.rows import defaults_of, read_arguments, read_evaluation_prompts, right_items
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import Item
 from marey.items.problems import InvalidItems
 from tests.support.models import NOT_KEEPING
+from tests.support.rows import items_of
 
 
 def write(folder: Path, name: str, content: str | bytes) -> str:
@@ -25,14 +26,14 @@ def write(folder: Path, name: str, content: str | bytes) -> str:
 
 def problems(folder: Path, name: str, content: str | bytes) -> list[str]:
     with pytest.raises(InvalidItems) as caught:
-        list(items_from_file(write(folder, name, content)))
+        items_of(write(folder, name, content))
     return [str(problem) for problem in caught.value.problems]
 
 
 def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
     header = "prompt,name,seconds,seed,variants,model,tags\n"
     text = header + '"walks, then runs",a,2.5,7,3,hgm3,walk; run\na person waves,,,,,,\n'
-    assert list(items_from_file(write(tmp_path, "p.csv", text))) == [
+    assert items_of(write(tmp_path, "p.csv", text)) == [
         Item("walks, then runs", "a", 2.5, ("walk", "run"), 7, 3, "hgm3"),
         Item("a person waves"),
     ]
@@ -42,19 +43,19 @@ def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
 def test_a_byte_order_mark_and_windows_lines_change_nothing(tmp_path: Path, bom: bytes, newline: bytes) -> None:
     path = write(tmp_path, "p.csv", bom + newline.join([b"prompt,seed", b"a person waves,3", b""]))
-    assert list(items_from_file(path)) == [Item("a person waves", seed=3)]
+    assert items_of(path) == [Item("a person waves", seed=3)]
 
 
 def test_a_jsonl_line_may_hold_settings(tmp_path: Path) -> None:
     path = write(tmp_path, "p.jsonl", '{"prompt": "a person waves", "settings": {"guidance": 3}}\n\n')
-    assert list(items_from_file(path)) == [Item("a person waves", settings={"guidance": 3.0})]
+    assert items_of(path) == [Item("a person waves", settings={"guidance": 3.0})]
 
 
 def test_a_csv_has_a_column_of_settings_which_come_before_those_of_the_command(tmp_path: Path) -> None:
     path = write(tmp_path, "p.csv", "prompt,settings\na person waves,temperature=1.2; guidance=4\na person bows,\n")
-    assert [item.settings for item in items_from_file(path)] == [{"temperature": 1.2, "guidance": 4.0}, {}]
+    assert [item.settings for item in items_of(path)] == [{"temperature": 1.2, "guidance": 4.0}, {}]
     defaults = defaults_of(settings={"guidance": 2.0, "steps": 8.0}, fps=30.0)
-    assert [item.settings for item in items_from_file(path, defaults=defaults)] == [
+    assert [item.settings for item in items_of(path, defaults=defaults)] == [
         {"temperature": 1.2, "guidance": 4.0, "steps": 8.0, "fps": 30.0},
         {"guidance": 2.0, "steps": 8.0, "fps": 30.0},
     ]
@@ -63,11 +64,11 @@ def test_a_csv_has_a_column_of_settings_which_come_before_those_of_the_command(t
 def test_a_column_of_timelines_stands_for_that_of_prompts(tmp_path: Path) -> None:
     rows = "0-3 a person walks; 3-5 a person waves"
     path = write(tmp_path, "p.csv", f'prompt,timeline,tags\n,"{rows}",a\na person bows,,\n')
-    first, second = items_from_file(path, defaults=defaults_of(seconds=4.0))
+    first, second = items_of(path, defaults=defaults_of(seconds=4.0))
     assert (first.prompt, first.seconds, first.tags) == (rows, None, ("a",))
     assert first.timeline is not None
     assert (second.timeline, second.seconds) == (None, 4.0)
-    (alone,) = items_from_file(write(tmp_path, "q.csv", f"timeline\n{rows}\n"))
+    (alone,) = items_of(write(tmp_path, "q.csv", f"timeline\n{rows}\n"))
     assert alone.timeline == first.timeline
     assert problems(tmp_path, "r.csv", f"prompt,timeline\nbow,{rows}\n") == [
         "line 2: prompt: stands beside a timeline: give one of the two"
@@ -76,7 +77,7 @@ def test_a_column_of_timelines_stands_for_that_of_prompts(tmp_path: Path) -> Non
 
 def test_a_timeline_of_jsonl_has_rows_or_a_text(tmp_path: Path) -> None:
     lines = '{"timeline": [{"start": 0, "end": 3, "prompt": "walk"}]}\n{"timeline": "0-3 walk", "model": "hgm3"}\n'
-    first, second = items_from_file(write(tmp_path, "p.jsonl", lines))
+    first, second = items_of(write(tmp_path, "p.jsonl", lines))
     assert first.timeline == second.timeline == [{"start": 0.0, "end": 3.0, "prompt": "walk"}]
     assert problems(tmp_path, "q.jsonl", f'{{"timeline": "0-3 walk", "model": "{NOT_KEEPING}"}}\n') == [
         f"line 1: timeline: the model {NOT_KEEPING!r} cannot generate timelines: it makes no motion between other "
@@ -93,7 +94,7 @@ def test_settings_that_are_none_are_told_with_their_line(tmp_path: Path, cell: s
 
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
     path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
-    assert [item.prompt for item in items_from_file(path)] == ["a person waves", "a person bows"]
+    assert [item.prompt for item in items_of(path)] == ["a person waves", "a person bows"]
 
 
 def test_an_unknown_column_is_an_error_that_lists_the_known_ones(tmp_path: Path) -> None:
@@ -140,7 +141,7 @@ def test_broken_json_is_told_with_its_line_and_the_rest_is_still_read(tmp_path: 
 )
 def test_a_file_in_another_encoding_is_refused_with_what_to_do(tmp_path: Path, content: bytes, said: str) -> None:
     with pytest.raises(InvalidFile, match=said) as caught:
-        list(items_from_file(write(tmp_path, "p.csv", content)))
+        items_of(write(tmp_path, "p.csv", content))
     assert caught.value.hint is not None
     assert "UTF-8" in caught.value.hint
 
@@ -151,11 +152,11 @@ def test_a_csv_that_breaks_off_inside_a_quote_names_the_line(tmp_path: Path) -> 
 
 def test_a_file_that_is_not_there_or_tells_no_format_or_holds_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotFound):
-        list(items_from_file(str(tmp_path / "none.csv")))
+        items_of(str(tmp_path / "none.csv"))
     with pytest.raises(InvalidInput, match="ending"):
-        list(items_from_file(write(tmp_path, "prompts.xlsx", "a")))
+        items_of(write(tmp_path, "prompts.xlsx", "a"))
     with pytest.raises(InvalidInput, match="no prompt"):
-        list(items_from_file(write(tmp_path, "p.csv", "prompt\n")))
+        items_of(write(tmp_path, "p.csv", "prompt\n"))
 
 
 def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Path) -> None:
@@ -166,13 +167,13 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
         '"settings": {"fps": 60}}',
         '{"prompt": "a person walks", "seconds": null, "settings": {"guidance": 3}}',
     ]
-    assert list(items_from_file(write(tmp_path, "p.jsonl", "\n".join(lines)), defaults=defaults)) == [
+    assert items_of(write(tmp_path, "p.jsonl", "\n".join(lines)), defaults=defaults) == [
         Item("a person bows", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0}),
         Item("a person waves", None, 2.0, (), 0, 1, "stroller", {"fps": 60.0}),
         Item("a person walks", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0, "guidance": 3.0}),
     ]
     table = write(tmp_path, "p.csv", "prompt,variants,seed\na person bows,1,\na person waves,,9\n")
-    found = [(item.variants, item.seed) for item in items_from_file(table, defaults=defaults)]
+    found = [(item.variants, item.seed) for item in items_of(table, defaults=defaults)]
     assert found == [(1, 1), (3, 9)]
     assert [item.variants for item in right_items(read_arguments(["a person bows"], defaults))] == [3]
 
@@ -180,13 +181,13 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
 def test_tags_of_the_command_come_beside_those_of_a_line(tmp_path: Path) -> None:
     defaults = defaults_of(tags=["shot=010", "walk"])
     table = write(tmp_path, "p.csv", "prompt,tags\na person walks,walk; take 2\na person bows,\n")
-    found = [item.tags for item in items_from_file(table, defaults=defaults)]
+    found = [item.tags for item in items_of(table, defaults=defaults)]
     assert found == [("walk", "take 2", "shot=010"), ("shot=010", "walk")]
     assert [item.tags for item in right_items(read_arguments(["a person bows"], defaults))] == [("shot=010", "walk")]
     for wrong in ("3", "[{}]"):
         line = f'{{"prompt": "a person bows", "tags": {wrong}}}'
         with pytest.raises(InvalidItems, match="tags"):
-            list(items_from_file(write(tmp_path, "p.jsonl", line), defaults=defaults))
+            items_of(write(tmp_path, "p.jsonl", line), defaults=defaults)
 
 
 @pytest.mark.parametrize(
@@ -214,7 +215,7 @@ def test_no_file_breaks_the_reader(tmp_path_factory: pytest.TempPathFactory, con
     path = tmp_path_factory.getbasetemp() / f"any.{ending}"
     path.write_bytes(content)
     try:
-        items = list(items_from_file(str(path)))
+        items = items_of(str(path))
     except InvalidInput:
         return
     assert items

@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from marey.client import rows
-from marey.client.rows import items_from_file, read_evaluation_prompts
+from marey.client.rows import read_evaluation_prompts
 from marey.client.text_files import MAX_LINE
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, Item
 from marey.items.problems import InvalidItems
+from tests.support.rows import items_of
 
 CSV = b"prompt,seed\na person walks,1\na person bows,2\n"
 PACKED = gzip.compress(CSV, mtime=0)
@@ -26,13 +27,13 @@ MEMORY_MIB = 64
 MEASURED = """
 import re, sys
 from pathlib import Path
-from marey.client.rows import items_from_file
+from marey.client.rows import read_file, right_items
 from marey.core.errors import TooLarge
 def peak():  # of this program alone: ru_maxrss begins at what the parent had
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
 before = peak()
 try:
-    list(items_from_file(sys.argv[1]))
+    list(right_items(read_file(sys.argv[1])))
 except TooLarge as error:
     print(error)
 print((peak() - before) // 1024)
@@ -48,7 +49,7 @@ def written(folder: Path, name: str, content: bytes) -> str:
 
 def refusal(folder: Path, name: str, content: bytes, kind: type[MareyError] = TooLarge) -> str:
     with pytest.raises(kind) as caught:
-        list(items_from_file(written(folder, name, content)))
+        items_of(written(folder, name, content))
     assert caught.value.hint is not None
     return str(caught.value)
 
@@ -62,18 +63,18 @@ def read_in_a_child(path: str) -> tuple[str, int]:
 
 @pytest.mark.parametrize("name", ["p.csv.gz", "P.CSV.GZ", "p.csv"])
 def test_a_packed_file_is_read_like_the_file_in_it(tmp_path: Path, name: str) -> None:
-    assert list(items_from_file(written(tmp_path, name, gzip.compress(CSV)))) == ITEMS
+    assert items_of(written(tmp_path, name, gzip.compress(CSV))) == ITEMS
 
 
 def test_a_packed_file_may_have_several_members_and_a_mark_of_its_encoding(tmp_path: Path) -> None:
     half = len(CSV) // 2
     content = gzip.compress(b"\xef\xbb\xbf" + CSV[:half]) + gzip.compress(CSV[half:])
-    assert list(items_from_file(written(tmp_path, "p.csv.gz", content))) == ITEMS
+    assert items_of(written(tmp_path, "p.csv.gz", content)) == ITEMS
 
 
 def test_a_packed_file_on_stdin_is_known_by_its_first_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(gzip.compress(CSV))))
-    assert list(items_from_file("-")) == ITEMS
+    assert items_of("-") == ITEMS
 
 
 def test_a_packed_file_of_an_evaluation_is_read_too(tmp_path: Path) -> None:
@@ -98,13 +99,13 @@ def test_a_packed_file_of_an_evaluation_is_read_too(tmp_path: Path) -> None:
 )
 def test_what_is_no_text_says_what_it_is(tmp_path: Path, name: str, content: bytes, said: str) -> None:
     with pytest.raises(InvalidInput, match=said):
-        list(items_from_file(written(tmp_path, name, content)))
+        items_of(written(tmp_path, name, content))
 
 
 def test_a_wrong_byte_far_down_is_told_with_its_line(tmp_path: Path) -> None:
     lines = [b"prompt", *[b"a person walks %d steps" % n for n in range(3000)], b"gar\xe7on"]
     with pytest.raises(InvalidFile, match="line 3002: is not UTF-8"):
-        list(items_from_file(written(tmp_path, "p.csv", b"\r\n".join(lines))))
+        items_of(written(tmp_path, "p.csv", b"\r\n".join(lines)))
 
 
 @on_linux
@@ -133,7 +134,7 @@ def test_a_file_over_the_limit_is_not_even_read(tmp_path: Path) -> None:
     with path.open("wb") as stream:
         stream.truncate(MAX_BODY_BYTES + 1)
     with pytest.raises(TooLarge, match="is over 64 MiB"):
-        list(items_from_file(str(path)))
+        items_of(str(path))
 
 
 @on_linux
@@ -161,8 +162,8 @@ def test_a_line_without_an_end_is_refused(tmp_path: Path) -> None:
 def test_a_quote_that_is_never_closed_is_told_as_that(tmp_path: Path) -> None:
     for tail in (b"", b"\na person walks" * 20_000):
         with pytest.raises(InvalidItems, match=r"line 3: is not CSV: .*a quote is never closed"):
-            list(items_from_file(written(tmp_path, "p.csv", b'prompt\na person walks\n"a person bows' + tail)))
+            items_of(written(tmp_path, "p.csv", b'prompt\na person walks\n"a person bows' + tail))
 
 
 def test_lines_of_old_macs_are_lines(tmp_path: Path) -> None:
-    assert list(items_from_file(written(tmp_path, "p.csv", CSV.replace(b"\n", b"\r")))) == ITEMS
+    assert items_of(written(tmp_path, "p.csv", CSV.replace(b"\n", b"\r"))) == ITEMS
