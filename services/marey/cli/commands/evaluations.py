@@ -316,10 +316,19 @@ def adherence(
     ] = None,
     settings: evaluating.Settings = None,
     prompts: Annotated[
-        str, typer.Option("--prompts", help="Set of prompts: evaluation, blind, development or fresh.")
+        str,
+        typer.Option(
+            "--prompts",
+            help="A set of test prompts that Marey has: evaluation, development, blind or fresh; no file.",
+        ),
     ] = "evaluation",
     captions: Annotated[
-        Path | None, typer.Option("--captions", metavar="DATA", help="A prepared folder: its validation captions.")
+        Path | None,
+        typer.Option(
+            "--captions",
+            metavar="DATA",
+            help="A prepared folder: its validation captions in place of the test prompts.",
+        ),
     ] = None,
     every: Annotated[int, typer.Option("--every", min=1, help="Only each K-th prompt, for a quick look.")] = 1,
     steers: Annotated[int, typer.Option("--steers", min=0, help="Live sessions that are steered.")] = 0,
@@ -328,7 +337,10 @@ def adherence(
     output: ReportFolder = None,
     as_json: console.Json = False,
 ) -> None:
-    """Check whether the motions of a bundle do what their prompts say. Needs no server and no evaluator."""
+    """Check whether the motions of a bundle do what their prompts say, on test prompts that Marey has.
+
+    Needs no server and no evaluator. Prompts of your own are measured by `marey eval run --split FILE`.
+    """
     from marey.cli.roles.adherence import judge_adherence
 
     with console.bar() as bar:
@@ -413,7 +425,11 @@ def studio(
     output: ReportFolder = None,
     as_json: console.Json = False,
 ) -> None:
-    """Measure a bundle on a studio's list of 300 prompts: motions that show them, and flagged ones. Needs no server."""
+    """Measure a bundle on a list of 300 prompts that Marey has, written as a games studio would send it.
+
+    Counts motions that show their prompt, and those that are flagged. The list is no file of yours, and shares no
+    prompt with the sets of `marey eval adherence`. Needs no server.
+    """
     from marey.cli.roles.actions import measure_studio
 
     _measure(lambda how: measure_studio(bundle, how), seeds, settings, threads, output, as_json)
