@@ -154,3 +154,11 @@ def test_an_ending_of_two_parts_names_its_own_format(walk: Path) -> None:
     said = run(walk, "-o", walk.with_name("a.smplx.npz"), "--mirror", code=2)
     assert "SMPL-X model" in said
     assert not walk.with_name("a.smplx.npz").exists()
+
+
+def test_a_prompt_that_the_model_does_not_know_is_refused_before_anything_is_generated(walk: Path) -> None:
+    out = walk.with_name("out.npz")
+    edits = ("--extend", "1", "--prompt", "asdf qwer zxcv", "--bundle", "hgm3-starter")
+    said = run(walk, "-o", out, *edits, "--scope", "refuse", code=2)
+    assert "names an action that the model does not know: 'asdf qwer" in said
+    assert not out.exists()
