@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import dropwhile, pairwise
 from typing import Literal
 
 from marey.vocabulary.inflection import verb_forms
@@ -43,6 +43,9 @@ _TO = frozenset(["to", "at", "toward", "towards", "for"])
 _LIKE = frozenset(["like", "as"])
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we"])
 _NAMELESS = _PRONOUNS | {"someone", "somebody"}
+_INDEFINITE = frozenset(["a", "an", "another"])
+_LIGHT = frozenset(["do", "make", "give", "take", "have", "get", "perform", "be"])
+"""Verbs whose object is an action: "does a shimmy"."""
 _MAX_SUBJECT = 5
 """Words within which the subject stands."""
 
@@ -50,9 +53,14 @@ _MAX_SUBJECT = 5
 class Flagger:
     """Reads flags from the words of a prompt."""
 
-    def __init__(self, lexicon: Lexicon, lists: WordLists) -> None:
-        """Keep the tables."""
+    def __init__(self, lexicon: Lexicon, lists: WordLists, travels: frozenset[str]) -> None:
+        """Keep the tables.
+
+        Args:
+            travels: ids of actions whose words say travel: what stands behind their verbs is a place.
+        """
         self._lexicon = lexicon
+        self._travels = travels
         self._lists = lists
         self._likened = lists.likened | {form for verb in lists.likened for form in verb_forms(verb)}
 
@@ -63,7 +71,8 @@ class Flagger:
         if any(text in lists.negations for text in texts) or ("rather", "than") in pairwise(texts):
             yield "negation"
         verbs = {match.start for match in found if match.end - match.start == 1}
-        if any(word.base in lists.objects and at not in verbs for at, word in enumerate(words)):
+        listed = any(word.base in lists.objects and at not in verbs for at, word in enumerate(words))
+        if listed or any(self._handles(words, at) for at in range(len(words))):
             yield "objects"
         if any(self._counts(words, at) for at in range(len(words))):
             yield "counts"
@@ -91,6 +100,25 @@ class Flagger:
             return False
         after = words[at + 1] if at + 1 < len(words) else Word("", "")
         return after.base not in self._lists.uncounted and after.text.removesuffix("s") not in self._lists.uncounted
+
+    def _handles(self, words: list[Word], at: int) -> bool:
+        """Return True if a verb, but one of travel, is followed by "a" and a noun that is in no list: "swings a
+        halberd", but not "walks a tightrope"."""
+        verb, rest = words[at], words[at + 1 :]
+        if not self._lexicon.is_verb_form(verb.text) or not rest or rest[0].text not in _INDEFINITE:
+            return False
+        node = self._lexicon.root.get(verb.base)
+        meanings = () if node is None else node.meanings
+        if verb.base in _LIGHT or any(each.action in self._travels and not each.near for each in meanings):
+            return False
+        noun, after = [*(word.text for word in dropwhile(self._is_skipped, rest[1:])), "", ""][:2]
+        if len(noun) < 3 or not noun.isalpha() or self._is_english(noun) or self._is_english(_single(noun)):
+            return False
+        lists = self._lists  # "a timid bow" and "a series of" name no object
+        return not after or (after != "of" and after in lists.breaks | lists.prepositions | lists.auxiliaries)
+
+    def _is_skipped(self, word: Word) -> bool:
+        return word.text in self._lists.skipped
 
     def _several(self, words: list[Word]) -> bool:
         """Return True if more than one person is named, or a person beside the one who acts."""

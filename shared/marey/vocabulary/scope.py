@@ -138,7 +138,10 @@ class ScopeMatcher:
         lexicon = Lexicon(vocabulary, lists.other_verbs, lists.idioms)
         self._vocabulary = vocabulary
         self._phrases = PhraseFinder(lexicon, lists)
-        self._flagger = Flagger(lexicon, lists)
+        travels = frozenset(
+            action.id for action in vocabulary.actions.values() if action.in_place and not action.kind_of
+        )
+        self._flagger = Flagger(lexicon, lists, travels)
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""

@@ -60,6 +60,20 @@ def test_the_action_of_an_in_scope_prompt_is_found() -> None:
     assert len(wrong) <= 3, wrong
 
 
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "a man walks a slackline",  # a place, or the way of it
+        "he makes a flourish",  # an action
+        "the boxer throws a nifty jab",
+        "she performs a series of jumps",
+        "a person raises the roof",
+    ],
+)
+def test_a_noun_in_no_list_is_an_object_only_behind_a_verb_of_the_hands(prompt: str) -> None:
+    assert "objects" not in match_scope(prompt, ALL).flags
+
+
 def test_a_prompt_out_of_scope_is_right_only_as_unknown() -> None:
     dog = next(prompt for prompt in DEVELOPMENT if prompt.text == "the dog barks")
     assert is_right(dog, match_scope(dog.text, ALL))
@@ -95,6 +109,9 @@ def test_verdicts_of_a_bundle_with_few_actions(
         ("he does not wave", "negation"),
         ("walks without moving the arms", "negation"),
         ("throws a ball", "objects"),
+        ("a warrior swings a halberd", "objects"),
+        ("throws another boomerang at the wall", "objects"),
+        ("she lifts a big kettlebell", "objects"),
         ("kicks three times", "counts"),
         ("two people dance", "several-people"),
         ("the dog barks", "other-subject"),
