@@ -14,6 +14,8 @@ import pytest
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
 from marey.exporters import Coordinates, exporters
 from marey.motion.export_options import ExportOptions
+from marey.motion.io.bvh import BvhClip
+from marey.motion.io.bvh_write import format_bvh
 from marey.motion.io.convert import as_motion_clip
 from marey.motion.io.glb_read import parse_glb
 from marey.motion.io.rig_bvh import parse_bvh_rig
@@ -28,7 +30,7 @@ from marey.motion.rigs.joint_map import map_joints
 from marey.motion.rigs.rename import renamed
 from marey.motion.rigs.rig import MAX_JOINTS
 from marey.motion.rigs.words import read_names
-from marey.motion.rotations import angle_between
+from marey.motion.rotations import about, angle_between, multiply, rotate
 from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
 from tests.support.changed_rigs import Change
 from tests.support.walker import walker
@@ -104,6 +106,33 @@ def test_a_bvh_rig_has_its_unit_told_by_the_body():
     rig = parse_bvh_rig(data, "x.bvh")
     assert rig.unit == 1.0
     assert RigBody.of(rig).leg == pytest.approx(0.8, abs=1e-3)
+
+
+def legs_up(sitting: bool) -> bytes:
+    """Return a body as BVH whose legs point up where nothing is turned, as iClone writes them."""
+    over = about("X", np.pi)
+    offsets, rotations = HUMANML3D.offsets.copy(), np.tile([1.0, 0.0, 0.0, 0.0], (WALK.frames, 22, 1))
+    for side in "LR":
+        joints = [HUMANML3D.index(f"{side}_{name}") for name in ("hip", "knee", "ankle", "foot")]
+        offsets[joints[1:]] = rotate(over, offsets[joints[1:]])
+        rotations[:, joints[0]] = multiply(rotations[:, joints[0]], over)
+        rotations[:, joints[1:]] = multiply(multiply(over, rotations[:, joints[1:]]), over)
+        if sitting:
+            rotations[:, joints[0]] = multiply(about("X", -1.5), rotations[:, joints[0]])
+    skeleton = HUMANML3D.with_offsets(offsets)
+    clip = BvhClip(skeleton, rotations, WALK.root.astype(float), None, 20.0, np.full((22, 3), np.nan))
+    return format_bvh(clip).encode()
+
+
+@pytest.mark.parametrize(("sitting", "pose"), [(False, "is the first frame"), (True, "is the one without rotations")])
+def test_a_bvh_rest_pose_that_is_a_guess_is_noted(sitting, pose):
+    rig = parse_bvh_rig(legs_up(sitting), "x.bvh")
+    (note,) = [note for note in rig.notes if "rest pose" in note]
+    assert pose in note
+    assert "begins with a T-pose" in note
+    assert RigBody.of(rig).standing is not sitting
+    data = exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "m", "y"))
+    assert not [note for note in parse_bvh_rig(data, "x.bvh").notes if "rest pose" in note]
 
 
 @pytest.mark.parametrize("seed", range(6))

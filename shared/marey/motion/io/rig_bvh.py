@@ -2,7 +2,8 @@
 
 All rotations zero need not be a rest pose: iClone writes bones that all point along one axis. The rest pose is the
 first frame where that frame stands apart from the motion, as a T-pose does, or where it stands and the zero pose does
-not. The format has no unit: the one that makes the body nearest to a person is taken, and noted.
+not. A pose that is only taken because no other is better is noted as a guess. The format has no unit: the one that
+makes the body nearest to a person is taken, and noted.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ UNITS = ("cm", "m", "in", "mm", "ft")
 FIGURE, PERSON = (0.25, 2.5), (0.55, 1.15)
 """Metres of legs: of any figure, for which the usual unit is kept, and of a person, from which another unit is told."""
 
+FROM_FRAME, FROM_ZERO = "the rest pose is the first frame", "the rest pose is the one without rotations"
+BETTER = "a file that begins with a T-pose gives better motions"
+
 
 def parse_bvh_rig(data: bytes, where: str = "bvh") -> Rig:
     """Read the rig of a BVH file.
@@ -40,10 +44,12 @@ def parse_bvh_rig(data: bytes, where: str = "bvh") -> Rig:
     sha256 = hashlib.sha256(data).hexdigest()
     zero = _rig(clip, np.tile(IDENTITY, (len(clip.skeleton), 1)), where, sha256)
     first = _rig(clip, global_rotations(clip.skeleton, clip.rotations[:1])[0], where, sha256)
-    apart = first_frame_stands_apart(clip)
-    chosen = first if apart or (_stands(first) and not _stands(zero)) else zero
-    notes = ("the rest pose is the first frame",) if chosen is first else ()
-    return _with_unit(replace(chosen, notes=(*clip.notes, *notes)))
+    if first_frame_stands_apart(clip):
+        return _with_unit(replace(first, notes=(*clip.notes, FROM_FRAME)))
+    if _stands(zero):
+        return _with_unit(replace(zero, notes=clip.notes))
+    chosen, found = (first, FROM_FRAME) if _stands(first) else (zero, FROM_ZERO)
+    return _with_unit(replace(chosen, notes=(*clip.notes, f"{found}, which need not be one: {BETTER}")))
 
 
 def _rig(clip: BvhClip, world: Array, where: str, sha256: str) -> Rig:
