@@ -9,8 +9,11 @@ import numpy as np
 
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import forward_kinematics, global_rotations
+from marey.motion.retarget.source import Source
+from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
+from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import about, conjugate, from_rotvec, multiply, rotate, to_matrix
 from marey.motion.skeleton import HUMANML3D
 from marey.motion.units import Z_TO_Y, Up
@@ -164,3 +167,11 @@ def lively(clip: MotionClip, seed: int) -> MotionClip:
     return MotionClip.of(
         clip.skeleton, rotations, root - [0, lowest, 0], clip.contacts, clip.fps, manifest=clip.manifest
     )
+
+
+def source_on_rig(motion: RiggedMotion) -> Source:
+    """Return a motion on a rig as one to retarget."""
+    body = RigBody.of(motion.rig)
+    world, places = motion.world()
+    turned = multiply(world, conjugate(multiply(body.upright, motion.rig.orientations)))
+    return Source(body, turned, places, motion.contacts, motion.fps)

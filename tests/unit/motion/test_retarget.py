@@ -13,10 +13,9 @@ from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import source_of
 from marey.motion.rigs.body import RigBody
-from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import angle_between
 from marey.motion.skeleton import HUMANML3D
-from tests.support.changed_rigs import Change, lively
+from tests.support.changed_rigs import Change, lively, source_on_rig
 from tests.support.walker import walker
 
 WALK = walker(seconds=3)
@@ -72,26 +71,15 @@ def test_bones_of_a_reference_skeleton_keep_their_length_and_left_stays_left(nam
 def test_from_one_rig_to_another_and_back_nothing_is_lost():
     source = source_of(WALK)
     there = on_body(WALK, RigBody.of(Change(3, "a", 5, 0.01, "z").rig()))
-    back = retarget(as_source(there), source.body).world()[1]
+    back = retarget(source_on_rig(there), source.body).world()[1]
     assert np.linalg.norm(back - WALK.joints, axis=-1).max() <= 5e-3
 
 
 def test_to_a_body_of_other_proportions_and_back():
     source = source_of(LIVELY)
     there = on_body(LIVELY, load_body("mixamo"))
-    back = retarget(as_source(there), source.body).world()[1]
+    back = retarget(source_on_rig(there), source.body).world()[1]
     assert np.linalg.norm(back - LIVELY.joints, axis=-1).mean() <= 0.02
-
-
-def as_source(motion: RiggedMotion):
-    """Return a motion on a rig as one to retarget."""
-    from marey.motion.retarget.source import Source
-    from marey.motion.rotations import conjugate, multiply
-
-    body = RigBody.of(motion.rig)
-    world, places = motion.world()
-    turned = multiply(world, conjugate(multiply(body.upright, motion.rig.orientations)))
-    return Source(body, turned, places, motion.contacts, motion.fps)
 
 
 def test_helpers_of_unreal_follow_hands_and_feet():
