@@ -23,7 +23,7 @@ from marey.data.prepare import CaptureSet, retarget_file
 from marey.generate import load
 from marey.motion import MotionClip, edit
 from marey.motion.arrange import placement_of
-from marey.motion.edits.loop_search import stands
+from marey.motion.edits.loop_feet import standing_spans, supports
 from marey.motion.feet import find_contacts, runs, skate
 from marey.motion.pose import solve_pose
 from marey.motion.rotations import rotate
@@ -88,8 +88,7 @@ def _feet(clip: MotionClip, loop: MotionClip, played: MotionClip) -> Iterator[st
     usual, found = (skate(c.joints, s, c.skeleton, c.fps) for c, s in ((clip, source), (played, three)))
     if found > 1.1 * usual + 0.0021:
         yield f"feet slide at {1000 * found:.1f} mm/s, source {1000 * usual:.1f}"
-    feet = stands(three).T
-    spans = sorted((begin, end, foot) for foot, each in enumerate(feet) for begin, end in runs(each))
+    spans = standing_spans(supports(played.joints, three, played.skeleton, played.fps))
     blend = round(0.3 * clip.fps)
     for (_, end, foot), (begin, _, other) in pairwise(spans):
         if foot == other and any(end - 1 <= s + blend and begin >= s - blend for s in _seam_frames(loop)):
@@ -112,7 +111,7 @@ def _kept(clip: MotionClip, loop: MotionClip) -> Iterator[str]:
     own = slice(blend["first"], last - first + 1 - blend["last"])
     if (off := float(np.abs(placed[own] - clip.joints[first : last + 1][own]).max(initial=0.0))) > 1e-4:
         yield f"frames outside the blend differ by {1000 * off:.2f} mm"
-    feet = stands(find_contacts(clip.joints, clip.skeleton, clip.fps)).T
+    feet = supports(clip.joints, find_contacts(clip.joints, clip.skeleton, clip.fps), clip.skeleton, clip.fps).T
     steps = [sum(first < begin <= last for begin, _ in runs(each)) for each in feet]
     if min(steps) == 0 and about["cycle"]["seconds"] < 2 - 1e-6:
         yield f"{about['cycle']['seconds']:g} s without a step of each foot"

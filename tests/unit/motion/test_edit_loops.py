@@ -10,7 +10,12 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.motion import MotionClip, edit
 from marey.motion.arrange import placement_of
+from marey.motion.edits.loop_bars import Bars, Fault
+from marey.motion.edits.loop_blend import closed
+from marey.motion.edits.loop_feet import onsets, standing_spans, stands, supports
+from marey.motion.edits.loop_search import cycles
 from marey.motion.feet import find_contacts, skate
+from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import solve_pose
 from marey.motion.rotations import about, from_rotvec, multiply, rotate
 from marey.motion.skeleton import HUMANML3D
@@ -27,9 +32,13 @@ def walk() -> MotionClip:
 
 def walked(seconds: float = 6.0) -> MotionClip:
     """A walk that sways a little, so that no two cycles are equal."""
-    body = bodies.Body(seconds, speed=lambda t: 1.1 + 0 * t)
+    return swaying(bodies.Body(seconds, speed=lambda t: 1.1 + 0 * t))
+
+
+def swaying(body: bodies.Body) -> MotionClip:
+    """A body whose arms and trunk swing with its steps, and drift a little."""
     pose = solve_pose(body.joints(), HUMANML3D, fps=bodies.FPS)
-    rotations, phase = pose.rotations.copy(), 2 * np.pi * 0.9 * np.arange(len(pose.root)) / bodies.FPS
+    rotations, phase = pose.rotations.copy(), np.pi * body.cadence * np.arange(len(pose.root)) / bodies.FPS
     for number, name in enumerate(("spine1", "spine2", "neck", "L_shoulder", "R_shoulder", "L_elbow", "R_elbow")):
         joint = HUMANML3D.index(name)
         swing = np.outer(np.sin(phase + (np.pi if name[0] == "L" else 0.0)), [0.4, 0.1, 0.1])
@@ -37,6 +46,11 @@ def walked(seconds: float = 6.0) -> MotionClip:
     root = pose.root + np.outer(np.sin(2 * phase), [0.0, 0.01, 0.02])
     contacts = find_contacts(pose.joints, pose.skeleton, bodies.FPS)
     return MotionClip.of(pose.skeleton, rotations, root, contacts, bodies.FPS)
+
+
+def run() -> MotionClip:
+    """A run of four steps; its right foot never stands still for two frames."""
+    return swaying(bodies.Body(1.4, speed=lambda t: 3.5 + 0 * t, duty=0.2, cadence=3.0))
 
 
 def idle(seconds: float) -> MotionClip:
@@ -157,3 +171,56 @@ def test_a_loop_in_place_stays_there(walk):
     assert loop.manifest["travel"]["z"] > 0.5
     steps = np.linalg.norm(np.diff(np.concatenate([loop.joints, loop.joints[1:3]]), axis=0), axis=-1)
     assert steps[loop.frames - 1].max() <= steps[: loop.frames - 1].max() + 2e-3
+
+
+def test_a_run_has_steps_where_its_contacts_are_not_found():
+    clip = run()
+    assert not clip.contacts[:, 2:].any()
+    feet = supports(clip.joints, clip.contacts, clip.skeleton, clip.fps)
+    begins = [(begin, foot) for begin, _, foot in standing_spans(feet)]
+    assert [foot for _, foot in begins] == [0, 1, 0, 1, 0]
+    assert set(np.diff([begin for begin, _ in begins])) <= {6, 7}
+    (loop,) = edit(clip, [LOOP])
+    assert loop.manifest["loop"]["cycle"]["seconds"] == pytest.approx(2 / 3, abs=0.051)
+
+
+def test_a_walk_is_told_by_its_contacts_alone(walk):
+    assert (supports(walk.joints, walk.contacts, walk.skeleton, 20.0) == stands(walk.contacts)).all()
+
+
+def test_both_feet_step_in_the_cycle_wherever_its_seam_is():
+    clip = run()
+    feet = supports(clip.joints, clip.contacts, clip.skeleton, clip.fps)
+    steps = onsets(feet)
+    found = list(cycles(clip, clip.contacts, 6, 100))
+    assert found
+    for cycle in found:
+        for earlier in range(min(cycle.first, 6) + 1):
+            assert steps[cycle.first - earlier + 1 : cycle.last - earlier + 1].any(axis=0).all()
+
+
+def test_a_slower_blend_moves_a_runner_less_and_meets_the_source_at_both_ends():
+    clip = run()
+    cycle = next(each for each in cycles(clip, clip.contacts, 6, 100) if each.first >= 6)
+    usual, slower = (closed(clip, clip.contacts, cycle, 6, frames) for frames in (0.0, 0.25))
+    places = [forward_kinematics(clip.skeleton, each.rotations, each.root) for each in (usual, slower)]
+    np.testing.assert_allclose(places[1][:-6], places[0][:-6])
+    np.testing.assert_allclose(places[1][-1], slower.travel.places(places[1][0]), atol=1e-6)
+    way = [np.linalg.norm(np.diff(each[:, 0], axis=0), axis=-1) for each in places]
+    assert 0.88 < way[1][-5:-1].mean() / way[0][-5:-1].mean() < 0.97
+    assert way[1][[-6, -1]] == pytest.approx(way[0][[-6, -1]], rel=0.03)
+
+
+def test_slower_blends_are_tried_before_a_motion_is_refused(monkeypatch):
+    asked: list[float] = []
+
+    def noted(*given):
+        asked.append(given[4])
+        return closed(*given)
+
+    monkeypatch.setattr("marey.motion.edits.loop.closed", noted)
+    monkeypatch.setattr(Bars, "best", lambda *_: Fault(2.0, "a joint jumps"))
+    with pytest.raises(InvalidInput, match="a joint jumps"):
+        edit(walked(), [LOOP])
+    assert asked == sorted(asked)
+    assert set(asked) == {0.0, 0.04 * 6}

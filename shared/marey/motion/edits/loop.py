@@ -7,6 +7,7 @@ before its end (`loop_blend.py`); the first one that keeps all bars (`loop_bars.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 from marey.core.errors import InvalidInput
@@ -22,6 +23,9 @@ from marey.motion.rotations import about, rotate
 
 TRIED = 100
 """Candidates."""
+SLOWER = (0.0, 0.04)
+"""Shares of a blend's length that it shows less of the source, tried in this order; 0.04 is slower by 8 percent in the
+middle of the blend. In a run hardly a frame lies within the bars by itself."""
 
 
 def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
@@ -43,9 +47,11 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     contacts = clip.contacts if clip.contacts.any() else found_contacts(clip)
     window = max(int(values["blend"] * clip.fps + 1e-6), 1)
     bars, best = Bars(clip, window), None
-    for cycle in cycles(clip, contacts, window, TRIED):
-        done = closed(clip, contacts, cycle, window)
-        found = bars.best(done)
+    candidates = list(cycles(clip, contacts, window, TRIED))
+    for slower, cycle in product(SLOWER, candidates):
+        if slower and cycle.first < window:
+            continue
+        found = bars.best(closed(clip, contacts, cycle, window, slower * window))
         if isinstance(found, Closed):
             return _result(clip, found, cycle, values)
         best = found if best is None or found.excess < best.excess else best

@@ -9,7 +9,8 @@ import numpy as np
 
 from marey.motion.clip import MotionClip
 from marey.motion.edits.loop_blend import Bool, Closed
-from marey.motion.edits.loop_search import PERCENTILE, standing_spans, stands
+from marey.motion.edits.loop_feet import standing_spans, supports
+from marey.motion.edits.loop_search import PERCENTILE
 from marey.motion.feet import find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array
@@ -105,7 +106,8 @@ class Bars:
     def _foot_fault(self, play: Played) -> Fault | None:
         """Return the fault of feet: one stands twice in a row at a seam, or they slide more than in the source."""
         contacts = find_contacts(play.joints, self._clip.skeleton, self._clip.fps)
-        for (_, end, foot), (begin, _, other) in pairwise(standing_spans(stands(contacts))):
+        feet = supports(play.joints, contacts, self._clip.skeleton, self._clip.fps)
+        for (_, end, foot), (begin, _, other) in pairwise(standing_spans(feet)):
             around = (end - 1 <= seam + self._window and begin >= seam - self._window for seam in play.seams)
             if foot == other and any(around):
                 return Fault(2.0, f"the {('left', 'right')[foot]} foot stands twice in a row at the seam")

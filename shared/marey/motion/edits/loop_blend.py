@@ -3,7 +3,7 @@
 The frame after the last is the one after the first, moved on by the travel of a cycle. So the last frames fade from the
 source to the frames before `first`, moved on in the same way: at the end places, speeds and accelerations agree. Where
 the source begins too late for that, the difference at the end fades in by a Hermite curve. The seam of the loop may be
-anywhere in the blend.
+anywhere in the blend. A blend may also show a fraction of a frame less than it is long: joints move less in it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from marey.motion.filters import smootherstep
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import foot_chain, two_bone_knee
 from marey.motion.pose import aim_bones
+from marey.motion.resample import interpolate, interpolate_rotations
 from marey.motion.rotations import (
     Array,
     about,
@@ -103,12 +104,17 @@ class Closed:
         return replace(self, rotations=rotations, root=root, contacts=contacts, earlier=earlier)
 
 
-def travel_of_cycle(clip: MotionClip, contacts: Bool, cycle: Cycle) -> Travel:
+def travel_of_cycle(clip: MotionClip, contacts: Bool, cycle: Cycle, slower: float = 0.0) -> Travel:
     """Return the way from the first pose to the last: standing feet stay where they are.
 
     The turn fits all joints on the floor plane, the shift those feet that stand in both frames, or else all joints.
+
+    Args:
+        slower: frames by which the last pose is before the last frame.
     """
-    first, last = (clip.joints[frame][:, [0, 2]].astype(np.float64) for frame in (cycle.first, cycle.last))
+    from_ = clip.joints[cycle.first].astype(np.float64)
+    to = interpolate(clip.joints.astype(np.float64), np.array([cycle.last - slower]))[0]
+    first, last = from_[:, [0, 2]], to[:, [0, 2]]
     weights = np.ones(len(first))
     both = contacts[cycle.first] & contacts[cycle.last]
     held = [joint for joint, stays in zip(clip.skeleton.feet, both, strict=True) if stays]
@@ -117,26 +123,29 @@ def travel_of_cycle(clip: MotionClip, contacts: Bool, cycle: Cycle) -> Travel:
     a, b = (points - weights @ points for points in (first, last))
     cosine, sine = (weights @ (a * b)).sum(), (weights @ (a[:, 1] * b[:, 0] - a[:, 0] * b[:, 1]))
     angle = float(np.arctan2(sine, cosine))
-    from_, to = (clip.joints[frame].astype(np.float64) for frame in (cycle.first, cycle.last))
     gaps = to - rotate(about("Y", angle), from_)
     shift = (gaps[held] if held else gaps).mean(axis=0) * np.array([1.0, 0.0, 1.0])
     return Travel(angle, shift)
 
 
-def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int) -> Closed:
-    """Return the cycle with its last `window` frames blended."""
-    travel = travel_of_cycle(clip, contacts, cycle)
+def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int, slower: float = 0.0) -> Closed:
+    """Return the cycle with its last `window` frames blended.
+
+    Args:
+        slower: frames that the blend shows less of the source than it is long: it is slower, so that joints move less
+            at the seam. 0 where the source begins too late for a blend of two movements.
+    """
     window = min(window, cycle.last - cycle.first - 1)
+    slower = slower if cycle.first >= window else 0.0
+    travel = travel_of_cycle(clip, contacts, cycle, slower)
     whole = slice(cycle.first, cycle.last + 1)
     rotations = unroll(clip.rotations[whole].astype(np.float64))
     root = clip.root[whole].astype(np.float64)
     feet = contacts[whole].copy()
     end = slice(len(root) - 1 - window, len(root))
     if cycle.first >= window:
-        before = slice(cycle.first - window, cycle.first + 1)
-        blended = _cross_faded(clip, travel, rotations[end], root[end], before)
-        later = np.arange(window + 1) > window / 2
-        feet[end] = np.where(later[:, None], contacts[before], feet[end])
+        blended, stands = _cross_faded(clip, contacts, travel, cycle, window, slower)
+        feet[end] = stands
     else:
         blended = _faded_in(clip, travel, rotations, root, cycle, window)
     rotations[end], root[end] = blended
@@ -145,15 +154,31 @@ def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int) -> Close
     return Closed(unroll(rotations), root, feet, travel, window, min(window, cycle.first))
 
 
-def _cross_faded(clip: MotionClip, travel: Travel, rotations: Array, root: Array, before: slice) -> tuple[Array, Array]:
-    """Fade from the poses to those of the frames `before`, moved by the travel; feet keep to the paths of both."""
-    share = smootherstep(np.linspace(0.0, 1.0, len(root)))
-    theirs, place = travel.turns(clip.rotations[before]), travel.places(clip.root[before].astype(np.float64))
+def _cross_faded(
+    clip: MotionClip, contacts: Bool, travel: Travel, cycle: Cycle, window: int, slower: float
+) -> tuple[tuple[Array, Array], Bool]:
+    """Fade from the last frames to those before the first, moved by the travel; feet keep to the paths of both."""
+    frames = np.arange(window + 1.0)
+    share = smootherstep(frames / window)
+    times = frames - window - slower * share
+    mine, begun = cycle.last + times, cycle.first + slower + times
+    (rotations, root), (theirs, place) = (_at(clip, each) for each in (mine, begun))
+    theirs, place = travel.turns(theirs), travel.places(place)
     mixed = slerp(rotations, theirs, share[:, None])
     middle = root + share[:, None] * (place - root)
     joints = [forward_kinematics(clip.skeleton, r, p) for r, p in ((rotations, root), (theirs, place))]
     wanted = joints[0] + share[:, None, None] * (joints[1] - joints[0])
-    return with_feet(clip, mixed, middle, wanted), middle
+    later = frames > window / 2
+    stands = np.where(later[:, None], *(contacts[np.rint(each).astype(np.intp)] for each in (begun, mine)))
+    return (with_feet(clip, mixed, middle, wanted), middle), stands
+
+
+def _at(clip: MotionClip, times: Array) -> tuple[Array, Array]:
+    """Return rotations (n, J, 4) and root (n, 3) at times (n,), counted in frames."""
+    whole = np.rint(times).astype(np.intp)
+    if np.array_equal(whole, times):
+        return clip.rotations[whole].astype(np.float64), clip.root[whole].astype(np.float64)
+    return interpolate_rotations(clip.rotations, times), interpolate(clip.root.astype(np.float64), times)
 
 
 def _faded_in(

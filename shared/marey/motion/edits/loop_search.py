@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
-from marey.motion.feet import runs
+from marey.motion.edits.loop_feet import onsets, supports
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array
 
@@ -53,20 +53,14 @@ class Cycle:
     cost: float
 
 
-def stands(contacts: Bool) -> Bool:
-    """Return where each foot (T, 2), left and right, stands on ankle or toe."""
-    return np.stack([contacts[:, :2].any(axis=1), contacts[:, 2:].any(axis=1)], axis=1)
-
-
-def onsets(feet: Bool) -> Bool:
-    """Return the frames (T, 2) in which a foot begins to stand; never the first one."""
-    return np.concatenate([np.zeros((1, 2), bool), feet[1:] & ~feet[:-1]])
-
-
 def has_steps(clip: MotionClip, contacts: Bool) -> bool:
     """Return True for locomotion: both feet step, and the body travels."""
-    steps = onsets(stands(contacts)).sum(axis=0)
+    steps = onsets(_supports(clip, contacts)).sum(axis=0)
     return bool(steps.min() >= 1 and _way(clip)[-1] / clip.seconds > TRAVELS)
+
+
+def _supports(clip: MotionClip, contacts: Bool) -> Bool:
+    return supports(clip.joints, contacts, clip.skeleton, clip.fps)
 
 
 def cycles(clip: MotionClip, contacts: Bool, window: int, most: int) -> Iterator[Cycle]:
@@ -88,7 +82,7 @@ def cycles(clip: MotionClip, contacts: Bool, window: int, most: int) -> Iterator
     cost = _distances(clip, window) + STRAIGHT * _extra_turn(clip) + HASTE * _haste(clip)[:, None]
     allowed = _lengths(clip, SHORTEST_GAIT if steps else SHORTEST_STILL)
     if steps:
-        allowed &= _whole_gaits(contacts) & _travelling(clip)
+        allowed &= _whole_gaits(_supports(clip, contacts), window) & _travelling(clip)
     cost = np.where(allowed, cost, np.inf)
     for _ in range(most):
         first, last = np.unravel_index(int(cost.argmin()), cost.shape)
@@ -142,13 +136,16 @@ def _haste(clip: MotionClip) -> Array:
     return excess
 
 
-def _whole_gaits(contacts: Bool) -> Bool:
-    """Return the pairs (T, T) between which both feet step equally often, and at which the same feet stand."""
-    feet = stands(contacts)
+def _whole_gaits(feet: Bool, window: int) -> Bool:
+    """Return the pairs (T, T) between which both feet (T, 2) step equally often, and at which the same feet carry; and
+    between which both step wherever in the `window` frames before the seam will be."""
     counts = np.cumsum(onsets(feet), axis=0)
     steps = counts[None, :] - counts[:, None]
-    same = (feet[None, :] == feet[:, None]).all(axis=2)
-    return (steps[..., 0] == steps[..., 1]) & (steps[..., 0] >= 1) & same
+    both = (steps >= 1).all(axis=2)
+    whole = both & (steps[..., 0] == steps[..., 1]) & (feet[None, :] == feet[:, None]).all(axis=2)
+    for earlier in range(1, window + 1):
+        whole[earlier:, earlier:] &= both[:-earlier, :-earlier]
+    return whole
 
 
 def _distances(clip: MotionClip, window: int) -> Array:
@@ -178,8 +175,3 @@ def _seen(clip: MotionClip) -> Array:
         return np.concatenate([cos * x - sin * z, y, sin * x + cos * z], axis=1)
 
     return np.concatenate([turned(joints - place[:, None]), turned(velocity)], axis=1)
-
-
-def standing_spans(feet: Bool) -> list[tuple[int, int, int]]:
-    """Return (begin, end, foot) of each stand of feet (T, 2), in order of time; the end is exclusive."""
-    return sorted((begin, end, foot) for foot in range(2) for begin, end in runs(feet[:, foot]))
