@@ -17,8 +17,16 @@ from marey.core.sides import swap_sides, swap_sides_in
 from marey.editing.judge import judged
 from marey.motion import edit, load_npz, read_fbx, read_glb
 from marey.motion.arrange import placement_of
+from marey.motion.clip import MotionClip
 from marey.motion.edits.table import OPERATIONS
+from marey.motion.feet import clean_feet
 from marey.motion.io.bvh import read_bvh
+from marey.motion.pose import solve_pose
+from marey.motion.skeleton import HUMANML3D
+from marey.quality.clips import quality_of
+from marey.quality.limits import Expected
+from marey.quality.record import Flag
+from tests.support import bodies
 from tests.support.walker import walker
 
 
@@ -97,6 +105,28 @@ def test_nothing_is_written_when_something_cannot_be_done(walk: Path):
     assert "already exists" in run(walk, "-o", out, "--mirror", code=2)
     assert out.read_text() == "mine"
     assert sorted(path.name for path in walk.parent.iterdir()) == ["out.npz", "walk.npz"]
+
+
+def test_of_several_motions_the_one_that_cannot_be_edited_is_named(walk: Path):
+    short = walk.with_name("short.npz")
+    run(walk, "-o", short, "--trim", ":0.3")
+    said = run(walk, short, "-o", walk.with_name("cut"), "--trim", "1:", code=2)
+    assert f"{short}: --trim" in said or f"{short}: ops.0" in said
+
+
+def test_a_motion_in_place_is_not_flagged_for_its_sliding_feet():
+    joints, contacts = clean_feet(bodies.walker(turn=0), HUMANML3D, 20.0)
+    pose = solve_pose(joints, HUMANML3D, fps=20.0)
+    walk = MotionClip.of(pose.skeleton, pose.rotations, pose.root, contacts, 20.0)
+    (still,) = edit(walk, [{"op": "in-place"}])
+    measured = quality_of(still, Expected())
+    assert measured is not None
+    assert measured.flags == [Flag.SKATING]
+    assert judged(still).manifest["quality"]["flags"] == []
+    carried = MotionClip.of(  # it travels again, by another way than its feet
+        walk.skeleton, walk.rotations, 2 * walk.root * [1, 0.5, 1], contacts, 20.0, manifest=still.manifest
+    )
+    assert judged(carried).manifest["quality"]["flags"] == ["skating"]
 
 
 def test_every_operation_of_the_table_has_its_option():

@@ -6,23 +6,33 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
+import numpy as np
+
 from marey.core.errors import InvalidInput
 from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.prompt_frames import prompts_of
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
-from marey.quality.record import PromptMatch
+from marey.quality.record import Flag, PromptMatch
 from marey.selector.records import match_of
 from marey.text.actions import split_actions
 from marey.text.graph import SemanticGraph
 
+STAYS = 1e-3
+"""Metres on the floor within which the root of a motion in place stays."""
+
 
 def judged(clip: MotionClip) -> MotionClip:
-    """Return the clip with a quality record in its manifest; without one on skeletons that are not measured."""
+    """Return the clip with a quality record in its manifest; without one on skeletons that are not measured.
+
+    Feet of a motion whose travel was removed slide by intention: it is not flagged for that.
+    """
     about = clip.manifest
     quality = quality_of(clip, expected_by_prompts([str(text) for _, text in prompts_of(clip)]))
     if quality is None:
         return clip
+    if "travel" in about and np.ptp(clip.root[:, [0, 2]], axis=0).max() < STAYS:
+        quality = quality.model_copy(update={"flags": [flag for flag in quality.flags if flag is not Flag.SKATING]})
     record = quality.with_match(_match(clip)).model_dump(mode="json")
     return replace(clip, manifest={**about, QUALITY: record})
 

@@ -58,7 +58,12 @@ def edit_files(
     check_options([writer], export)
     made: list[tuple[Path, Path, MotionClip]] = []
     for source in sources:
-        clips = edit(_read(source), ops, load=lambda name: _read(Path(name)), model=model)
+        try:
+            clips = edit(_read(source), ops, load=lambda name: _read(Path(name)), model=model)
+        except InvalidInput as error:
+            if len(sources) > 1:
+                error.where = f"{source}: {error.where}" if error.where else str(source)
+            raise
         target = output if is_file else output / f"{source.stem}.{writer.extension}"
         made += [(source, path, judged(clip)) for path, clip in zip(_numbered(target, len(clips)), clips, strict=True)]
     _check_targets([path for _, path, _ in made], overwrite=overwrite)
