@@ -13,21 +13,29 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.generate.poses import with_poses
 from marey.generation.candidates import DrawPlan
+from marey.generation.constraints import choose
+from marey.generation.constraints.constraint_set import asked_of
 from marey.generation.constraints.curves import fades, smooth_open, through
 from marey.generation.constraints.draw import constrained_clips, constrained_request
 from marey.generation.constraints.paths import stand_clock
-from marey.generation.constraints.timing import NO_JUMPS, play_times
+from marey.generation.constraints.playing import played
+from marey.generation.constraints.timing import NO_JUMPS, Timing, play_times
 from marey.generation.port import Request
 from marey.items.constraints import read_constraints
 from marey.motion.arrange import placement_of
 from marey.motion.clip import MotionClip
 from marey.motion.edits.licences import terms_with
+from marey.motion.feet import clean_feet, skate
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.pose import solve_pose
+from marey.motion.resample import interpolate, interpolate_rotations
 from marey.motion.rotations import rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import Flag, read_quality
 from marey.registry import get_model, resolve
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
+from tests.support import bodies
 from tests.support.models import random_bundle
 
 FRAMES = 60
@@ -254,3 +262,42 @@ def test_a_standing_foot_has_one_moment() -> None:
     assert (np.diff(clock) >= 0).all()
     assert still[10:25].all()
     assert not still[27:33].any()
+
+
+def test_most_of_a_difference_of_speeds_is_played_faster() -> None:
+    timing = play_times(np.full(120, 1.0), np.full(60, 1.5), np.ones(60), 20.0, NO_JUMPS)
+    assert 1.15 < np.diff(timing.times)[10:-10].mean() < 1.25
+
+
+def steady_walk() -> MotionClip:
+    """A walk whose standing feet do not move."""
+    joints, contacts = clean_feet(bodies.walker(turn=0, cadence=1.8), HUMANML3D, 20.0)
+    pose = solve_pose(joints, HUMANML3D, fps=20.0)
+    return MotionClip.of(pose.skeleton, pose.rotations, pose.root, contacts, 20.0)
+
+
+def test_feet_stand_as_still_at_other_moments() -> None:
+    clip = steady_walk()
+    times = np.linspace(3.0, clip.frames - 4.0, round(1.2 * clip.frames))
+    motion = played(clip, Timing(times, (), 0.0))
+    turns, root = interpolate_rotations(clip.rotations, times), interpolate(clip.root.astype(float), times)
+    by_itself = forward_kinematics(HUMANML3D, turns, root)
+    stands = clip.contacts[np.floor(times).astype(int)] & clip.contacts[np.ceil(times).astype(int)]
+    speeds = [skate(joints, stands, HUMANML3D, 20.0) for joints in (motion.joints(HUMANML3D), by_itself)]
+    assert speeds[0] < 0.002
+    assert speeds[0] < 0.6 * speeds[1]
+
+
+def test_a_candidate_whose_toes_stand_stiller_is_better(generator: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = steady_walk()
+    drift = np.outer(np.linspace(0.0, 1.0, clip.frames), [0.0, 0.0, 0.002 * clip.frames])  # 4 cm/s
+    drifting = MotionClip.of(clip.skeleton, clip.rotations, clip.root + drift, clip.contacts, clip.fps)
+    ranks: list[float] = []
+    for made in (clip, drifting):
+        monkeypatch.setattr(choose, "fit_clip", lambda *_, made=made: made)
+        asked = asked_of((), HUMANML3D, clip.frames, 20.0)
+        fitted = choose.fit_candidate(made, request(generator), asked, 0.0)
+        sliding = read_quality(fitted.clip.manifest)
+        assert sliding is not None
+        ranks.append(fitted.rank[3] + choose.SLIDING * sliding.skate)
+    assert ranks[0] - ranks[1] == pytest.approx(choose.TOES * 0.04, abs=0.05)

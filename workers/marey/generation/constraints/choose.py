@@ -13,11 +13,13 @@ from marey.generation.export import judged
 from marey.generation.port import Request
 from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.place import at_origin
+from marey.motion.feet import find_contacts, skate
 from marey.quality.record import SHOWN, Flag, MotionQuality, PromptMatch, read_quality
 from marey.quality.selection import Candidate
 
-SLIDING, JERKING = 2.0, 0.3
-"""Weights beside `misfit`: of the share of sliding frames, and of the logarithm of how much jerk the fit added."""
+SLIDING, TOES, JERKING = 2.0, 6.0, 0.8
+"""Weights beside `misfit`: of the share of sliding frames, of the speed of standing toes in m/s, and of the logarithm
+of how much jerk the fit added."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ def fit_candidate(clip: MotionClip, request: Request, asked: ConstraintSet, misf
     quality = quality.with_constraints(errors)
     met = Flag.CONSTRAINT_MISSED not in quality.flags
     match = None if quality.match is None else quality.match.value
-    cost = misfit + SLIDING * quality.skate + JERKING * float(np.log(_jerk(made) / _jerk(clip)))
+    cost = misfit + SLIDING * quality.skate + TOES * _toes(made)
+    cost += JERKING * float(np.log(_jerk(made) / _jerk(clip)))
     rank = (met, match is None or match >= SHOWN, sound, -cost)
     return Fitted(
         replace(made, manifest={**made.manifest, QUALITY: quality.model_dump(mode="json")}), rank, request.seed
@@ -67,6 +70,12 @@ def _jerk(clip: MotionClip) -> float:
     """Return the mean jerk of joints, m/s³, 1 or more."""
     third = np.diff(clip.joints.astype(np.float64), 3, axis=0) * clip.fps**3
     return 1.0 + float(np.linalg.norm(third, axis=-1).mean()) if len(third) else 1.0
+
+
+def _toes(clip: MotionClip) -> float:
+    """Return the mean speed of standing toes, m/s."""
+    joints = clip.joints.astype(np.float64)
+    return skate(joints, find_contacts(joints, clip.skeleton, clip.fps), clip.skeleton, clip.fps)
 
 
 def _value(quality: MotionQuality | None) -> float:

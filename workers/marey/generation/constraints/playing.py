@@ -10,6 +10,7 @@ from marey.generation.constraints.timing import Timing
 from marey.motion.clip import MotionClip
 from marey.motion.feet import clean_feet
 from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.legs import follow_feet, foot_chain
 from marey.motion.pose import aim_bones
 from marey.motion.resample import interpolate, interpolate_rotations
 from marey.motion.rotations import Array, about, conjugate, from_rotvec, multiply, rotate, to_rotvec
@@ -27,9 +28,9 @@ def played(clip: MotionClip, timing: Timing) -> BodyMotion:
     rotations, root = clip.rotations.astype(np.float64), clip.root.astype(np.float64)
     turns, moved = interpolate_rotations(rotations, times), interpolate(root, times)
     contacts = clip.contacts[np.rint(times).astype(np.intp)]
-    if not timing.begins:
-        return BodyMotion(turns, moved, contacts)
     skeleton, span = clip.skeleton, round(BLEND_S * clip.fps)
+    if not timing.begins:
+        return _on_its_feet(clip, times, BodyMotion(turns, moved, contacts))
     for before, piece in zip(timing.pieces, timing.pieces[1:], strict=False):
         after = min(times[before.stop - 1] + 1, clip.frames - 1.0)  # that the piece before would have shown next
         next_turns = interpolate_rotations(rotations, np.array([after]))[0]
@@ -45,6 +46,19 @@ def played(clip: MotionClip, timing: Timing) -> BodyMotion:
     joints = forward_kinematics(skeleton, turns, moved)
     joints, contacts = clean_feet(joints, skeleton, clip.fps, contacts=contacts)
     return BodyMotion(aim_bones(joints, turns, skeleton), joints[:, 0], contacts)
+
+
+def _on_its_feet(clip: MotionClip, times: Array, motion: BodyMotion) -> BodyMotion:
+    """Return a clip at other moments with its feet where they are then: between frames, rotations and root that are
+    interpolated each by itself move a foot that stands."""
+    skeleton = clip.skeleton
+    before = motion.joints(skeleton)
+    joints, own = before.copy(), clip.joints.astype(np.float64)
+    for toe in skeleton.feet[1::2]:
+        foot = foot_chain(skeleton, toe)
+        joints[:, foot] = interpolate(own[:, foot], times)
+    follow_feet(before, joints, motion.contacts[:, 1::2], skeleton, clip.fps)
+    return BodyMotion(aim_bones(joints, motion.rotations, skeleton), joints[:, 0], motion.contacts)
 
 
 def _to(turns: Array, root: Array, there_turns: Array, there_root: Array, skeleton: Skeleton) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from marey.motion.rotations import Array, about, conjugate, from_rotvec, multipl
 from marey.motion.skeleton import HUMANML3D, Skeleton
 from marey.motion.support import clearance
 
-SHORTEST_S, LONGEST_S, PER_METRE_S = 0.4, 1.0, 1.5
+SHORTEST_S, LONGEST_S, PER_METRE_S = 0.4, 1.0, 2.25
 """Seconds of a fade, and seconds for each metre that a joint is away."""
 STANDS = 0.06
 """Metres over the floor up to which a toe stands."""

@@ -28,8 +28,9 @@ STILL = 0.4
 """Metres a second that are added to both speeds: under it they hardly differ."""
 CUT = 0.03
 """Cost of a frame that is not shown, beside a frame at speeds that differ by a factor of e."""
-STEADY = 2.5
-"""Weight of the play rate's own logarithm beside that of the speeds' ratio."""
+STEADY = 1.0
+"""Weight of the play rate's own logarithm beside that of the speeds' ratio: a play rate costs less jerk in the legs
+than longer steps."""
 SMOOTH_S = 0.2
 JUMP, JUMP_PER_METRE = 0.6, 20.0
 """Cost of going on at another moment: of each, and by the mean distance of joints."""
