@@ -22,6 +22,8 @@ REGISTERED = "pyproject.toml"
 NAMING = {
     REGISTERED: "the line that registers it",
     "models/packages/starter/pyproject.toml": "the package of bundles that has its bundle",
+    "models/packages/open/pyproject.toml": "the package of bundles that has another of its bundles",
+    "models/packages/open/LICENSE": "the terms of that bundle",
     "mkdocs.yml": "the list of pages",
     "workers/marey/evaluator/protocol/published.toml": "rows of the papers' tables",
     "tests/unit/evaluator/test_protocol.py": "reads these rows",

@@ -48,7 +48,7 @@ The same prompt, seed, settings and bundle give the same motion.""",
         memory="marey.models.mogo.memory:memory_model",
     ),
     tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
-    bundles={"mogo-starter": "marey-bundles-starter"},
+    bundles={"mogo-starter": "marey-bundles-starter", "mogo-open": "marey-bundles-open"},
     random_bundle="marey.models.mogo.bundle:random_bundle",
     live_adherence="marey.models.mogo.adherence:judge_streams",
     ablations=(
