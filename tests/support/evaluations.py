@@ -48,12 +48,14 @@ CLIPS = [
 PROMPTS = (EvaluationPrompt("walk", 2.0, "walk"), EvaluationPrompt("walk away"), EvaluationPrompt("walk on", 3.0))
 
 
-def write_generator(models: Path, name: str = GENERATOR, *, model: str = toy.QUEUE, weight: float = 0.0) -> None:
+def write_generator(
+    models: Path, name: str = GENERATOR, *, model: str = toy.QUEUE, weight: float = 0.0, licence: str = "MIT"
+) -> None:
     """A generator's bundle; another `weight` makes it another exact bundle."""
     with BundleWriter(models / name, overwrite=True) as writer:
         writer.add_part("masked", {"w": np.full(3, weight, np.float32)})
         writer.finish(
-            name=name, version="1", kind="generator", model=model, config="tiny", fps=20.0, licence="MIT",
+            name=name, version="1", kind="generator", model=model, config="tiny", fps=20.0, licence=licence,
             skeleton="humanml3d", layout="humanml3d-263",
             parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 10}},
             text=TextSpec(labeller="none", encoder_sha256="0" * 64),

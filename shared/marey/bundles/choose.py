@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 
 from marey.bundles.bundle import Bundle
@@ -17,28 +17,48 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
     """Return the generator bundle of a model (`hgm3`), a bundle's name, exact reference or path.
 
     Of a model's bundles it is the first that the model prefers (`ModelSpec.bundles`); else the first trained one by
-    name; else the first with random weights.
+    name; else the first with random weights. Bundles whose terms `MAREY_REQUIRE_LICENCE` refuses are passed over.
 
     Raises:
         NotFound: unknown bundle and unknown model.
-        InvalidBundle, Refused: as `find_bundle`.
+        InvalidBundle: as `find_bundle`.
+        Refused: as `find_bundle`, if every bundle of the model is.
     """
     config = config or settings()
     if "/" in name or name.startswith(".") or "@" in name or has_bundle(name, config):
         return find_bundle(name, config=config, verify=verify)
-    for known in preferred(name):
-        if has_bundle(known, config):
-            return find_bundle(known, config=config, verify=verify)
-    found = [b for b in list_bundles(config=config, kind="generator") if b.manifest.model == name]
-    if not found:
+    refused: Refused | None = None
+    for candidate in _bundles_of(name, config):
+        try:
+            return find_bundle(candidate, config=config, verify=verify)
+        except Refused as error:
+            refused = refused or error
+    if refused is None:
         known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))
         raise NotFound(
             f"no model or bundle is named {name!r}",
             hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder."
             + how_to_get(name),
         )
-    chosen = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name))
-    return find_bundle(chosen.manifest.name, config=config, verify=verify)
+    raise refused
+
+
+def _bundles_of(model: str, config: Settings) -> Iterator[str]:
+    """Yield the names of a model's bundles, the preferred ones first."""
+    yield from (known for known in preferred(model) if has_bundle(known, config))
+    found = [b.manifest for b in list_bundles(config=config, kind="generator") if b.manifest.model == model]
+    yield from (each.name for each in sorted(found, key=lambda manifest: (manifest.random, manifest.name)))
+
+
+def choose_live_bundle(model: str, *, config: Settings | None = None) -> Bundle:
+    """Return the bundle that live workers of a model load: the one that `MAREY_LIVE_MODEL` names, if it is of this
+    model; else as `choose_bundle`, which says what is raised."""
+    config = config or settings()
+    if config.live_model is not None:
+        bundle = choose_bundle(config.live_model, config=config)
+        if bundle.manifest.model == model:
+            return bundle
+    return choose_bundle(model, config=config)
 
 
 @contextmanager

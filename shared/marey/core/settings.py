@@ -242,8 +242,8 @@ class Settings(BaseSettings):
     default_model: str = defaults.MODEL
     """Model of items that name none."""
     live_model: str | None = None
-    """Model of live streams that name none. Unset = the only installed model that streams, or the only one of these
-    that has a bundle."""
+    """Model or bundle of live streams that name none; live workers of its model load that bundle. Unset = the only
+    installed model that streams, or the only one of these that has a bundle."""
     live_slots: int = Field(default=4, ge=0, le=1000)
     """Live streams of one worker at once."""
     streams_per_key: int = Field(default=4, ge=0, le=1000)

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from marey.bundles import choose_bundle, choose_evaluator, find_bundle, list_bundles
+from marey.bundles import choose_bundle, choose_evaluator, choose_live_bundle, find_bundle, list_bundles
 from marey.bundles.places import OPEN, STARTER, distributions, folders, installed
 from marey.core import checkout
-from marey.core.errors import NotFound
+from marey.core.errors import NotFound, Refused
 from marey.core.settings import Settings
 from marey.registry import get_model, model_names
 from tests.support.evaluations import write_generator
@@ -137,3 +137,25 @@ def test_of_a_models_bundles_the_preferred_one_is_used(tmp_path: Path, model: st
         write_generator(tmp_path, name, model=model)
         assert choose_bundle(model, config=config).manifest.name == name
     assert choose_bundle("a-studio", config=config).manifest.name == "a-studio"
+
+
+def test_bundles_whose_terms_are_refused_are_passed_over(tmp_path: Path) -> None:
+    config = Settings(home=tmp_path, models=tmp_path, require_licence="commercial")
+    model, preferred = next((name, get_model(name).bundles) for name in model_names() if get_model(name).bundles)
+    write_generator(tmp_path, next(iter(preferred)), model=model, licence="CC-BY-NC-4.0")
+    with pytest.raises(Refused, match="does not allow commercial use"):
+        choose_bundle(model, config=config)
+    write_generator(tmp_path, "a-studio", model=model, licence="CC-BY-4.0")
+    assert choose_bundle(model, config=config).manifest.name == "a-studio"
+    with pytest.raises(Refused):
+        choose_bundle(next(iter(preferred)), config=config)
+
+
+def test_live_workers_load_the_bundle_that_the_settings_name(tmp_path: Path) -> None:
+    for name, model in (("first", "walker"), ("second", "walker"), ("third", "runner")):
+        write_generator(tmp_path, name, model=model)
+    config = Settings(home=tmp_path, models=tmp_path)
+    named = {live: config.model_copy(update={"live_model": live}) for live in ("second", "third")}
+    assert choose_live_bundle("walker", config=config).manifest.name == "first"
+    assert choose_live_bundle("walker", config=named["second"]).manifest.name == "second"
+    assert choose_live_bundle("walker", config=named["third"]).manifest.name == "first"

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from marey.bundles import choose_bundle
+from marey.bundles import choose_live_bundle
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.core.settings import settings as configuration
 from marey.generation.port import Request
@@ -261,13 +261,13 @@ class LiveSessionPool:
 
 
 def create_live_model() -> LiveModel:
-    """Load the live model of `marey worker mogo`: the bundle of this machine.
+    """Load the live model of `marey worker mogo`: see `choose_live_bundle`.
 
     Raises:
-        NotFound, InvalidBundle: there is none, or a broken one.
+        NotFound, InvalidBundle, Refused: there is none, a broken one, or one whose terms the settings refuse.
     """
     chosen = configuration()
-    bundle = choose_bundle(MODEL, config=chosen)
+    bundle = choose_live_bundle(MODEL, config=chosen)
     if bundle.manifest.text is None:
         raise InvalidBundle("it does not read prompts", where=str(bundle.path))
     generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
