@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 import torch
@@ -20,15 +21,7 @@ def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], I
         parts: yields the losses of the parts of a step, each of which is freed before the next.
     """
     with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CPU], profile_memory=True) as profile:
-        module = build()
-        trained = [each for each in module.parameters() if each.requires_grad]
-        optimizer = torch.optim.AdamW(trained, fused=True)
-        for _ in range(2):
-            for loss in parts(module):
-                loss.backward()
-                del loss
-            optimizer.step()
-            optimizer.zero_grad(set_to_none=True)
+        _train(build(), parts, nullcontext)
     events = profile.profiler.kineto_results.events()  # type: ignore[union-attr]
     changes = sorted((e.start_ns(), e.nbytes()) for e in events if e.name() == "[memory]")  # pyright: ignore[reportAttributeAccessIssue]
     return max(np.cumsum([change for _, change in changes]))
@@ -40,18 +33,26 @@ def peak_on_gpu(build: Callable[[], nn.Module], parts: Callable[[nn.Module], Ite
     before = torch.cuda.memory_allocated()
     torch.cuda.reset_peak_memory_stats()
     with torch.device("cuda"):
-        module = build()
-        trained = [each for each in module.parameters() if each.requires_grad]
-        optimizer = torch.optim.AdamW(trained, fused=True)
-        for _ in range(2):
-            made = iter(parts(module))
-            while True:
-                with torch.autocast("cuda", torch.bfloat16):
-                    loss = next(made, None)
-                if loss is None:
-                    break
-                loss.backward()
-                del loss
-            optimizer.step()
-            optimizer.zero_grad(set_to_none=True)
+        _train(build(), parts, lambda: torch.autocast("cuda", torch.bfloat16))
     return torch.cuda.max_memory_allocated() - before
+
+
+def _train(
+    module: nn.Module,
+    parts: Callable[[nn.Module], Iterable[Tensor]],
+    forward: Callable[[], AbstractContextManager[object]],
+) -> None:
+    """Take two steps; each forward pass runs in a context of its own."""
+    trained = [each for each in module.parameters() if each.requires_grad]
+    optimizer = torch.optim.AdamW(trained, fused=True)
+    for _ in range(2):
+        losses = iter(parts(module))
+        while True:
+            with forward():
+                loss = next(losses, None)
+            if loss is None:
+                break
+            loss.backward()
+            del loss
+        optimizer.step()
+        optimizer.zero_grad(set_to_none=True)

@@ -1,4 +1,4 @@
-"""Capabilities of this machine's processor, for tests that need them."""
+"""Capabilities of this machine's processors, for tests that need them."""
 
 from __future__ import annotations
 
@@ -13,3 +13,6 @@ packs_bfloat16 = pytest.mark.skipif(
 
 PACKED_TYPES = [torch.float32, pytest.param(torch.bfloat16, marks=packs_bfloat16)]
 """Types of packed matrices."""
+
+on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+"""Beside the mark `gpu`, which chooses such tests."""

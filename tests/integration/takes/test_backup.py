@@ -251,9 +251,7 @@ def test_an_edit_of_another_tenants_motion_is_not_imported(
     parse_texts(engine)
     work(engine, folder_store)
     work(engine, folder_store)
-    with transaction(engine) as conn:
-        made = submit_edit(conn, NewEdit(motion_in(engine, source), [{"op": "mirror"}])).id
-    work(engine, folder_store, queue=EDIT_QUEUE)
+    made = mirrored(engine, folder_store, source)
     export_tenant(engine, folder_store, "default", tmp_path / "b")
     theirs = motion_in(engine, stranger)
     with engine.begin() as conn:
@@ -272,9 +270,7 @@ def test_an_erasure_leaves_jobs_of_other_tenants_alone(
     source = submit_items(engine, 1)
     parse_texts(engine)
     work(engine, folder_store)
-    with transaction(engine) as conn:
-        made = submit_edit(conn, NewEdit(motion_in(engine, source), [{"op": "mirror"}])).id
-    work(engine, folder_store, queue=EDIT_QUEUE)
+    made = mirrored(engine, folder_store, source)
     with engine.begin() as conn:  # a link that no import writes any more
         conn.execute(sa.text("INSERT INTO tenant (id) VALUES ('other')"))
         conn.execute(sa.text("UPDATE motion SET tenant_id = 'other' WHERE job_id = :job"), {"job": made})
@@ -282,6 +278,14 @@ def test_an_erasure_leaves_jobs_of_other_tenants_alone(
     with transaction(engine) as conn:
         assert erase(conn, "default", source, by="ann").edits == ()
         assert get_job(conn, "other", made).erased is None
+
+
+def mirrored(engine: sa.Engine, store: FolderStore, source: UUID) -> UUID:
+    """The finished job of an edit of a job's motion."""
+    with transaction(engine) as conn:
+        made = submit_edit(conn, NewEdit(motion_in(engine, source), [{"op": "mirror"}])).id
+    work(engine, store, queue=EDIT_QUEUE)
+    return made
 
 
 def forge_sources(folder: Path, job: UUID, motion: UUID) -> None:

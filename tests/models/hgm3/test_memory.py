@@ -16,6 +16,7 @@ from marey.models.hgm3.stage_masked import MaskedModule, MaskedObjective
 from marey.models.hgm3.stage_residual import piece_losses
 from marey.training.memory import MemoryEstimate
 from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
+from tests.support.processors import on_a_gpu
 
 
 def small(layers: int, width: int) -> HGM3Config:
@@ -64,7 +65,7 @@ def test_the_estimates_are_within_a_tenth_of_what_is_used(layers: int, width: in
 
 
 @pytest.mark.gpu
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@on_a_gpu
 def test_the_estimates_at_the_published_size_are_enough_on_a_gpu() -> None:
     """Fused attention saves less than the steps that are counted on a CPU: 1.10 GiB for 1.21 estimated on an H200."""
     for estimate, found in (

@@ -23,6 +23,7 @@ from marey.training.sentences import SentenceData
 from marey.training.staging import set_recompute
 from marey.training.texts import CaptionTexts
 from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
+from tests.support.processors import on_a_gpu
 
 PLAIN = replace(
     TINY,
@@ -123,7 +124,7 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int,
 
 
 @pytest.mark.gpu
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@on_a_gpu
 def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses() -> None:
     found = measured(PAPER, 4, recompute=False, peak=peak_on_gpu)
     estimate = memory_model(PAPER).estimate(4)

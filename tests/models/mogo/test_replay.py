@@ -18,11 +18,11 @@ from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.replay import Replayed
 from marey.models.mogo.streaming import StreamBatch
 from tests.support.prepared import text_features
+from tests.support.processors import on_a_gpu
 
 from .networks import columns, opened, prompts, transformer
 
 CUDA = torch.device("cuda", 0)
-on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
 
 
 def played(streams: StreamBatch, device: str | torch.device = "cpu") -> torch.Tensor:

@@ -13,6 +13,7 @@ from marey.models.momaskpp.memory import longest_samples, memory_model
 from marey.models.momaskpp.model import ScaleTransformer
 from marey.models.momaskpp.stage_masked import masked_losses
 from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu
+from tests.support.processors import on_a_gpu
 
 
 def small(layers: int, width: int, conditioning: Conditioning) -> MoMaskPPConfig:
@@ -50,7 +51,7 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(
 
 
 @pytest.mark.gpu
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@on_a_gpu
 def test_the_estimate_at_the_published_size_is_enough_on_a_gpu() -> None:
     """Fused attention saves less than the steps that are counted on a CPU: 1.21 GiB for 1.53 estimated on an H200."""
     found = measured(PAPER, 64, peak_on_gpu)

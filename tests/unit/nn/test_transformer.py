@@ -11,7 +11,7 @@ from torch import nn
 from marey.nn.ema import WeightAverage, update_average, warm_momentum
 from marey.nn.ragged import pad_length
 from marey.nn.transformer import Transformer, dropout, sinusoidal_positions
-from tests.support.processors import PACKED_TYPES
+from tests.support.processors import PACKED_TYPES, on_a_gpu
 
 
 def transformer(*, norm_first: bool = True) -> Transformer:
@@ -102,7 +102,7 @@ def test_attention_in_training_equals_that_of_inference() -> None:
 
 
 @pytest.mark.gpu
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
+@on_a_gpu
 @pytest.mark.parametrize(("width", "heads", "size"), [(256, 4, 80), (256, 4, 139), (192, 4, 64)])
 @pytest.mark.parametrize("bf16", [False, True])
 def test_gradients_on_a_gpu_are_those_of_the_processor(width: int, heads: int, size: int, bf16: bool) -> None:
