@@ -34,13 +34,14 @@ class WeightAverage:
         self.momentum = momentum
         self.values: dict[str, Tensor] = {n: p.detach().clone() for n, p in self._parameters()} if momentum else {}
 
-    @torch.no_grad()
     def update(self, updates: int) -> None:
         """Move the average after step number `updates`."""
-        if not self.momentum:
-            return
-        weight = 1 - warm_momentum(self.momentum, updates)
-        for name, parameter in self._parameters():
+        self.blend(1 - warm_momentum(self.momentum, updates))
+
+    @torch.no_grad()
+    def blend(self, weight: float | Tensor) -> None:
+        """Move the average towards the parameters by `weight`, 0 to 1; nothing where no average is kept."""
+        for name, parameter in self._parameters() if self.momentum else ():
             self.values[name].lerp_(parameter, weight)
 
     @contextmanager

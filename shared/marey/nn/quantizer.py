@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from marey.nn.distributed import all_reduce_sum, broadcast_any
+from marey.nn.distributed import all_reduce_sum, broadcast_any, is_distributed
 
 NO_TOKEN = -1
 """Token of a level that was dropped, or of a position beyond the clip: decodes to the zero vector."""
@@ -24,6 +24,14 @@ class Quantized:
     tokens: Tensor  # (B, n, V) int64, NO_TOKEN where dropped or invalid
     commitment: Tensor  # scalar: sum over levels of the mean squared distance (eq. 2, without β)
     perplexity: Tensor  # (V,), exp of the entropy of each level's code usage in this batch
+
+
+@dataclass(frozen=True)
+class Fresh:
+    """Vectors of a batch that may become codes."""
+
+    codes: Tensor  # (K, d)
+    exist: Tensor  # () bool, False where the batch has none
 
 
 class ResidualQuantizer(nn.Module):
@@ -88,17 +96,18 @@ class ResidualQuantizer(nn.Module):
         for level in range(self.levels):
             active = valid & (level < kept)[:, None]  # (B, n)
             vectors = self.scaled(residual.detach(), level).detach()  # (B, n, d)
-            if self.training:
-                self._initialize(level, vectors[active])
+            fresh = self._draw(level, vectors, active) if self.training else None
+            if fresh is not None:
+                self._initialize(level, fresh)
             index = self.nearest(vectors, level)  # (B, n)
             restored = self.restored(self.codebooks[level][index], level) * active[..., None]  # (B, n, d)
             chosen = restored.detach()
             distance = (residual - chosen).square().mean(-1)  # (B, n)
             commitment = commitment + (distance * active).sum() / active.sum().clamp(min=1)
-            usage = torch.bincount(index[active], minlength=self.codes).float()
+            usage = self._usage(index, active)
             perplexity.append(_perplexity(usage))
-            if self.training:
-                self._update(level, vectors[active], index[active], usage)
+            if fresh is not None:
+                self._update(level, vectors, active, index, usage, fresh)
             residual = residual - chosen
             total = total + restored
             tokens.append(index.masked_fill(~active, NO_TOKEN))
@@ -158,53 +167,67 @@ class ResidualQuantizer(nn.Module):
         fewer = torch.randint(1, self.levels, (batch,), device=latent.device)
         return torch.where(torch.rand(batch, device=latent.device) < self.dropout, fewer, everything)
 
-    @torch.no_grad()
-    def _initialize(self, level: int, vectors: Tensor) -> None:
-        """Fill a codebook with vectors of the first batch (repeated with a little noise if there are too few)."""
-        if bool(self.initialized):
-            return
-        drawn = self._draw_any(level, vectors)
-        if drawn is None:
-            return
-        self.codebooks[level] = drawn
-        self.sums[level] = self.codebooks[level]
-        self.counts[level] = 1.0
+    def _usage(self, index: Tensor, active: Tensor) -> Tensor:
+        """Return how many of the `active` (…) vectors chose each code (K,), from the codes `index` (…) of all."""
+        counts = torch.zeros(self.codes, device=index.device)
+        return counts.index_add_(0, index.flatten(), active.flatten().float())
+
+    # From here on no value of a tensor is read on the host: training steps are recorded on a GPU.
 
     @torch.no_grad()
-    def _update(self, level: int, vectors: Tensor, index: Tensor, usage: Tensor) -> None:
-        """Move the averages, then reset dead codes to vectors of this batch."""
-        sums = torch.zeros_like(self.sums[level]).index_add_(0, index, vectors)
+    def _draw(self, level: int, vectors: Tensor, active: Tensor) -> Fresh:
+        """Draw K of the `active` (…) vectors (…, d) of a batch; with several processes, those of the first that has
+        any."""
+        drawn, any_active = _draw(vectors.flatten(0, -2), active.flatten(), self.codes), active.any()
+        if not is_distributed():
+            return Fresh(drawn, any_active)
+        shared = broadcast_any(drawn if bool(any_active) else None, self.codebooks[level])
+        return Fresh(drawn if shared is None else shared, torch.tensor(shared is not None, device=drawn.device))
+
+    @torch.no_grad()
+    def _initialize(self, level: int, fresh: Fresh) -> None:
+        """Fill a codebook with vectors of the first batch."""
+        first = fresh.exist & ~self.initialized
+        self.codebooks[level] = torch.where(first, fresh.codes, self.codebooks[level])
+        self.sums[level] = torch.where(first, fresh.codes, self.sums[level])
+        self.counts[level].masked_fill_(first, 1.0)
+
+    @torch.no_grad()
+    def _update(self, level: int, vectors: Tensor, active: Tensor, index: Tensor, usage: Tensor, fresh: Fresh) -> None:
+        """Move the averages, then reset dead codes to vectors of this batch.
+
+        Args:
+            level: the codebook.
+            vectors: (…, d) of this batch.
+            active: (…) bool, vectors that count.
+            index: (…) the code nearest to each.
+            usage: (K,) active vectors of each code.
+            fresh: codes in place of dead ones.
+        """
+        counted = (vectors * active[..., None]).flatten(0, -2)
+        sums = torch.zeros_like(self.sums[level]).index_add_(0, index.flatten(), counted)
         usage = all_reduce_sum(usage.clone())
         sums = all_reduce_sum(sums)
         self.counts[level].mul_(self.decay).add_(usage, alpha=1 - self.decay)
         self.sums[level].mul_(self.decay).add_(sums, alpha=1 - self.decay)
-        alive = self.counts[level] >= self.revive  # (K,)
-        self.codebooks[level] = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
-        if bool(alive.all()):  # the same in every process
-            return
         # A revived code starts at the limit: it is reset again after the next batch unless vectors enough choose it
         # there. So dead codes are drawn anew in every batch until they lie where vectors are.
-        fresh = self._draw_any(level, vectors)
-        if fresh is None:
-            return
-        dead = ~alive
-        self.codebooks[level][dead] = fresh[dead]
-        self.sums[level][dead] = fresh[dead] * self.revive
-        self.counts[level][dead] = self.revive
-
-    def _draw_any(self, level: int, vectors: Tensor) -> Tensor | None:
-        """Return K of the vectors (N, d) of the first process that has any at this level; None if none has."""
-        mine = _draw(vectors, self.codes) if len(vectors) else None
-        return broadcast_any(mine, self.codebooks[level])
+        dead = (self.counts[level] < self.revive) & fresh.exist  # (K,), the same in every process
+        moved = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
+        self.codebooks[level] = torch.where(dead[:, None], fresh.codes, moved)
+        self.sums[level] = torch.where(dead[:, None], fresh.codes * self.revive, self.sums[level])
+        self.counts[level].masked_fill_(dead, self.revive)
 
 
-def _draw(vectors: Tensor, count: int) -> Tensor:
-    """Return `count` vectors drawn from (N, d) without replacement; if N < count, repeated with a little noise."""
-    rows = len(vectors)
-    if rows >= count:
-        return vectors[torch.randperm(rows, device=vectors.device)[:count]].clone()
-    repeated = vectors[torch.randint(rows, (count,), device=vectors.device)]
-    return repeated + torch.randn_like(repeated) * (0.01 / vectors.shape[-1] ** 0.5)
+def _draw(vectors: Tensor, active: Tensor, count: int) -> Tensor:
+    """Return `count` of the `active` (N,) vectors (N, d), drawn without replacement; if they are fewer, they are
+    repeated with a little noise."""
+    order = torch.rand(len(active), device=active.device).masked_fill(~active, -1.0).argsort(descending=True)
+    place = torch.arange(count, device=active.device)
+    number = active.sum().clamp(min=1)
+    chosen = vectors[order[place % number]]
+    noise = torch.randn_like(chosen) * (0.01 / vectors.shape[-1] ** 0.5)
+    return torch.where((place < number)[:, None], chosen, chosen + noise)
 
 
 def _perplexity(usage: Tensor) -> Tensor:

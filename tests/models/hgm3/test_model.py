@@ -27,7 +27,7 @@ from marey.nn.motion_tokenizer import biased_std
 from marey.nn.ragged import pad_length
 from marey.nn.sampling import guide
 from marey.training.joints import heading_joints, world_joints
-from marey.training.tokenizing import tokenizer_loss
+from marey.training.tokenizing import tokenizer_loss, world_share
 from tests.support.prepared import graph, made_up_texts, swinging, text_features
 
 CPU = torch.device("cpu")
@@ -294,7 +294,8 @@ def test_the_loss_ignores_frames_beyond_the_clip() -> None:
 def test_the_term_in_space_rises_over_the_first_half_of_the_budget() -> None:
     model = tokenizer()
     features = torch.randn(2, 16, 263)
-    totals = [float(tokenizer_loss(model, TINY, features, None, f)[0].total.detach()) for f in (0.0, 0.25, 0.5, 1.0)]
+    shares = [world_share(fraction) for fraction in (0.0, 0.25, 0.5, 1.0)]
+    totals = [float(tokenizer_loss(model, TINY, features, None, share)[0].total.detach()) for share in shares]
     assert totals[0] < totals[1] < totals[2]
     assert totals[2] == totals[3]
 

@@ -18,19 +18,22 @@ from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.decoding import DecodeOptions, Items
 from marey.models.hgm3.generate import Generator
 from marey.models.hgm3.model import MaskedTransformer
-from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage
+from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage, _pieces
 from marey.models.hgm3.stage_residual import ResidualSample, ResidualStage, piece_losses
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
 from marey.training.budget import Budget
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData, TokenData
+from marey.training.stages import StepContext
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
-from marey.training.tokenizing import tokenizer_loss
+from marey.training.tokenizing import TokenizerStage, tokenizer_loss
 from tests.support.prepared import text_features
+from tests.support.recording import assert_recordable
 
 CPU = torch.device("cpu")
+STILL = replace(TINY.condition, dropout=0.0, noise=0.0)
+"""Conditions without draws of torch."""
 
 
 def encoded(prepared: PreparedData, config: HGM3Config) -> tuple[Tokenizer, TokenData, CaptionData]:
@@ -82,9 +85,9 @@ def test_a_step_trains_the_motion_action_and_specific_level(prepared: PreparedDa
     seen: list[tuple[bool, bool]] = []
     forward = stage.module.masked.forward
 
-    def watched(tokens: torch.Tensor, valid: torch.Tensor, text: torch.Tensor, visible: torch.Tensor, *rest: object):
+    def watched(tokens: torch.Tensor, valid: torch.Tensor, text: torch.Tensor, visible: torch.Tensor, *rest, **trim):
         seen.append((bool(visible[:, 1 : 1 + lowest].any()), bool(visible[:, 1 + lowest :].any())))
-        return forward(tokens, valid, text, visible, *rest)  # type: ignore[arg-type]
+        return forward(tokens, valid, text, visible, *rest, **trim)
 
     stage.module.masked.forward = watched  # type: ignore[method-assign]
     stage.config = replace(stage.config, condition=replace(stage.config.condition, drop=0.0))
@@ -135,9 +138,9 @@ def test_the_residual_input_holds_nothing_of_the_level_it_predicts(prepared: Pre
     inputs: list[torch.Tensor] = []
     forward = stage.module.forward
 
-    def watched(total: torch.Tensor, *rest: torch.Tensor) -> torch.Tensor:
+    def watched(total: torch.Tensor, *rest: torch.Tensor, trim: bool) -> torch.Tensor:
         inputs.append(total)
-        return forward(total, *rest)
+        return forward(total, *rest, trim=trim)
 
     stage.module.forward = watched  # type: ignore[method-assign]
     codes = torch.randint(TINY.tokenizer.codes, (2, 8, TINY.tokenizer.levels))
@@ -334,3 +337,40 @@ def test_random_masks_do_not_train_the_loss_predictor(prepared: PreparedData) ->
         loss.backward()
         assert all((p.grad is not None) == trained for p in stage.module.predictor.parameters())
         assert (float(logs["ranking"]) > 0) == trained
+
+
+def test_steps_of_both_transformers_and_the_tokenizer_can_be_recorded(prepared: PreparedData) -> None:
+    config = replace(TINY, mining=replace(TINY.mining, mask="random"))
+    tokenizer, tokens, captions = encoded(prepared, config)
+    assert_recordable(MaskedStage(config, prepared.clips, tokens, captions))
+    codebooks = tokenizer.quantizer.codebooks
+    assert_recordable(ResidualStage(config, prepared.clips, tokens, captions, codebooks))
+    assert_recordable(TokenizerStage(config, MotionData.load(prepared.path, CPU), tokenizer))
+
+
+@pytest.mark.parametrize("conditions", ["all", "specific"])
+def test_a_padded_batch_has_the_loss_of_its_pieces(prepared: PreparedData, conditions: str) -> None:
+    mining = replace(TINY.mining, mask="random", conditions=conditions)
+    config = replace(TINY, mining=mining, masked=replace(TINY.masked, dropout=0.0), condition=STILL)
+    stage = masked_stage(prepared, config)
+    batch = stage.batch(StepContext(0, 0.0, np.random.default_rng(0)))
+    losses, masked, right, _ = zip(*(stage.piece(piece, 0.0) for each in batch for piece in _pieces(each)), strict=True)
+    asked = sum(each.sum() for each in masked)
+    loss, logs = stage.batch_loss(batch)
+    assert batch[0].tokens.shape[1] == config.max_tokens > int(batch[0].lengths.max())
+    torch.testing.assert_close(loss, sum((a * b).sum() for a, b in zip(losses, masked, strict=True)) / asked)
+    assert float(logs["accuracy"]) == pytest.approx(
+        float(sum((a * b).sum() for a, b in zip(right, masked, strict=True)) / asked)
+    )
+
+
+def test_a_padded_batch_of_the_residual_stage_has_the_loss_of_its_pieces(prepared: PreparedData) -> None:
+    config = replace(TINY, residual=replace(TINY.residual, dropout=0.0))
+    tokenizer, tokens, captions = encoded(prepared, config)
+    stage = ResidualStage(config, prepared.clips, tokens, captions, tokenizer.quantizer.codebooks)
+    (loss, logs), (padded, shown) = (
+        make(StepContext(0, 0.0, np.random.default_rng(0)))
+        for make in (stage.loss, lambda context: stage.batch_loss(stage.batch(context)))
+    )
+    torch.testing.assert_close(padded, loss)
+    assert float(shown["accuracy"]) == pytest.approx(float(logs["accuracy"]))

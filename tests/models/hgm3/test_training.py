@@ -27,9 +27,10 @@ from marey.models.hgm3.train import train_stage
 from marey.nn.devices import fast_bf16
 from marey.nn.growing import grow
 from marey.training.budget import Budget
-from marey.training.loop import RunOptions, StepContext, train
+from marey.training.loop import RunOptions, train
 from marey.training.motions import MotionData, TokenData
 from marey.training.parts import load_part
+from marey.training.stages import StepContext
 from marey.training.staging import MemoryOf, TrainOptions
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage

@@ -39,7 +39,7 @@ def test_the_tokenizer_learns_to_give_motion_back() -> None:
     optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
     losses: list[float] = []
     for _ in range(120):
-        loss, _ = tokenizer_loss(model, TINY, clips, torch.tensor([24, 24, 20, 16]), fraction=0.0)
+        loss, _ = tokenizer_loss(model, TINY, clips, torch.tensor([24, 24, 20, 16]), world=0.0)
         optimizer.zero_grad()
         (loss.total + scale_penalty(model, TINY.tokenizer)).backward()
         optimizer.step()

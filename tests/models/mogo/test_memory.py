@@ -16,10 +16,10 @@ from marey.models.mogo.memory import longest_samples, memory_model
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.stage_transformer import TransformerStage, piece_losses
 from marey.models.mogo.tokenizer import Tokenizer
-from marey.training.loop import StepContext
 from marey.training.memory import GIB, Amount, MemoryModel
 from marey.training.motions import MotionData, TokenData
 from marey.training.sentences import SentenceData
+from marey.training.stages import StepContext
 from marey.training.staging import set_recompute
 from marey.training.texts import CaptionTexts
 from tests.support.allocator import Peak, peak_of_steps, peak_on_gpu

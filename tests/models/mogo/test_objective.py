@@ -12,16 +12,17 @@ import torch
 from marey.data.prepared import PreparedData
 from marey.models.mogo import train
 from marey.models.mogo.config import TINY, MOGOConfig
-from marey.models.mogo.losses import LevelSums
+from marey.models.mogo.losses import LevelSums, scale_penalty
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.training.budget import Budget
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData, TokenData
 from marey.training.sentences import SentenceData
+from marey.training.stages import StepContext
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage
+from tests.support.recording import assert_recordable
 
 CPU = torch.device("cpu")
 
@@ -90,3 +91,25 @@ def test_a_heavier_first_level_moves_the_loss_towards_its_own() -> None:
     assert losses[0] == pytest.approx(2.5)
     assert losses[1] == pytest.approx((3 * 4 + 1) / 4)
     assert losses[2] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_steps_of_both_networks_can_be_recorded(prepared: PreparedData) -> None:
+    data = MotionData.load(prepared.path, CPU)
+    tokenizer = Tokenizer(TINY)
+    stage = TokenizerStage(TINY, data, tokenizer, lambda: scale_penalty(tokenizer, TINY.tokenizer))
+    assert_recordable(stage)
+    assert_recordable(transformer_stage(prepared, TINY))
+
+
+def test_a_padded_batch_has_the_loss_of_its_pieces(prepared: PreparedData) -> None:
+    config = replace(
+        TINY, corruption=0.0, ahead=(), depth=replace(TINY.depth, share=1.0),
+        transformer=replace(TINY.transformer, dropout=0.0), condition=replace(TINY.condition, drop=0.0, clockless=0.0),
+    )  # fmt: skip
+    stage = transformer_stage(prepared, config)
+    loss, logs = stage.loss(StepContext(0, 0.0, np.random.default_rng(0)))
+    batch = stage.batch(StepContext(0, 0.0, np.random.default_rng(0)))
+    padded, shown = stage.batch_loss(batch)
+    assert batch.tokens.shape[1] == config.max_frames
+    torch.testing.assert_close(padded, loss)
+    assert float(shown["level_0"]) == pytest.approx(float(logs["level_0"]))

@@ -28,12 +28,13 @@ from marey.models.momaskpp.tokens import ScaleTokens, encode_clips
 from marey.models.momaskpp.train import train_stage
 from marey.nn.growing import take
 from marey.training.budget import Budget
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.parts import load_part
+from marey.training.stages import StepContext
 from marey.training.staging import TrainOptions
 from tests.support.device_memory import device_with_room_for
 from tests.support.prepared import farthest_move, text_features, write_prepared
+from tests.support.recording import assert_recordable
 
 CPU = torch.device("cpu")
 STAGES = ("tokenizer", "masked", "refiner", "length")
@@ -336,3 +337,22 @@ def test_the_tokenizers_loss_weighs_essential_columns_and_the_root_once_more(pre
     added = [total(**{name: 1.0}) - total() for name in ("root_weight", "position_weight", "velocity_weight")]
     assert all(value > 0 for value in (*added, total(world_weight=1.0) - total()))
     assert has_positions(TINY)
+
+
+def test_steps_of_both_networks_can_be_recorded(prepared: PreparedData, words: WordData) -> None:
+    tokenizer = Tokenizer(TINY)
+    assert_recordable(ScaleTokenizerStage(TINY, MotionData.load(prepared.path, CPU), tokenizer), len(TINY.windows))
+    assert_recordable(masked_stage(prepared, words))
+
+
+def test_a_padded_batch_has_the_loss_of_its_pieces(prepared: PreparedData, words: WordData) -> None:
+    still = PerturbationConfig(replace_random=0.0, perturb=0.0, replace_mask=1.0)
+    config = replace(TINY, perturbation=still, masked=replace(TINY.masked, dropout=0.0))
+    config = replace(config, text=replace(config.text, noise=0.0))
+    stage = masked_stage(prepared, words, config)
+    loss, logs = stage.loss(StepContext(0, 0.0, np.random.default_rng(0)))
+    batch = stage.batch(StepContext(0, 0.0, np.random.default_rng(0)))
+    padded, shown = stage.batch_loss(batch)
+    assert batch.tokens.shape[1] == stage.scales.size
+    torch.testing.assert_close(padded, loss)
+    assert float(shown["accuracy"]) == pytest.approx(float(logs["accuracy"]))

@@ -109,7 +109,7 @@ def test_positions_beyond_a_clip_come_out_as_zeros_and_train_nothing() -> None:
 
 def test_codes_drawn_from_too_few_vectors_differ_by_a_hundredth() -> None:
     torch.manual_seed(0)
-    drawn = _draw(torch.ones(2, 64), 4000)
+    drawn = _draw(torch.ones(2, 64), torch.ones(2, dtype=torch.bool), 4000)
     assert 0.9 < float((drawn - 1).norm(dim=-1).mean() / 0.01) < 1.1
 
 

@@ -21,9 +21,9 @@ from marey.evaluator.scores import EmbeddedSplit, retrieval_scores
 from marey.evaluator.sentences import CaptionStates
 from marey.nn.convolution import frame_mask
 from marey.text.encoders import TextEncoder
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.pairs import pieces_of
+from marey.training.stages import StepContext
 
 STATISTICS_CAPTIONS = 1024
 """Number of training captions for the statistics of text features: 19,000 tokens, with a standard error of 1 %."""

@@ -10,10 +10,10 @@ import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from marey.training.loop import StepContext
 from marey.training.optimisation import StageConfig
 from marey.training.pairs import Pairs
 from marey.training.sentences import SentenceData
+from marey.training.stages import StepContext
 
 
 class LengthStage:

@@ -10,11 +10,11 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 import structlog
@@ -30,63 +30,10 @@ from marey.nn.devices import fast_bf16
 from marey.nn.ema import WeightAverage
 from marey.training.budget import Budget, learning_rate
 from marey.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
-from marey.training.optimisation import StageConfig
+from marey.training.recorded import RecordedSteps, StepResult
+from marey.training.stages import RecordableStage, SplitStage, StepContext, TrainingStage
 
 log = structlog.get_logger()
-
-
-@dataclass(frozen=True)
-class StepContext:
-    """Inputs that a stage may use in one step."""
-
-    step: int
-    fraction: float  # of the budget, 0 to 1: every schedule runs on it
-    rng: np.random.Generator  # for the choice of data, seeded from (seed, step, rank)
-
-
-class TrainingStage(Protocol):
-    """One stage of training."""
-
-    @property
-    def name(self) -> str:
-        """Name of the stage, `tokenizer` for instance."""
-        ...
-
-    @property
-    def module(self) -> nn.Module:
-        """Module with all trained parameters and all tensors of a checkpoint."""
-        ...
-
-    @property
-    def optimisation(self) -> StageConfig:
-        """Batch size, learning rate and other optimisation settings."""
-        ...
-
-    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """Groups of parameters whose gradient norms are clipped separately."""
-        ...
-
-    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the loss of one batch, and values to log."""
-        ...
-
-    def after_step(self, context: StepContext) -> None:
-        """Update state after the optimiser's step (a teacher, for instance)."""
-        ...
-
-    def validate(self) -> Mapping[str, float]:
-        """Return metrics of the averaged weights on the validation split."""
-        ...
-
-
-@runtime_checkable
-class SplitStage(Protocol):
-    """A stage whose batches can be trained in parts, each with its own backward pass: gradient accumulation."""
-
-    def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
-        """Yield the losses of parts of one batch, at most `size` samples each, and values to log; sums over the parts
-        are those of the whole batch."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -103,6 +50,7 @@ class RunOptions:
     log_every: int = 20
     quiet: bool = False
     micro_batch: int | None = None  # samples of a forward and backward pass; None = the whole batch
+    record: bool = True  # steps as CUDA graphs, where device and stage allow it
 
 
 def start_process_group() -> None:
@@ -134,12 +82,15 @@ class _Run:
         o = stage.optimisation
         self.device = next(stage.module.parameters()).device
         trained = [p for group in stage.clip_groups() for p in group]
+        recordable = _recordable(stage, options, self.device)
         self.optimizer = torch.optim.AdamW(
-            _decay_groups(trained, o.weight_decay), lr=o.learning_rate, betas=o.betas, fused=True
-        )
+            _decay_groups(trained, o.weight_decay), lr=o.learning_rate, betas=o.betas, fused=True,
+            capturable=recordable is not None,
+        )  # fmt: skip
         self.average = WeightAverage(stage.module, o.ema)
         self.step = 0
         self.seconds = 0.0
+        self.rate = 0.0
         self.metrics: dict[str, float] = {}
         self.checkpoint = options.folder / "checkpoint"
         self.main = distributed.rank() == 0
@@ -155,6 +106,9 @@ class _Run:
         else:
             for tensor in stage.module.state_dict().values():
                 distributed.broadcast(tensor)
+        self.recorded: RecordedSteps | None = None
+        if recordable is not None:
+            self.recorded = RecordedSteps(recordable, self.optimizer, self.average, self._autocast)
 
     @property
     def fraction(self) -> float:
@@ -170,15 +124,18 @@ class _Run:
         with _progress(self.main and not options.quiet) as progress:
             bar = progress.add_task(self.stage.name, total=1.0, note="")
             while self.fraction < 1.0:
-                logs = self._one_step()
-                if writer and (self.step % options.log_every == 0 or self.step == 1):
-                    self._write_logs(writer, progress, bar, logs)
+                result = self._one_step()
+                if self.step % options.log_every == 0 or self.step == 1:
+                    self._check_finite(result)  # recorded steps run ahead of the host until here
+                    if writer:
+                        self._write_logs(writer, progress, bar, result)
                 due = math.floor(self.fraction * options.validate_times + 1e-9)
                 if due > validated or self.fraction >= 1.0:
                     validated = due
                     self._validate(writer)
                 if time.monotonic() - saved > 60 * options.checkpoint_minutes or self.fraction >= 1.0:
                     saved = time.monotonic()
+                    self._check_finite(result)
                     self._save()
         if writer:
             writer.close()
@@ -186,40 +143,48 @@ class _Run:
         self.stage.module.eval()
         return self.metrics
 
-    def _one_step(self) -> dict[str, float]:
+    def _one_step(self) -> StepResult:
         started = time.monotonic()
         stage, o = self.stage, self.stage.optimisation
         fraction = self.fraction
-        rate = learning_rate(
+        self.rate = learning_rate(
             o.learning_rate, fraction, self.step, warmup_steps=o.warmup_steps, warmup_share=o.warmup_share,
             decay=o.decay, final=o.final,
         )  # fmt: skip
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate
         entropy = np.random.SeedSequence([self.options.seed, self.step, distributed.rank()])
         rng = np.random.default_rng(entropy)
         torch.manual_seed(int(rng.integers(2**62)))
         context = StepContext(self.step, fraction, rng)
         stage.module.train()
+        result = self.recorded.step(context, self.rate) if self.recorded else self._eager_step(context)
+        stage.after_step(context)
+        self.step += 1
+        self._tick(time.monotonic() - started)
+        return result
+
+    def _eager_step(self, context: StepContext) -> StepResult:
+        stage = self.stage
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.rate
         self.optimizer.zero_grad(set_to_none=True)
         logs = self._backward(context)
         groups = stage.clip_groups()
         for group in groups:
             distributed.average_gradients(group)
-        norms = [nn.utils.clip_grad_norm_(group, o.clip) for group in groups]
-        if not all(bool(torch.isfinite(n)) for n in norms):
+        norms = tuple(nn.utils.clip_grad_norm_(group, stage.optimisation.clip) for group in groups)
+        result = StepResult(logs, norms)
+        self._check_finite(result)
+        self.optimizer.step()
+        self.average.update(self.step)
+        return result
+
+    def _check_finite(self, result: StepResult) -> None:
+        if not all(bool(torch.isfinite(norm)) for norm in result.norms):
             raise MareyError(
-                f"the gradient of {stage.name} is not finite at step {self.step}",
+                f"the gradient of {self.stage.name} is not finite at step {self.step}",
                 where=str(self.options.folder),
                 hint="Resume from the last checkpoint with a smaller learning rate.",
             )
-        self.optimizer.step()
-        stage.after_step(context)
-        self.average.update(self.step)
-        self.step += 1
-        self._tick(time.monotonic() - started)
-        values = {k: float(v) for k, v in logs.items()} if self.step % self.options.log_every in (0, 1) else {}
-        return values | {"rate": rate, "gradient_norm": float(norms[0])}
 
     def _backward(self, context: StepContext) -> Mapping[str, Tensor]:
         """Compute the gradients of one batch; return values to log."""
@@ -243,8 +208,10 @@ class _Run:
 
     def _tick(self, seconds: float) -> None:
         """Advance the training clock, the same on all processes."""
-        elapsed = torch.tensor(seconds, dtype=torch.float64, device=self.device)
-        self.seconds += float(distributed.broadcast(elapsed))
+        if distributed.is_distributed():
+            elapsed = torch.tensor(seconds, dtype=torch.float64, device=self.device)
+            seconds = float(distributed.broadcast(elapsed))
+        self.seconds += seconds
 
     def _autocast(self) -> Any:
         if not (self.options.bf16 and fast_bf16(self.device)):
@@ -272,11 +239,21 @@ class _Run:
         )
         save_checkpoint(self.checkpoint, state, self.stage.module, self.average, self.optimizer)
 
-    def _write_logs(self, writer: SummaryWriter, progress: Progress, bar: TaskID, logs: dict[str, float]) -> None:
-        for name, value in logs.items():
+    def _write_logs(self, writer: SummaryWriter, progress: Progress, bar: TaskID, result: StepResult) -> None:
+        logs = {name: float(value) for name, value in result.logs.items()}
+        for name, value in (logs | {"rate": self.rate, "gradient_norm": float(result.norms[0])}).items():
             writer.add_scalar(f"train/{name}", value, self.step)
         note = f"step {self.step}  loss {logs.get('loss', math.nan):.4f}"
         progress.update(bar, completed=self.fraction, note=note)
+
+
+def _recordable(stage: TrainingStage, options: RunOptions, device: torch.device) -> RecordableStage | None:
+    """Return the stage if its steps are recorded: whole batches of one process on a GPU, with their activations."""
+    if device.type != "cuda" or not options.record or options.micro_batch is not None or distributed.is_distributed():
+        return None
+    if any(getattr(module, "recompute", False) for module in stage.module.modules()):
+        return None
+    return stage if isinstance(stage, RecordableStage) and stage.recordable else None
 
 
 def _decay_groups(parameters: Sequence[nn.Parameter], weight_decay: float) -> list[dict[str, Any]]:

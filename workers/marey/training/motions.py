@@ -129,10 +129,13 @@ class TokenData:
         counts = torch.stack([torch.bincount(level, minlength=codes) for level in tokens.T]).float() + 1
         return (counts / counts.sum(1, keepdim=True)).log()
 
-    def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:
-        """Return tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
+    def batch(
+        self, clips: Tensor, phases: Tensor, max_tokens: int, *, size: int | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Return tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end. n is
+        `size`, or the longest length."""
         lengths = self.lengths[clips, phases].clamp(max=max_tokens)
-        size = int(lengths.max())
+        size = int(lengths.max()) if size is None else size
         position = torch.arange(size, device=clips.device)
         index = (self.starts[clips, phases][:, None] + position).clamp(max=len(self.tokens) - 1)
         valid = position[None] < lengths[:, None]

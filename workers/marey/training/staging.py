@@ -26,10 +26,11 @@ from marey.nn import distributed
 from marey.nn.devices import choose_device, fast_bf16
 from marey.nn.growing import grow, take
 from marey.training.budget import Budget
-from marey.training.loop import RunOptions, TrainingStage, train
+from marey.training.loop import RunOptions, train
 from marey.training.memory import MemoryModel, device_memory
 from marey.training.optimisation import StageConfig
 from marey.training.parts import TrainedPart, load_part, load_sources, save_part
+from marey.training.stages import TrainingStage
 
 log = structlog.get_logger()
 
@@ -72,6 +73,7 @@ class TrainOptions(Generic[C]):
     quiet: bool = False
     micro_batch: int | Literal["auto"] | None = None  # samples of a pass; auto = as many as fit the device's memory
     recompute: bool = False  # activations in the backward pass: less memory, more time
+    record: bool = True  # steps as CUDA graphs, where device and stage allow it
 
     def options(self, stage: str) -> RunOptions:
         """Return the loop's options for a stage."""
@@ -80,7 +82,7 @@ class TrainOptions(Generic[C]):
             raise InvalidInput("auto is for stages whose memory is estimated", where="--micro-batch", hint=hint)
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet,
-            micro_batch=self.micro_batch,
+            micro_batch=self.micro_batch, record=self.record,
         )  # fmt: skip
 
 

@@ -17,9 +17,9 @@ from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
 from marey.nn.quantizer import Quantized
 from marey.training.joints import heading_joints, unit_of, world_joints
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData, dataset_of
 from marey.training.optimisation import StageConfig
+from marey.training.stages import StepContext
 
 
 class TokenizerWeights(Protocol):
@@ -79,26 +79,23 @@ def tokenizer_loss(
     config: TokenizerTraining,
     features: Tensor,
     lengths: Tensor | None = None,
-    fraction: float = 1.0,
+    world: float | Tensor = 1.0,
 ) -> tuple[TokenizerLoss, Quantized]:
     """Compute eq. 2 of HGM³, eq. 6 of MOGO without its last term, plus terms on the joints (ours), which metrics
     measure.
-
-    The term in space rises with the budget's `fraction`: drift adds up over a window, and at first its gradient
-    dominates all others.
 
     Args:
         model: the tokenizer.
         config: weights of the terms.
         features: (B, T, D) in their own units.
         lengths: (B,) frames, or None where every window is full.
-        fraction: of the budget used.
+        world: factor of the term in space; see `world_share`.
     """
     t = config.tokenizer
     output, quantized = model(features, lengths)
     target = model.normalize(features)
     valid = torch.ones_like(features[..., 0]) if lengths is None else frame_mask(lengths, features.shape[1]).float()
-    weights = feature_weights(config).to(features.device)  # (D,)
+    weights = feature_weights(config, features.device)  # (D,)
     l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
     restored, body = model.restore(output), (config.joints, unit_of(config.layout))
@@ -106,21 +103,27 @@ def tokenizer_loss(
     position = _average(local.abs().sum(-1).mean(-1), valid)
     velocity = _average(local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps, valid[:, 1:])
     drift = world_joints(restored, *body) - world_joints(features, *body)
-    world = _average(drift.abs().sum(-1).mean(-1), valid)
+    in_space = _average(drift.abs().sum(-1).mean(-1), valid)
     total = (
         l1
         + t.commitment * quantized.commitment
         + t.position_weight * position
         + t.velocity_weight * velocity
-        + t.world_weight * min(1.0, 2 * fraction) ** 2 * world
+        + t.world_weight * world * in_space
     )
-    terms = (l1, quantized.commitment, position, velocity, world)
+    terms = (l1, quantized.commitment, position, velocity, in_space)
     return TokenizerLoss(total, *(term.detach() for term in terms)), quantized
 
 
-def feature_weights(config: TokenizerTraining) -> Tensor:
+def world_share(fraction: float) -> float:
+    """Return the factor of the loss in space after a `fraction` of the budget: drift adds up over a window, and at
+    first its gradient dominates all others."""
+    return min(1.0, 2 * fraction) ** 2
+
+
+def feature_weights(config: TokenizerTraining, device: torch.device) -> Tensor:
     """Return the weight of each feature column (D,) in the L1 term: 1, or `rotation_weight` for the 6-D rotations."""
-    weights = torch.ones(config.features)
+    weights = torch.ones(config.features, device=device)
     start = 4 + 3 * (config.joints - 1)
     weights[start : start + 6 * (config.joints - 1)] = config.tokenizer.rotation_weight
     return weights
@@ -186,14 +189,39 @@ class TokenizerStage:
         """Return one group."""
         return [list(self.module.parameters())]
 
+    @property
+    def recordable(self) -> bool:
+        """Return True."""
+        return True
+
+    def batch(self, context: StepContext) -> tuple[Tensor, Tensor, Tensor]:
+        """Return the features (B, T, D) of windows, the frames (B,) that are the clips' own, and the factor of the term
+        in space. All windows of a step have one size; the batch is scaled to a constant number of frames."""
+        features, lengths = self._windows(context)
+        device = features.device
+        return features, torch.from_numpy(lengths).to(device), torch.tensor(world_share(context.fraction)).to(device)
+
+    def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        features, lengths, world = batch
+        return self._loss(features, lengths, world)
+
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the loss of one window size per step; the batch is scaled to a constant number of frames."""
-        rng, config = context.rng, self.config
-        window = int(rng.choice(config.windows))
-        batch = max(1, self.optimisation.batch * min(config.windows) // window)
-        features, lengths = self.windows.draw(rng, batch, window)
-        own = None if bool((lengths == window).all()) else torch.from_numpy(lengths).to(features.device)
-        loss, quantized = tokenizer_loss(self.module, config, features, own, context.fraction)
+        """Return the loss of one batch of windows."""
+        features, lengths = self._windows(context)
+        full = bool((lengths == features.shape[1]).all())
+        own = None if full else torch.from_numpy(lengths).to(features.device)
+        return self._loss(features, own, world_share(context.fraction))
+
+    def _windows(self, context: StepContext) -> tuple[Tensor, NDArray[np.int64]]:
+        window = int(context.rng.choice(self.config.windows))
+        size = max(1, self.optimisation.batch * min(self.config.windows) // window)
+        return self.windows.draw(context.rng, size, window)
+
+    def _loss(
+        self, features: Tensor, lengths: Tensor | None, world: float | Tensor
+    ) -> tuple[Tensor, Mapping[str, Tensor]]:
+        loss, quantized = tokenizer_loss(self.module, self.config, features, lengths, world)
         logs = {
             "loss": loss.total.detach(),
             "features": loss.features,

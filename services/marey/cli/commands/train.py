@@ -78,6 +78,10 @@ MicroBatch = Annotated[
 Recompute = Annotated[
     bool, typer.Option("--recompute", help="Compute activations again in the backward pass: less memory, more time.")
 ]
+Record = Annotated[
+    bool,
+    typer.Option("--record/--no-record", help="Record steps on a GPU as CUDA graphs: three times as many a second."),
+]
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Use bfloat16 matrices where they are faster.")]
 
 
@@ -127,6 +131,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         bf16: Bf16 = True,
         micro_batch: MicroBatch = None,
         recompute: Recompute = False,
+        record: Record = True,
         as_json: console.Json = False,
         **choices: StrEnum | None,
     ) -> None:
@@ -135,7 +140,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         metrics = train_stage(
             training, stage, data, run, config=config, steps=steps, minutes=max_minutes, seed=seed, resume=resume,
             warm=warm, origin=origin, rate=learning_rate, device=device, threads=threads, bf16=bf16,
-            choices=_given(choices), micro_batch=_micro_batch(micro_batch), recompute=recompute,
+            choices=_given(choices), micro_batch=_micro_batch(micro_batch), recompute=recompute, record=record,
         )  # fmt: skip
         if as_json:
             console.result_json(metrics)

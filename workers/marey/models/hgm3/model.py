@@ -316,14 +316,14 @@ class ResidualTransformer(nn.Module):
         index = index if guidance is None else index.chunk(2)[0]
         if not self.compact:
             hidden = guided(self.norm(self.gelu(self.dense(hidden))), guidance)
-            if bool((index == index[0]).all()):  # decoding: one level at a time
+            if not self.training and bool((index == index[0]).all()):  # decoding: one level at a time
                 return F.linear(hidden, self.output[index[0]]).float() + self.bias[index[0]]
             return (
                 torch.bmm(hidden, self.output[index].to(hidden.dtype).transpose(1, 2)).float()
                 + (self.bias[index][:, None])
             )
         leaving = guided(self.out_proj(hidden), guidance).float() * self.scale[index][:, None, None]  # (B, n, d)
-        if bool((index == index[0]).all()):
+        if not self.training and bool((index == index[0]).all()):
             return F.linear(leaving, self.codebooks[1 + index[0]]) + self.bias[index[0]]
         codes = self.codebooks[1:][index]  # (B, K, d)
         return torch.bmm(leaving, codes.transpose(1, 2)) + self.bias[index][:, None]

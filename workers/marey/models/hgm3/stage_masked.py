@@ -21,9 +21,9 @@ from marey.nn.convolution import frame_mask
 from marey.nn.ema import update_average, warm_momentum
 from marey.nn.losses import hits, ranking_loss, token_losses
 from marey.nn.masking import easy_to_hard_mask, mask_counts
-from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
+from marey.training.stages import StepContext
 
 CONDITIONS = ("motion", "action", "specific")
 """Names of the levels of condition, each with those before it."""
@@ -90,8 +90,9 @@ class MaskedObjective:
             difficulty = self._predict(teacher, sample, nodes, valid)
         return easy_to_hard_mask(difficulty, sample.noise, valid, counts, alpha)
 
-    def piece(self, sample: MaskedSample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return ℓ (B, n), mask (B, n), correct predictions (B, n), ranking loss (B,)."""
+    def piece(self, sample: MaskedSample, alpha: float, *, trim: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return ℓ (B, n), mask (B, n), correct predictions (B, n), ranking loss (B,); `trim` as in
+        `SequenceModel`."""
         model = self.module.masked
         valid = frame_mask(sample.lengths, sample.tokens.shape[1])
         nodes = model.text(sample.graphs)  # C, (B, S, W)
@@ -99,7 +100,7 @@ class MaskedObjective:
         targets = sample.tokens.clamp(min=0)
         condition = model.condition(nodes, sample.dropped)
         visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
-        logits = model(self._shown(targets, masked), valid, condition, visible, masked)
+        logits = model(self._shown(targets, masked), valid, condition, visible, masked, trim=trim)
         losses = token_losses(logits, targets)
         return losses, masked, hits(logits.detach(), targets), self._ranking(sample, nodes.detach(), losses, masked)
 
@@ -147,29 +148,41 @@ class MaskedStage(MaskedObjective):
         """Return F (with the graph) and G as separate groups."""
         return [list(self.module.masked.parameters()), list(self.module.predictor.parameters())]
 
+    @property
+    def recordable(self) -> bool:
+        """Return whether masks are random: the share of hard ones changes with every step."""
+        return self.config.mining.mask == "random"
+
+    def batch(self, context: StepContext) -> tuple[MaskedSample, ...]:
+        """Return a batch under each condition of a step, padded to the longest clip."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        return tuple(self._conditioned(self.sample(clips, context.rng, size=self.config.max_tokens)))
+
+    def batch_loss(self, batch: tuple[MaskedSample, ...]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        return self._mean_loss([self.piece(sample, 0.0, trim=False) for sample in batch])
+
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return L_rec + L_pred (eq. 7, 12, 13), averaged over levels."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
         sample = self.sample(clips, context.rng)
         alpha = self._alpha(context)
-        samples = self._conditioned(sample)
-        rec = sample.noise.new_zeros(())
-        pred = sample.noise.new_zeros(())
-        counted = sample.noise.new_zeros(())
-        correct = sample.noise.new_zeros(())
-        for piece in (p for s in samples for p in _pieces(s)):
-            losses, masked, right, ranking = self.piece(piece, alpha)
-            rec = rec + (losses * masked).sum()
-            pred = pred + ranking.sum() / (self.optimisation.batch * len(samples))
-            counted = counted + masked.sum()
-            correct = correct + (right * masked).sum()
-        rec = rec / counted.clamp(min=1)
+        pieces = [self.piece(piece, alpha) for s in self._conditioned(sample) for piece in _pieces(s)]
+        loss, logs = self._mean_loss(pieces)
+        return loss, {**logs, "alpha": torch.tensor(alpha)}
+
+    @staticmethod
+    def _mean_loss(pieces: Sequence[tuple[Tensor, Tensor, Tensor, Tensor]]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch, and values to log, from what `piece` gave for its parts."""
+        counted = torch.stack([masked.sum() for _, masked, _, _ in pieces]).sum().clamp(min=1)
+        rec = torch.stack([(losses * masked).sum() for losses, masked, _, _ in pieces]).sum() / counted
+        pred = torch.cat([ranking for *_, ranking in pieces]).mean()
+        correct = torch.stack([(right * masked).sum() for _, masked, right, _ in pieces]).sum()
         logs = {
             "loss": (rec + pred).detach(),
             "reconstruction": rec.detach(),
             "ranking": pred.detach(),
-            "accuracy": correct / counted.clamp(min=1),
-            "alpha": torch.tensor(alpha),
+            "accuracy": correct / counted,
         }
         return rec + pred, logs
 
@@ -203,15 +216,21 @@ class MaskedStage(MaskedObjective):
         return [sample] if mining.levels_per_step == 1 else [sample.at_level(level) for level in range(LEVELS)]
 
     def after_step(self, context: StepContext) -> None:
-        """Update the teacher as the student's moving average (eq. 6)."""
+        """Update the teacher as the student's moving average (eq. 6); with random masks neither is trained."""
+        if self.config.mining.mask == "random":
+            return
         momentum = warm_momentum(self.config.mining.momentum, context.step)
         update_average(self.module.teacher, self.module.predictor, momentum)
 
-    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True) -> MaskedSample:
-        """Draw phase, caption, τ, noise, drop and level for each clip; with `drop` False, all keep their condition."""
+    def sample(
+        self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True, size: int | None = None
+    ) -> MaskedSample:
+        """Draw phase, caption, τ, noise, drop and level for each clip; with `drop` False, all keep their condition. The
+        sequences are padded to `size` tokens, or to the longest of them."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
-        tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
+        chosen = torch.from_numpy(clips).to(device)
+        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size)
         captions = self.captions.choose(clips, rng)
         return MaskedSample(
             tokens[..., 0],

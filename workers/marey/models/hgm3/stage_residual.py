@@ -18,9 +18,9 @@ from marey.models.hgm3.model import LengthEstimator, ResidualTransformer
 from marey.nn.convolution import frame_mask
 from marey.nn.losses import hits, token_losses
 from marey.training.length import LengthStage
-from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs, pieces_of
+from marey.training.stages import StepContext
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,24 @@ class ResidualStage:
         """Return one group."""
         return [list(self.module.parameters())]
 
+    @property
+    def recordable(self) -> bool:
+        """Return True."""
+        return True
+
+    def batch(self, context: StepContext) -> ResidualSample:
+        """Return a batch, padded to the longest clip."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        return self._draw(clips, context.rng, None, size=self.config.max_tokens)
+
+    def batch_loss(self, batch: ResidualSample) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        return _mean_loss(*piece_losses(self.module, batch, trim=False))
+
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return the mean cross-entropy over the tokens of the drawn levels (App. A.2, eq. 1, as a mean)."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
-        losses, right, counts = self._batch(clips, context.rng, None)
-        total = counts.sum().clamp(min=1)
-        loss = losses.sum() / total
-        return loss, {"loss": loss.detach(), "accuracy": right.sum() / total}
+        return _mean_loss(*self._batch(clips, context.rng, None))
 
     def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
         """Yield the losses of parts of one batch; see `SplitStage`."""
@@ -111,10 +122,13 @@ class ResidualStage:
         losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))
         return losses, right, counts
 
-    def _draw(self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None) -> ResidualSample:
+    def _draw(
+        self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None, *, size: int | None = None
+    ) -> ResidualSample:
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
-        tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
+        chosen = torch.from_numpy(clips).to(device)
+        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size)
         sentences = self.captions.sentences(self.captions.choose(clips, rng))
         drawn = rng.integers(1, self.module.levels, size=len(clips))
         levels = torch.from_numpy(drawn).to(device) if level is None else torch.full_like(lengths, level)
@@ -123,12 +137,22 @@ class ResidualStage:
         return ResidualSample(tokens, lengths, sentences, levels, dropped)
 
 
-def piece_losses(model: ResidualTransformer, sample: ResidualSample) -> tuple[Tensor, Tensor, Tensor]:
-    """Return summed loss, correct answers and tokens (B,) of a part of a batch."""
+def _mean_loss(losses: Tensor, right: Tensor, counts: Tensor) -> tuple[Tensor, Mapping[str, Tensor]]:
+    """Return the loss of a batch, and values to log, from sums (B,) of its samples."""
+    total = counts.sum().clamp(min=1)
+    loss = losses.sum() / total
+    return loss, {"loss": loss.detach(), "accuracy": right.sum() / total}
+
+
+def piece_losses(
+    model: ResidualTransformer, sample: ResidualSample, *, trim: bool = True
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return summed loss, correct answers and tokens (B,) of a part of a batch; `trim` as in `SequenceModel`."""
     tokens, levels = sample.tokens, sample.levels
     valid = frame_mask(sample.lengths, tokens.shape[1])
     below = [model.embed(tokens[..., v], v) * (levels > v)[:, None, None].float() for v in range(model.levels - 1)]
-    logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sample.sentences, sample.dropped))
+    sentence = model.sentence(sample.sentences, sample.dropped)
+    logits = model(torch.stack(below).sum(0), valid, levels, sentence, trim=trim)
     targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
     losses = token_losses(logits, targets) * valid
     right = hits(logits.detach(), targets) * valid

@@ -69,10 +69,10 @@ class RelativeAttention(nn.Module):
     def _positions(self, query: Tensor, terms: Tensor, reach: Reach) -> Tensor:
         """Return (q_i + v)·φ_{i−j} of frames (N, H, n, w / H) over prompts and frames: (N, H, n, P + n)."""
         size = query.shape[2]
-        query = query + self._heads(self.v)
-        prompt = terms[:, :, reach.to_prompt].permute(2, 0, 3, 1)  # (1 or N, H, n, w / H)
-        to_prompt = (query * prompt).sum(-1, keepdim=True).expand(-1, -1, -1, reach.prompts)
-        among = query @ terms[..., :size].flip(-1)  # (N, H, n, n), column c is distance n - 1 - c
+        positions = (query + self._heads(self.v)) @ terms  # (N, H, n, D + 1)
+        distance = reach.to_prompt[:, None, :, None].expand(len(positions), self.heads, -1, -1)
+        to_prompt = positions.gather(3, distance).expand(-1, -1, -1, reach.prompts)
+        among = positions[..., :size].flip(-1)  # (N, H, n, n), column c is distance n - 1 - c
         # Transformer-XL's shift: row i moves left by n - 1 - i; wrapped entries lie above the diagonal
         shifted = F.pad(among, (1, 0)).view(*among.shape[:2], size + 1, size)[:, :, 1:]
         return torch.cat([to_prompt, shifted], -1)

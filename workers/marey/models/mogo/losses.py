@@ -55,16 +55,14 @@ def level_sums(model: RQHCTransformer, states: Tensor, targets: Tensor, share: f
             Without a depth head less than 1 saves nothing.
     """
     targets, states = targets.transpose(1, 2).flatten(0, 1), states.flatten(0, 1)
-    whole = targets[:, -1] != NOT_ASKED  # the end of a clip is a target of level 0 alone
-    if share < 1:
-        whole &= torch.rand(len(whole), device=whole.device) < share
-    brief = (targets[:, 0] != NOT_ASKED) & ~whole
-    codes = targets[whole]
-    every = model.score(model.refine(states[whole], codes[:, :-1]))  # (N, V, K + 1)
-    first = model.score(model.refine(states[brief][:, :1], codes[:0].new_empty(int(brief.sum()), 0)))
-    sums = _sums(every, codes)
-    alone = _sums(first, targets[brief][:, :1])
-    padding = (0, model.levels - 1)
+    drawn, others = _split(len(targets), share, targets.device)
+    codes = targets[drawn]
+    below = codes[:, :-1].masked_fill(codes[:, :-1] == model.end, NOT_ASKED)  # END is never an input
+    sums = _sums(model.score(model.refine(states[drawn], below)), codes)
+    if not len(others):
+        return sums
+    first = model.score(model.refine(states[others][:, :1], codes.new_empty(len(others), 0)))
+    alone, padding = _sums(first, targets[others][:, :1]), (0, model.levels - 1)
     return sums + LevelSums(F.pad(alone.losses, padding), F.pad(alone.right, padding), F.pad(alone.asked, padding))
 
 
@@ -83,16 +81,27 @@ def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Te
     for distance, project in zip(model.config.ahead, model.ahead, strict=True):
         wanted = targets[:, 0, distance:]
         now = position[: max(size - distance, 0)]
-        asked = (wanted != NOT_ASKED) & (wanted != model.end) & (torch.rand(wanted.shape, device=wanted.device) < share)
+        asked = (wanted != NOT_ASKED) & (wanted != model.end)
         if seam is not None:
             asked &= (now >= seam[:, None]) | (now + distance < seam[:, None])
-        logits = model.score(project(states[:, : len(now), 0][asked])[:, None])[:, 0]
-        losses.append(F.cross_entropy(logits, wanted[asked], reduction="sum") / asked.sum().clamp(min=1))
+        drawn, _ = _split(wanted.numel(), share, wanted.device)
+        codes = wanted.masked_fill(~asked, NOT_ASKED).flatten()[drawn]
+        logits = model.score(project(states[:, : len(now), 0].flatten(0, 1)[drawn])[:, None])[:, 0]
+        loss = F.cross_entropy(logits, codes, ignore_index=NOT_ASKED, reduction="sum")
+        losses.append(loss / (codes != NOT_ASKED).sum().clamp(min=1))
     return torch.stack(losses).mean() if losses else states.new_zeros(())
 
 
+def _split(rows: int, share: float, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return a `share` of so many rows, drawn at random, and the others; all in their order where the share is 1."""
+    every = torch.arange(rows, device=device) if share >= 1 else torch.rand(rows, device=device).argsort()
+    count = round(min(share, 1.0) * rows)  # known on the host: steps are recorded on a GPU
+    return every[:count], every[count:]
+
+
 def _sums(logits: Tensor, codes: Tensor) -> LevelSums:
-    """Sum over logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
-    losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), reduction="none").view(codes.shape).sum(0)
-    right = hits(logits.detach(), codes).sum(0)
-    return LevelSums(losses, right, right.new_full(right.shape, len(codes)))
+    """Sum over logits (N, m, K + 1) and codes (N, m), m levels; those that are NOT_ASKED do not count."""
+    asked = codes != NOT_ASKED
+    losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), ignore_index=NOT_ASKED, reduction="none")
+    right = (hits(logits.detach(), codes) * asked).sum(0)
+    return LevelSums(losses.view(codes.shape).sum(0), right, asked.sum(0).to(right.dtype))

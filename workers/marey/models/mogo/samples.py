@@ -161,12 +161,12 @@ class Samples:
         captions, frames = torch.tensor(said, device=self.tokens.device).unbind(1)
         return captions, frames
 
-    def collate(self, stretches: Sequence[TokenSpan]) -> SequenceSample:
-        """Collect tokens and prompts of spans."""
+    def collate(self, stretches: Sequence[TokenSpan], size: int | None = None) -> SequenceSample:
+        """Collect tokens and prompts of spans, padded to `size` frames or to the longest of them."""
         device = self.tokens.device
         columns = np.array([(s.first, s.frames, s.skipped, s.before, s.after, s.seam) for s in stretches])
         first, lengths, skipped, before, after, seam = torch.from_numpy(columns).to(device).unbind(1)
-        size = int(lengths.max())
+        size = int(columns[:, 1].max()) if size is None else size
         position = torch.arange(size, device=device)
         index = (first[:, None] + position).clamp(max=len(self.tokens) - 1)
         tokens = self.tokens[index].masked_fill(~(position < lengths[:, None])[..., None], -1)

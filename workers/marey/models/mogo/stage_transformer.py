@@ -17,10 +17,10 @@ from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.samples import MIN_FRAMES, Samples, SequenceSample
 from marey.models.mogo.steers import Steers
-from marey.training.loop import StepContext
 from marey.training.motions import TokenData
 from marey.training.pairs import Pairs
 from marey.training.sentences import SentenceData, text_statistics
+from marey.training.stages import StepContext
 
 
 class TransformerStage:
@@ -57,11 +57,28 @@ class TransformerStage:
         """Return one group."""
         return [list(self.module.parameters())]
 
+    @property
+    def recordable(self) -> bool:
+        """Return True."""
+        return True
+
+    def batch(self, context: StepContext) -> SequenceSample:
+        """Return a batch, padded to the longest sample."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        return self.samples.collate(self.samples.draw(clips, context.rng), self.config.max_frames)
+
+    def batch_loss(self, batch: SequenceSample) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        return self._mean_loss([self._losses(batch, self.config.depth.share)])
+
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return the loss of one batch, computed in pieces."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
         pieces = list(self.samples.collate(self.samples.draw(clips, context.rng)).pieces())
-        found = [self._losses(piece, self.config.depth.share) for piece in pieces]
+        return self._mean_loss([self._losses(piece, self.config.depth.share) for piece in pieces])
+
+    def _mean_loss(self, found: Sequence[tuple[LevelSums, Tensor]]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch, and values to log, from the losses of its pieces."""
         sums = reduce(add, [levels for levels, _ in found])
         ahead = torch.stack([later for _, later in found]).mean()
         loss, means = sums.loss(self.config.first_level), sums.means.detach()

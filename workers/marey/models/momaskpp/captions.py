@@ -71,11 +71,11 @@ class WordData:
             distributed.broadcast(torch.zeros(1, device=device))  # the others wait for the files
         return cls(sentences, *_read(prepared.path, config.width, len(sentences.sentence)), config.max_words)
 
-    def words(self, captions: Tensor) -> TextStates:
-        """Return the states of captions (B,), as long as the longest of them."""
+    def words(self, captions: Tensor, size: int | None = None) -> TextStates:
+        """Return the states of captions (B,), padded to `size` words or to the longest of them."""
         chosen = self.caption[captions.cpu().numpy()]
         parts = [self.states[self.start[text] : self.start[text + 1]] for text in chosen]
-        longest = max(map(len, parts))
+        longest = max(map(len, parts)) if size is None else size
         padded = np.zeros((len(parts), longest, self.states.shape[1]), np.float32)
         for row, part in enumerate(parts):
             padded[row, : len(part)] = part

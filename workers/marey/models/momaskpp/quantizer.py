@@ -55,17 +55,18 @@ class MultiScaleQuantizer(ResidualQuantizer):
             found.append(scale)
             distance = (latent - scale.total).square().mean(-1, keepdim=True)
             commitment = commitment + (distance * inside).sum() / inside.sum()
-        index = torch.cat([scale.index[scale.valid] for scale in found])
-        usage = torch.bincount(index, minlength=self.codes).float()
+        index = torch.cat([scale.index for scale in found], 1)
+        valid, chosen = torch.cat([scale.valid for scale in found], 1), index.clamp(min=0)
+        usage = self._usage(chosen, valid)
         if self.training:
-            self._update(0, torch.cat([scale.vectors[scale.valid] for scale in found]), index, usage)
+            vectors = torch.cat([scale.vectors for scale in found], 1)
+            self._update(0, vectors, valid, chosen, usage, self._draw(0, vectors, valid))
             self.initialized.fill_(True)
         share = usage / usage.sum().clamp(min=1)
         perplexity = torch.exp(-(share * torch.log(share + 1e-10)).sum())[None]
-        tokens = torch.cat([scale.index for scale in found], 1)[..., None]
         masked = latent * inside
         output = self.straight_through(masked, found[-1].total * inside)
-        return Quantized(output, tokens, commitment / len(found), perplexity)
+        return Quantized(output, index[..., None], commitment / len(found), perplexity)
 
     @torch.no_grad()
     def indices(self, latent: Tensor, lengths: Tensor) -> Tensor:
@@ -90,7 +91,7 @@ class MultiScaleQuantizer(ResidualQuantizer):
             vectors = shrinking(span, positions, size, width) @ (residual * inside)  # (B, P, d)
             valid = frame_mask(self.scales.counts(lengths, scale), width)
             if self.training and scale == 0:
-                self._initialize(0, vectors[valid])
+                self._initialize(0, self._draw(0, vectors, valid))
             index = self._chosen(vectors).masked_fill(~valid, NO_TOKEN)
             enlarged = self._enlarged(index, lengths, scale, size)
             residual, total = residual - enlarged, total + enlarged

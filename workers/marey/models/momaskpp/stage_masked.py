@@ -19,8 +19,8 @@ from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.tokens import ScaleTokens
 from marey.nn.losses import token_losses
 from marey.nn.masking import cosine_schedule, easy_to_hard_mask, mask_counts
-from marey.training.loop import StepContext
 from marey.training.pairs import Pairs, pieces_of
+from marey.training.stages import StepContext
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,25 @@ class ScaleStage:
         """Return one group."""
         return [list(self.module.parameters())]
 
+    @property
+    def recordable(self) -> bool:
+        """Return True."""
+        return True
+
+    def batch(self, context: StepContext) -> ScaleSample:
+        """Return a batch with the positions of the longest clip and the words of the longest caption."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        (sample,) = self.samples(clips, context.rng, size=len(clips), whole=True)
+        return sample
+
+    def batch_loss(self, batch: ScaleSample) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        return _mean_loss(*masked_losses(self.module, batch, self.shown(batch)))
+
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return the mean cross-entropy of masked tokens."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
-        losses, right, count = self._batch(clips, context.rng)
-        loss = losses / count.clamp(min=1)
-        return loss, {"loss": loss.detach(), "accuracy": right / count.clamp(min=1)}
+        return _mean_loss(*self._batch(clips, context.rng))
 
     def parts(self, context: StepContext, size: int) -> Iterator[tuple[Tensor, Mapping[str, Tensor]]]:
         """Yield the losses of parts of one batch; see `SplitStage`."""
@@ -106,10 +119,12 @@ class ScaleStage:
         return {"loss": float(totals[0] / totals[2]), "accuracy": float(totals[1] / totals[2])}
 
     def samples(
-        self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True, size: int | None = None
-    ) -> Iterator[ScaleSample]:
+        self, clips: NDArray[np.int64], rng: np.random.Generator, *,
+        drop: bool = True, size: int | None = None, whole: bool = False,
+    ) -> Iterator[ScaleSample]:  # fmt: skip
         """Draw phase, caption, τ, masks and drop of each clip, in pieces of similar lengths; with `drop` False, all
-        keep their condition. `size` as in `pieces_of`."""
+        keep their condition; `whole` keeps the positions and words that no clip of a piece has. `size` as in
+        `pieces_of`."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.rows(torch.from_numpy(clips).to(device), phases)
@@ -120,8 +135,9 @@ class ScaleStage:
         padded = self.config.perturbation.padded_counts
         masked = choose_masks(self.scales, lengths, progress, noise, padded=padded)
         for rows in pieces_of(lengths, size):
-            columns = bucket_positions(self.scales, int(lengths[rows].max())).to(device)
-            text = self.words.words(captions[rows])
+            longest = self.scales.longest if whole else int(lengths[rows].max())
+            columns = bucket_positions(self.scales, longest).to(device)
+            text = self.words.words(captions[rows], self.words.limit if whole else None)
             there = self.scales.valid(lengths[rows])[:, columns]
             own = tokens[rows][:, columns], columns, there, text, masked[rows][:, columns], dropped[rows]
             yield ScaleSample(*own)
@@ -147,6 +163,12 @@ class ScaleStage:
         found = [masked_losses(self.module, sample, self.shown(sample)) for sample in samples]
         losses, right, counts = zip(*found, strict=True)
         return torch.stack(losses).sum(), torch.stack(right).sum(), torch.stack(counts).sum()
+
+
+def _mean_loss(losses: Tensor, right: Tensor, count: Tensor) -> tuple[Tensor, Mapping[str, Tensor]]:
+    """Return the loss of a batch, and values to log, from sums over its masked tokens."""
+    loss = losses / count.clamp(min=1)
+    return loss, {"loss": loss.detach(), "accuracy": right / count.clamp(min=1)}
 
 
 def masked_losses(model: ScaleTransformer, sample: ScaleSample, shown: Tensor) -> tuple[Tensor, Tensor, Tensor]:

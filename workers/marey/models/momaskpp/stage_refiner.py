@@ -18,9 +18,9 @@ from marey.models.momaskpp.model import ROOT_VELOCITY, LengthHead, RootRefiner, 
 from marey.models.momaskpp.tokens import ScaleTokens
 from marey.nn.motion_tokenizer import biased_std
 from marey.training.length import LengthStage
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.pairs import Pairs
+from marey.training.stages import StepContext
 
 
 class RefinerStage:

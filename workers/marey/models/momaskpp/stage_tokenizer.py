@@ -16,9 +16,9 @@ from marey.motion.features import layout
 from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import ROOT, biased_std
 from marey.training.joints import heading_joints, unit_of, world_joints
-from marey.training.loop import StepContext
 from marey.training.motions import MotionData
-from marey.training.tokenizing import ClipWindows, feature_weights, reconstruction_errors
+from marey.training.stages import StepContext
+from marey.training.tokenizing import ClipWindows, feature_weights, reconstruction_errors, world_share
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def has_positions(config: MoMaskPPConfig) -> bool:
 
 
 def tokenizer_loss(
-    model: Tokenizer, config: MoMaskPPConfig, features: Tensor, lengths: Tensor, fraction: float
+    model: Tokenizer, config: MoMaskPPConfig, features: Tensor, lengths: Tensor, world: float | Tensor
 ) -> Losses:
     """Compute eq. 6 with smooth L1, plus the root once more (published), plus terms on the joints (ours).
 
@@ -48,17 +48,17 @@ def tokenizer_loss(
         config: weights of the terms.
         features: (B, T, D) in their own units.
         lengths: (B,) frames.
-        fraction: of the budget used.
+        world: factor of the term in space; see `world_share`.
     """
     t = config.tokenizer
     output, quantized = model(features, lengths)
     valid = frame_mask(lengths, features.shape[1]).float()
     error = F.smooth_l1_loss(output, model.normalize(features), reduction="none")  # (B, T, D)
 
-    weights = feature_weights(config).to(features.device)  # (D,)
+    weights = feature_weights(config, features.device)  # (D,)
     whole = _average((error * weights).sum(-1) / weights.sum(), valid)
     essential = _average(error[..., slice(*t.essential)].mean(-1), valid)
-    joints = _joint_losses(model.restore(output), features, valid, config, fraction)
+    joints = _joint_losses(model.restore(output), features, valid, config, world)
     total = whole + t.commitment * quantized.commitment + t.essential_weight * essential + joints
     if t.root_weight:
         total = total + t.root_weight * _average(error[..., ROOT].mean(-1), valid)
@@ -72,7 +72,9 @@ def tokenizer_loss(
     )
 
 
-def _joint_losses(restored: Tensor, features: Tensor, valid: Tensor, config: MoMaskPPConfig, fraction: float) -> Tensor:
+def _joint_losses(
+    restored: Tensor, features: Tensor, valid: Tensor, config: MoMaskPPConfig, world: float | Tensor
+) -> Tensor:
     """Return the weighted sum of the terms on joints; 0 where none has a weight."""
     t, total = config.tokenizer, features.new_zeros(())
     if not (t.position_weight or t.velocity_weight or t.world_weight):
@@ -85,8 +87,7 @@ def _joint_losses(restored: Tensor, features: Tensor, valid: Tensor, config: MoM
         total = total + t.velocity_weight * _average(speed, valid[:, 1:])
     if t.world_weight:
         drift = world_joints(restored, *body) - world_joints(features, *body)
-        weight = t.world_weight * min(1.0, 2 * fraction) ** 2  # drift adds up: at first it would dominate
-        total = total + weight * _average(drift.abs().sum(-1).mean(-1), valid)
+        total = total + t.world_weight * world * _average(drift.abs().sum(-1).mean(-1), valid)
     return total
 
 
@@ -112,16 +113,29 @@ class ScaleTokenizerStage:
         """Return one group."""
         return [list(self.module.parameters())]
 
-    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the loss of one window size per step; the batch is scaled to a constant number of frames."""
-        rng, config = context.rng, self.config
-        window = int(rng.choice(config.windows))
-        batch = max(1, self.optimisation.batch * min(config.windows) // window)
-        features, lengths = self.windows.draw(rng, batch, window)
-        own = torch.from_numpy(lengths).to(features.device)
-        losses = tokenizer_loss(self.module, config, features, own, context.fraction)
+    @property
+    def recordable(self) -> bool:
+        """Return True."""
+        return True
+
+    def batch(self, context: StepContext) -> tuple[Tensor, Tensor, Tensor]:
+        """Return the features (B, T, D) of windows, the frames (B,) that are the clips' own, and the factor of the term
+        in space. All windows of a step have one size; the batch is scaled to a constant number of frames."""
+        window = int(context.rng.choice(self.config.windows))
+        size = max(1, self.optimisation.batch * min(self.config.windows) // window)
+        features, lengths = self.windows.draw(context.rng, size, window)
+        device = features.device
+        return features, torch.from_numpy(lengths).to(device), torch.tensor(world_share(context.fraction)).to(device)
+
+    def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+        losses = tokenizer_loss(self.module, self.config, *batch)
         logs = {name: value.detach() for name, value in vars(losses).items() if name != "total"}
         return losses.total, {"loss": losses.total.detach(), **logs}
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of one batch of windows."""
+        return self.batch_loss(self.batch(context))
 
     def after_step(self, context: StepContext) -> None:
         """Do nothing: the codebook is updated in the forward pass."""

@@ -14,8 +14,9 @@ from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import load_scale_tokens
 from marey.nn.devices import choose_device
-from marey.training.loop import TrainingStage, start_process_group
+from marey.training.loop import start_process_group
 from marey.training.motions import MotionData, check_layout
+from marey.training.stages import TrainingStage
 from marey.training.staging import TrainOptions, finish, fit_micro_batch, train_all, use_threads
 
 
