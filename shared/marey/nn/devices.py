@@ -23,7 +23,8 @@ def choose_device(name: str) -> torch.device:
     """
     if name == "auto":
         local = int(os.environ.get("LOCAL_RANK", "0"))
-        return torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+        found = torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+        return _without_cudnn_attention(found)
     try:
         device = torch.device(name)
     except RuntimeError as error:
@@ -32,6 +33,15 @@ def choose_device(name: str) -> torch.device:
         raise InvalidInput("no CUDA device is available", where=name, hint=HINT)
     if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
         raise InvalidInput(f"this machine has {torch.cuda.device_count()} CUDA devices", where=name, hint=HINT)
+    return _without_cudnn_attention(device)
+
+
+def _without_cudnn_attention(device: torch.device) -> torch.device:
+    """Keep torch from choosing the attention of cuDNN, whose gradients with masks are wrong on Hopper: measured for
+    outputs of which only some rows are used (torch 2.11, cuDNN 9.19), reported for some lengths
+    (github.com/pytorch/pytorch/issues/196678). Its other fused kernels agree with the processor."""
+    if device.type == "cuda":
+        torch.backends.cuda.enable_cudnn_sdp(False)
     return device
 
 

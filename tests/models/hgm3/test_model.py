@@ -22,12 +22,13 @@ from marey.models.hgm3.config import PAPER, STARTER, TINY, named_config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
 from marey.models.hgm3.tokenizer import Tokenizer
-from marey.motion.features import HUMANML3D_263
+from marey.motion.features import HUMANML3D_263, layout
 from marey.nn.motion_tokenizer import biased_std
+from marey.nn.quantizer import Quantized
 from marey.nn.ragged import pad_length
 from marey.nn.sampling import guide
 from marey.training.joints import heading_joints, world_joints
-from marey.training.tokenizing import tokenizer_loss, world_share
+from marey.training.tokenizing import swing_weights, tokenizer_loss, world_share
 from tests.support.prepared import graph, made_up_texts, swinging, text_features
 
 CPU = torch.device("cpu")
@@ -410,3 +411,25 @@ def test_the_null_condition_replaces_the_first_token_of_dropped_samples() -> Non
     assert torch.equal(some[1], plain[1])
     assert torch.equal(some[0, 1:], plain[0, 1:])
     assert (some[0, 0] == 7.0).all()
+
+
+def test_errors_of_swinging_joints_weigh_what_the_configuration_says() -> None:
+    names = layout("humanml3d-263").skeleton.joint_names
+    weights = swing_weights("humanml3d-263", torch.device("cpu"), 4.0)
+    assert float(weights.mean()) == pytest.approx(1.0)
+    assert float(weights[names.index("L_wrist")] / weights[names.index("L_knee")]) == pytest.approx(4.0)
+    heavy = replace(TINY, tokenizer=replace(TINY.tokenizer, swing_weight=4.0))
+    model, features = tokenizer().eval(), torch.randn(2, 16, 263)
+    model.forward = lambda *_: (model.normalize(moved), quantized)  # type: ignore[method-assign]
+    errors: dict[str, list[float]] = {}
+    for joint in ("L_wrist", "L_knee"):
+        moved = features.clone()
+        moved[..., 4 + 3 * (names.index(joint) - 1)] += 1.0
+        quantized = Quantized(features, torch.zeros(2, 4, 3).long(), torch.zeros(()), torch.ones(3))
+        found = [tokenizer_loss(model, config, features)[0] for config in (TINY, heavy)]
+        errors[joint] = [float(loss.position) for loss in found] + [float(loss.features) for loss in found]
+    wrist, knee = errors["L_wrist"], errors["L_knee"]
+    assert wrist[0] == pytest.approx(knee[0])
+    assert wrist[1] == pytest.approx(4 * knee[1])
+    assert wrist[3] == pytest.approx(4 * wrist[2], rel=0.5)
+    assert knee[3] < knee[2]

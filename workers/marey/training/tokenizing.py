@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from marey.data.manifest import Clip
 from marey.data.sampling import UNLABELLED, sampling_weights
+from marey.motion.features import layout
 from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
 from marey.nn.quantizer import Quantized
@@ -41,6 +42,8 @@ class TokenizerWeights(Protocol):
     def velocity_weight(self) -> float: ...
     @property
     def world_weight(self) -> float: ...
+    @property
+    def swing_weight(self) -> float: ...
 
 
 class TokenizerTraining(Protocol):
@@ -95,13 +98,14 @@ def tokenizer_loss(
     output, quantized = model(features, lengths)
     target = model.normalize(features)
     valid = torch.ones_like(features[..., 0]) if lengths is None else frame_mask(lengths, features.shape[1]).float()
-    weights = feature_weights(config, features.device)  # (D,)
+    weights = feature_weights(config, features.device, t.swing_weight)  # (D,)
+    joint_weights = swing_weights(config.layout, features.device, t.swing_weight)  # (J,), their mean is 1
     l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
     restored, body = model.restore(output), (config.joints, unit_of(config.layout))
     local = heading_joints(restored, *body) - heading_joints(features, *body)  # (B, T, J, 3)
-    position = _average(local.abs().sum(-1).mean(-1), valid)
-    velocity = _average(local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps, valid[:, 1:])
+    position = _average((local.abs().sum(-1) * joint_weights).mean(-1), valid)
+    velocity = _average((local.diff(dim=1).abs().sum(-1) * joint_weights).mean(-1) * config.fps, valid[:, 1:])
     drift = world_joints(restored, *body) - world_joints(features, *body)
     in_space = _average(drift.abs().sum(-1).mean(-1), valid)
     total = (
@@ -121,11 +125,33 @@ def world_share(fraction: float) -> float:
     return min(1.0, 2 * fraction) ** 2
 
 
-def feature_weights(config: TokenizerTraining, device: torch.device) -> Tensor:
-    """Return the weight of each feature column (D,) in the L1 term: 1, or `rotation_weight` for the 6-D rotations."""
+SWINGING = frozenset(
+    ("L_elbow", "R_elbow", "L_wrist", "R_wrist", "head")  # HumanML3D
+    + ("LE", "RE", "LW", "RW", "BUN")  # KIT-ML
+    + ("L_armLower0001_bind_JNT", "R_armLower0001_bind_JNT", "L_hand0001_bind_JNT", "R_hand0001_bind_JNT")  # SnapMoGen
+    + ("C_head_bind_JNT",)
+)
+"""Joints whose quick swings (waves, claps, nods) are small beside the movements of the body."""
+
+
+def swing_weights(name: str, device: torch.device, weight: float) -> Tensor:
+    """Return the weights (J,) of the joints of a layout, `weight` times as high for `SWINGING`; their mean is 1."""
+    names = layout(name).skeleton.joint_names
+    weights = torch.ones(len(names), device=device)
+    for number, joint in enumerate(names):
+        if joint in SWINGING:
+            weights[number] = weight
+    return weights / weights.mean()
+
+
+def feature_weights(config: TokenizerTraining, device: torch.device, swing: float = 1.0) -> Tensor:
+    """Return the weight of each feature column (D,) in the L1 term: 1, `rotation_weight` for the 6-D rotations, and
+    `swing` times as high for positions of `SWINGING`."""
     weights = torch.ones(config.features, device=device)
     start = 4 + 3 * (config.joints - 1)
     weights[start : start + 6 * (config.joints - 1)] = config.tokenizer.rotation_weight
+    if swing != 1:
+        weights[4:start] = swing_weights(config.layout, device, swing)[1:].repeat_interleave(3)
     return weights
 
 

@@ -35,6 +35,8 @@ class TokenizerConfig:
     position_weight: Weight = 0.0  # ours: L1 on joints in the heading frame, metres
     velocity_weight: Weight = 0.0  # ours: L1 on their velocity, m/s; against jitter and skating
     world_weight: Weight = 0.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
+    swing_weight: Positive = field(default=1.0, metadata=ADDED)
+    """Ours: weight of elbows, wrists and head relative to the other joints, in all terms but that in space."""
 
 
 @dataclass(frozen=True)

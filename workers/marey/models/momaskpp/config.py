@@ -44,6 +44,8 @@ class TokenizerConfig:
     position_weight: float = 0.0  # ours: L1 on joints in the heading frame, metres; 0 where the layout has no such loss
     velocity_weight: float = 0.0  # ours: L1 on their velocity, m/s
     world_weight: float = 0.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
+    swing_weight: float = field(default=1.0, metadata=ADDED)
+    """Ours: weight of elbows, wrists and head relative to the other joints, in all terms but that in space."""
 
     @property
     def frames_per_token(self) -> int:

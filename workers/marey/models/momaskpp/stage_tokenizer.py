@@ -18,7 +18,13 @@ from marey.nn.motion_tokenizer import ROOT, biased_std
 from marey.training.joints import heading_joints, unit_of, world_joints
 from marey.training.motions import MotionData
 from marey.training.stages import StepContext
-from marey.training.tokenizing import ClipWindows, feature_weights, reconstruction_errors, world_share
+from marey.training.tokenizing import (
+    ClipWindows,
+    feature_weights,
+    reconstruction_errors,
+    swing_weights,
+    world_share,
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def tokenizer_loss(
     valid = frame_mask(lengths, features.shape[1]).float()
     error = F.smooth_l1_loss(output, model.normalize(features), reduction="none")  # (B, T, D)
 
-    weights = feature_weights(config, features.device)  # (D,)
+    weights = feature_weights(config, features.device, t.swing_weight)  # (D,)
     whole = _average((error * weights).sum(-1) / weights.sum(), valid)
     essential = _average(error[..., slice(*t.essential)].mean(-1), valid)
     joints = _joint_losses(model.restore(output), features, valid, config, world)
@@ -82,8 +88,9 @@ def _joint_losses(
     body = config.joints, unit_of(config.layout)
     if t.position_weight or t.velocity_weight:
         local = heading_joints(restored, *body) - heading_joints(features, *body)
-        total = total + t.position_weight * _average(local.abs().sum(-1).mean(-1), valid)
-        speed = local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps
+        weights = swing_weights(config.layout, features.device, t.swing_weight)
+        total = total + t.position_weight * _average((local.abs().sum(-1) * weights).mean(-1), valid)
+        speed = (local.diff(dim=1).abs().sum(-1) * weights).mean(-1) * config.fps
         total = total + t.velocity_weight * _average(speed, valid[:, 1:])
     if t.world_weight:
         drift = world_joints(restored, *body) - world_joints(features, *body)
