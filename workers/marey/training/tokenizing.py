@@ -125,12 +125,10 @@ def world_share(fraction: float) -> float:
     return min(1.0, 2 * fraction) ** 2
 
 
-SWINGING = frozenset(
-    ("L_elbow", "R_elbow", "L_wrist", "R_wrist", "head")  # HumanML3D
-    + ("LE", "RE", "LW", "RW", "BUN")  # KIT-ML
-    + ("L_armLower0001_bind_JNT", "R_armLower0001_bind_JNT", "L_hand0001_bind_JNT", "R_hand0001_bind_JNT")  # SnapMoGen
-    + ("C_head_bind_JNT",)
-)
+_HUMANML3D = ("L_elbow", "R_elbow", "L_wrist", "R_wrist", "head")
+_KIT = ("LE", "RE", "LW", "RW", "BUN")
+_SNAPMOGEN = tuple(f"{side}_{part}0001_bind_JNT" for side in "LR" for part in ("armLower", "hand"))
+SWINGING = frozenset((*_HUMANML3D, *_KIT, *_SNAPMOGEN, "C_head_bind_JNT"))
 """Joints whose quick swings (waves, claps, nods) are small beside the movements of the body."""
 
 
