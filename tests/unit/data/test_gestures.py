@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from marey.data import gestures
 from marey.data.describe import describe_text
-from marey.data.gestures import KINDS, made_gestures
+from marey.data.gestures import KINDS, made_gestures, read_captions
 from marey.data.pack import PackClip
 from marey.data.part import MAX_FRAMES, Part
 from marey.data.sampling import sampling_weights
@@ -164,6 +165,15 @@ def test_captions_are_in_three_voices_and_name_the_side_that_acts(made: list[Par
             if part.content in ("wave", "raise-arm", "guide", "reach-forward") and part.source.side != "both":
                 assert part.source.side in text.lower(), text
                 assert OTHER[part.source.side] not in text.lower(), text
+
+
+def test_captions_come_from_several_files_and_no_key_stands_twice(tmp_path: Path) -> None:
+    (tmp_path / "gestures.toml").write_text('[a]\nwave = ["wave"]\n[b]\nwave = ["She waves."]\n', "utf-8")
+    (tmp_path / "gestures_more.toml").write_text('[a]\nbow = ["bow"]\n', "utf-8")
+    assert read_captions(tmp_path) == {"a": {"wave": ["wave"], "bow": ["bow"]}, "b": {"wave": ["She waves."]}}
+    (tmp_path / "gestures_other.toml").write_text('[b]\nwave = ["He waves."]\n', "utf-8")
+    with pytest.raises(ValueError, match="wave"):
+        read_captions(tmp_path)
 
 
 def test_the_same_idles_give_the_same_gestures(monkeypatch: pytest.MonkeyPatch) -> None:

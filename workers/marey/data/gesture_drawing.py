@@ -24,7 +24,7 @@ class Gesture:
 
     Attributes:
         seconds: its length, including the time standing before and after it.
-        kinds: keys of `gestures.toml` that apply to it.
+        kinds: keys of the files `gestures*.toml` that apply to it.
         change: applies it to a body of that length.
         side: left, right, both or empty.
         times: number of bows.

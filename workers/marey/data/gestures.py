@@ -2,7 +2,7 @@
 
 Each gesture modifies a captured clip and keeps its feet, breath and sway; side, height, pace, length and number are
 random. These clips are marked as `made`, are used for training only, and are at most half of the draws of an action
-(`marey.data.sampling`). `gestures.toml` has captions of each kind in three voices.
+(`marey.data.sampling`). The files `gestures*.toml` have captions of each kind in three voices.
 """
 
 from __future__ import annotations
@@ -129,7 +129,23 @@ def _captions_of(gesture: Gesture, rng: random.Random) -> tuple[tuple[str, ...],
 
 @cache
 def _captions() -> Mapping[str, Mapping[str, Sequence[str]]]:
-    return tomllib.loads(Path(__file__).with_name("gestures.toml").read_text("utf-8"))
+    return read_captions(Path(__file__).parent)
+
+
+def read_captions(folder: Path) -> Mapping[str, Mapping[str, Sequence[str]]]:
+    """Read the captions by voice and key from all `gestures*.toml` of a folder.
+
+    Raises:
+        ValueError: if a key stands twice in one voice.
+    """
+    voices: dict[str, dict[str, Sequence[str]]] = {}
+    for path in sorted(folder.glob("gestures*.toml")):
+        for voice, rows in tomllib.loads(path.read_text("utf-8")).items():
+            said = voices.setdefault(voice, {})
+            if twice := sorted(said.keys() & rows.keys()):
+                raise ValueError(f"{path.name}: voice {voice} has captions already of {', '.join(twice)}")
+            said.update(rows)
+    return voices
 
 
 KINDS: Mapping[str, Kind] = {
