@@ -100,7 +100,7 @@ class StandingBody:
         pivot = self.joints[:, joint : joint + 1]
         self.joints[:, moved] = pivot + rotate(turned[:, None], self.joints[:, moved] - pivot)
 
-    def move_arm(self, side: str, way: Array, upper: Array, fore: Array, lag: float) -> None:
+    def move_arm(self, side: str, way: Array, upper: Array, fore: Array, lag: float, *, straight: bool = False) -> None:
         """Move an arm from its current direction to another and back.
 
         Args:
@@ -108,6 +108,7 @@ class StandingBody:
             way: (T,) progress of the movement, 0 to 1.
             upper, fore: (T, 3) or (3,) directions of upper arm and forearm at 1, in the body's frame.
             lag: seconds by which the forearm follows the upper arm.
+            straight: go there the shortest way instead of past the front of the body with a bent elbow.
         """
         collar, shoulder, elbow, wrist = ARMS[side]
         later = np.interp(np.arange(len(way)) - lag * FPS, np.arange(len(way)), way)
@@ -118,6 +119,7 @@ class StandingBody:
         ):
             here = self.local(normalize(self.joints[:, b] - self.joints[:, a]), side)
             w = weight[:, None]
+            via = 0.5 * (here + target) if straight else via
             bones.append(normalize((1 - w) ** 2 * here + 2 * w * (1 - w) * via + w**2 * target).astype(np.float64))
         elevation = np.arcsin(np.clip(bones[0][:, 1], -1, 1))
         hanging = normalize(self.joints[:, elbow] - self.joints[:, shoulder])[:, 1]
@@ -167,6 +169,10 @@ class StandingBody:
         """
         middle = self.joints[:, [arm[1] for arm in ARMS.values()]].mean(1)
         self.move_arm(side, way, *self.reach(side, self.from_shoulder(side, middle) + point, pole), lag)
+
+    def lift_arm(self, side: str, degrees: Array) -> None:
+        """Lift a hanging arm away from the body by turning its shoulder by `degrees` (T,)."""
+        self.turn(ARMS[side][1], "forward", _SIGN[side] * degrees)
 
     def shrug(self, degrees: Array) -> None:
         """Lift both shoulders by turning the collars by `degrees` (T,)."""

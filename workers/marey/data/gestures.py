@@ -26,6 +26,7 @@ from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run, sprint
 from marey.data.gesture_hands import reach_forward, talk
+from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import ARMS, StandingBody
 from marey.data.gesture_trunk import bow, nod, shiver
 from marey.data.part import FPS, Part
@@ -162,4 +163,7 @@ KINDS: Mapping[str, Kind] = {
     "talk": Kind(100, talk, is_plain_idle),
     "shiver": Kind(60, shiver, is_plain_idle),
     "sprint": Kind(60, sprint, is_quick_run),
+    "drink": Kind(120, drink, is_plain_idle),
+    "reach-up": Kind(120, reach_up, is_plain_idle),
+    "arm-circles": Kind(120, arm_circles, is_plain_idle),
 }
