@@ -30,6 +30,7 @@ class Gesture:
         times: number of bows.
         base: what is taken of a captured clip before the change, (T, 22, 3), or None if the clip does not do; without
             it, `seconds` of an idle.
+        content: the action of the captured clips that it may be put onto, or empty for all clips of its kind.
     """
 
     seconds: float
@@ -38,6 +39,7 @@ class Gesture:
     side: str = ""
     times: int = 1
     base: Callable[[Part], Array | None] | None = None
+    content: str = ""
 
 
 @dataclass(frozen=True)

@@ -135,20 +135,21 @@ class StandingBody:
         self.joints[:, elbow] = self.joints[:, shoulder] + _LENGTH[elbow] * self.world(bones[0], side)
         self.joints[:, wrist] = self.joints[:, elbow] + _LENGTH[wrist] * self.world(bones[1], side)
 
-    def reach(self, side: str, target: Array, pole: Sequence[float] = _POLE) -> tuple[Array, Array]:
+    def reach(self, side: str, target: Array, pole: Sequence[float] | Array = _POLE) -> tuple[Array, Array]:
         """Directions (T, 3) of upper arm and forearm that put the wrist at a target.
 
         Args:
             side: of the arm.
             target: (T, 3) the wrist relative to the shoulder, in the body's frame, metres; brought into reach.
-            pole: where the elbow points, in the body's frame; down and outward by default.
+            pole: (3,) or (T, 3) where the elbow points, in the body's frame; down and outward by default.
         """
         _, _, elbow, wrist = ARMS[side]
         upper, lower = _LENGTH[elbow], _LENGTH[wrist]
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
         axis = target / distance
         distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
-        aside = np.asarray(pole) - axis * (axis @ np.asarray(pole))[:, None]
+        poles = np.broadcast_to(np.asarray(pole), axis.shape)
+        aside = poles - axis * (axis * poles).sum(-1, keepdims=True)
         along = (distance**2 + upper**2 - lower**2) / (2 * distance)
         bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * normalize(aside)
         return normalize(bent), normalize(distance * axis - bent)

@@ -22,12 +22,18 @@ from marey.data.captions import seeded
 from marey.data.compose import TRIES
 from marey.data.describe import describe_text
 from marey.data.gesture_aims import aim, shoot_basket
+from marey.data.gesture_archery import draw_bow
 from marey.data.gesture_arms import clap, guide, raise_arm, wave
+from marey.data.gesture_balls import dribble
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run, sprint
+from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
+from marey.data.gesture_laughs import laugh
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import ARMS, StandingBody
+from marey.data.gesture_pushes import push
+from marey.data.gesture_throws import throw
 from marey.data.gesture_trunk import bow, nod, shiver
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
@@ -88,10 +94,16 @@ def is_plain_idle(part: Part) -> bool:
     )
 
 
+def _is_plain(part: Part) -> bool:
+    return is_plain_idle(part) or is_plain_walk(part)
+
+
 def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
     rng = seeded("gesture", name)
     gesture = KINDS[action].draw(rng)
     if round(gesture.seconds * FPS) > LIMIT:
+        return None
+    if not (bases := [part for part in bases if gesture.content in ("", part.content)]):
         return None
     base = rng.choice(bases)
     taken = gesture.base(base) if gesture.base else _of_length(base.joints, round(gesture.seconds * FPS), rng)
@@ -166,4 +178,10 @@ KINDS: Mapping[str, Kind] = {
     "drink": Kind(120, drink, is_plain_idle),
     "reach-up": Kind(120, reach_up, is_plain_idle),
     "arm-circles": Kind(120, arm_circles, is_plain_idle),
+    "draw-bow": Kind(120, draw_bow, is_plain_idle),
+    "push": Kind(120, push, _is_plain),
+    "throw": Kind(140, throw, is_plain_idle),
+    "laugh": Kind(120, laugh, is_plain_idle),
+    "fight-stance": Kind(120, fight_stance, is_plain_idle),
+    "dribble": Kind(120, dribble, _is_plain),
 }

@@ -1,0 +1,90 @@
+"""Bows that are drawn; see `marey.data.gestures`."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+
+from marey.data.gesture_drawing import SIDES, Gesture, respond
+from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, direction, envelope
+from marey.data.gesture_steps import glide, settle, step, turn_hips
+
+_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
+_ARM = 0.52
+"""Metres from shoulder to wrist."""
+_HEAD, _NECK = 15, (12,)
+_LONGEST = 9.6
+
+
+def draw_bow(rng: random.Random) -> Gesture:
+    side = rng.choices(SIDES, (3, 2))[0]
+    draws = _OTHER[side]
+    aside, up = rng.uniform(20, 74), rng.uniform(-7, 12)
+    looses, nocks = rng.random() < 0.75, rng.random() < 0.5
+    shots = 2 if looses and rng.random() < 0.25 else 1
+    start, lift = rng.uniform(0.05, 0.8), rng.uniform(0.45, 0.9)
+    wait = rng.uniform(0.4, 1.1) if nocks else 0.0
+    draw, hold = rng.uniform(0.5, 1.3), rng.uniform(0.4, 2.6) / shots
+    again, rest, fall = rng.uniform(0.9, 1.4), rng.uniform(0.3, 1.0), rng.uniform(0.5, 1.0)
+    rise = start + lift + wait  # the bow arm is up and the draw begins
+    at, drawn, goes = [0.0, rise], [0.0, 0.0], rise
+    for shot in range(shots):
+        at += [goes + draw, goes + draw + hold]
+        drawn += [1.0, 1.0]
+        if looses:
+            at.append(at[-1] + 0.12)
+            drawn.append(1.0 + rng.uniform(0.25, 0.45))
+        if shot < shots - 1:
+            goes = at[-1] + again
+            at += [at[-1] + 0.2, goes]
+            drawn += [drawn[-1], 0.0]
+    end = at[-1] + rest
+    low = (rng.uniform(-0.02, 0.06), rng.uniform(-0.32, -0.2), rng.uniform(0.28, 0.36))
+    cheek = (
+        rng.uniform(0.1, 0.13),
+        rng.uniform(-0.13, -0.06),
+        rng.uniform(-0.11, -0.02),
+    )  # aside, up, toward the target
+    high = rng.uniform(0.08, 0.4)
+    twist, hips = rng.uniform(0.4, 0.6) * (90 - aside), rng.uniform(6, 22)
+    stride, turn, steps = rng.uniform(0.08, 0.22), rng.uniform(0, 25), rng.random() < 0.6
+    sink, stands = rng.uniform(0.0, 0.03), -1.0 if rng.random() < 0.5 else max(start - 0.2, 0.0)
+
+    def change(body: StandingBody) -> None:
+        frames = len(body.joints)
+        way = envelope(frames, start, lift, end - start - lift, fall)
+        raised = envelope(frames, start + (lift + 0.3 * wait if nocks else 0.0), max(lift, 0.6), 60.0, 1.0)
+        pulled = glide(frames, at, [[one] for one in drawn])[:, 0]
+        if steps:  # a foot stands or steps toward the target
+            step(body, side, (stride, 0.1), stands, 0.5, turn=turn)
+            body.shift(-sink * way, 0.05 * way)
+        turn_hips(body, (-1.0 if side == LEFT else 1.0) * hips * way)
+        respond(body, way, side, twist, 0.0)
+        body.lean((1.0 if side == LEFT else -1.0) * 0.7 * aside * way, "up", _NECK)
+        settle(body)
+        bow = direction(aside, up)
+        carried = np.tile(low, (frames, 1)) + body.from_shoulder(side, body.joints[:, [16, 17]].mean(1))
+        pull = np.clip(pulled, 0.0, 1.0)[:, None]
+        w = (raised if nocks else np.ones(frames))[:, None]
+        bent = (1 - w) * carried + w * (0.8 + 0.17 * pull) * _ARM * bow
+        bones = [
+            (1 - 0.8 * w * pull) * bone + 0.8 * w * pull * bow for bone in body.reach(side, bent, (0.3, -1.0, -0.4))
+        ]
+        body.move_arm(side, way, bones[0], bones[1], 0.04)
+        aim = np.array([-bow[0], bow[1], bow[2]])  # outward is the other way for the drawing hand
+        string = body.from_shoulder(draws, body.joints[:, ARMS[side][3]]) - 0.1 * aim
+        beside = np.array([aim[2], 0.0, -aim[0]])
+        string += 0.08 * beside
+        face = body.from_shoulder(draws, body.joints[:, _HEAD]) + cheek[0] * beside + [0.0, cheek[1], 0.0]
+        u = pulled[:, None]
+        pole = (1 - u) * (0.8 * beside - [0.0, 0.7, 0.0]) + u * [-0.9 * aim[0], high, -0.9 * aim[2]]
+        body.move_arm(draws, way, *body.reach(draws, (1 - u) * string + u * (face + cheek[2] * aim), pole), 0.04)
+
+    kinds = ["draw-bow", "draw-bow-loose" if looses else "draw-bow-hold", "draw-bow-hand"]
+    if shots > 1:
+        kinds.append("draw-bow-twice")
+    elif hold > 1.4:
+        kinds.append("draw-bow-aim")
+    seconds = end + fall + rng.uniform(0.2, 0.8)
+    return Gesture(min(seconds, _LONGEST), tuple(kinds), change, side, shots)
