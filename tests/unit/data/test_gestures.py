@@ -24,7 +24,8 @@ from tests.unit.data.test_sampling import clip
 WRIST, SHOULDER = {"left": 20, "right": 21}, {"left": 16, "right": 17}
 OTHER = {"left": "right", "right": "left"}
 ON_TOES = ("shoot-basket", "reach-up")
-STEPPING = ("carry", "draw-bow", "push", "throw", "fight-stance", "dribble")
+FIGHTS = ("punch", "stab", "slash", "block")
+STEPPING = ("carry", "draw-bow", "push", "throw", "fight-stance", "dribble", *FIGHTS)
 OPEN_ENDED = ("carry", "aim", "talk", "shiver", *STEPPING[1:])
 """Clips that may begin or end within the action."""
 SAID = (("stand still",),)

@@ -22,7 +22,7 @@ _LEAST_STROKES = 5
 
 def dribble(rng: random.Random) -> Gesture:
     walks = rng.random() < 0.35
-    low, crosses = rng.random() < 0.3, not walks and rng.random() < 0.3
+    low, crosses = not walks and rng.random() < 0.35, not walks and rng.random() < 0.3
     side = rng.choice(SIDES)
     rate = rng.uniform(1.9, 2.7) if low else rng.uniform(1.25, 2.1)
     strong = rng.uniform(0.07, 0.1) if low else rng.uniform(0.09, 0.15)

@@ -1,9 +1,9 @@
-"""Bodies that stand in guard; see `marey.data.gestures`."""
+"""Stances of fighters, and bodies that stand in guard; see `marey.data.gestures`."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,21 @@ def drawn_stance(rng: random.Random, lead: str, start: float, end: float | None)
         body.lean(0.3 * lean * way, "left", _NECK)
 
     return stand
+
+
+def near(rng: random.Random, place: Sequence[float], wide: float = 0.03) -> tuple[float, ...]:
+    """A place at random within `wide` metres of another, on each axis."""
+    return tuple(one + rng.uniform(-wide, wide) for one in place)
+
+
+def begun(rng: random.Random, lead: str) -> tuple[float, float, Stance | None]:
+    """Draw how a fight begins: when the guard is reached, when it begins (negative: before the clip), and the stance
+    of the legs, None for legs that stay as they are."""
+    if rng.random() < 0.3:
+        start = rng.uniform(0.1, 0.6)
+        return start + rng.uniform(0.5, 0.7), start, None
+    start = -2.0 if rng.random() < 0.6 else rng.uniform(0.1, 0.4)
+    return max(start + 0.9, rng.uniform(0.15, 0.6)), start, drawn_stance(rng, lead, start, None)
 
 
 def fight_stance(rng: random.Random) -> Gesture:

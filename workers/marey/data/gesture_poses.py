@@ -158,7 +158,9 @@ class StandingBody:
         """Convert points (T, 3) of the world to the body's frame, relative to a shoulder."""
         return self.local(points - self.joints[:, ARMS[side][1]], side)
 
-    def hold(self, side: str, way: Array, point: Array, *, lag: float = 0.0, pole: Sequence[float] = _POLE) -> None:
+    def hold(
+        self, side: str, way: Array, point: Array, *, lag: float = 0.0, pole: Sequence[float] | Array = _POLE
+    ) -> None:
         """Move a hand to a point before the chest and back; see `move_arm`.
 
         Args:

@@ -25,7 +25,9 @@ from marey.data.gesture_aims import aim, shoot_basket
 from marey.data.gesture_archery import draw_bow
 from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_balls import dribble
+from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_drawing import SIDES, Gesture
+from marey.data.gesture_fights import block, punch
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run, sprint
 from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
@@ -184,4 +186,8 @@ KINDS: Mapping[str, Kind] = {
     "laugh": Kind(120, laugh, is_plain_idle),
     "fight-stance": Kind(120, fight_stance, is_plain_idle),
     "dribble": Kind(120, dribble, _is_plain),
+    "punch": Kind(140, punch, is_plain_idle),
+    "stab": Kind(120, stab, is_plain_idle),
+    "slash": Kind(140, slash, is_plain_idle),
+    "block": Kind(120, block, is_plain_idle),
 }
