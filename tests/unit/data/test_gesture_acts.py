@@ -14,7 +14,7 @@ from tests.unit.data.test_gestures import OTHER, SHOULDER, WRIST, few, height, i
 
 HEAD, NECK, HIPS = 15, 12, 0
 ELBOW = {"left": 18, "right": 19}
-ACTS = ("draw-bow", "push", "throw", "laugh", "fight-stance", "dribble")
+ACTS = ("draw-bow", "push", "throw", "laugh", "fight-stance", "dribble", "signal")
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +116,17 @@ def test_one_hand_makes_strokes_beside_the_hips_in_a_dribble(made: list[Part]) -
         assert knee < level < chest
         assert height(part, part.source.side).max() < 0.0
     assert any(np.ptp(part.joints[:, HIPS, 2]) > 1.0 for part in dribbles)
+
+
+def test_arms_are_held_in_three_or_more_places_away_from_the_trunk(made: list[Part]) -> None:
+    for part in of(made, "signal"):
+        places = []
+        for side in ("left", "right"):
+            seen = part.joints[:, WRIST[side]] - part.joints[:, SHOULDER[side]]
+            away = seen[:, 1] > -0.3
+            assert speed(seen).max() < 9.0
+            assert away.any() or side != part.source.side
+            for frame in np.flatnonzero(away)[::3]:
+                if all(np.linalg.norm(seen[frame] - place) > 0.25 for place in places):
+                    places.append(seen[frame])
+        assert len(places) >= 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from collections import Counter
 from dataclasses import replace
@@ -203,3 +204,14 @@ def test_made_clips_are_at_most_half_of_what_is_drawn_of_an_action() -> None:
     assert weights[:32].sum() == pytest.approx(weights[32:].sum())
     few = sampling_weights([captured] * 30 + [made] * 2)
     assert few[:30].sum() == pytest.approx(15 * few[30:].sum())
+
+
+def test_every_special_kind_that_is_drawn_has_captions_in_every_voice() -> None:
+    voices = read_captions(Path(gestures.__file__).parent)
+    assert set(voices) == {"a", "b", "c"}
+    for kind in KINDS.values():
+        drawn = {key for number in range(80) for key in kind.draw(random.Random(number)).kinds}
+        for said in voices.values():
+            assert drawn <= said.keys()
+    keys = [set(said) for said in voices.values()]
+    assert keys[0] == keys[1] == keys[2]

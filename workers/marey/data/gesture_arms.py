@@ -97,21 +97,26 @@ def guide(rng: random.Random) -> Gesture:
 
 
 def clap(rng: random.Random) -> Gesture:
-    high = rng.random() < 0.3
+    high = rng.random() < 0.35
     tempo = rng.choice(["slow", "", "", "fast"])
-    rate = {"slow": rng.uniform(1.1, 1.6), "": rng.uniform(1.7, 2.4), "fast": rng.uniform(2.6, 3.4)}[tempo]
-    pace = GesturePace.draw(rng, (0.4, 0.9), (3.6 / rate, 5.0))
-    above = rng.uniform(0.02, 0.4) if high else rng.uniform(-0.28, -0.06)
-    ahead = rng.uniform(0.2, 0.3) if high else rng.uniform(0.27, 0.36)
-    apart = rng.uniform(0.1, 0.22)
+    rate = {"slow": rng.uniform(0.8, 1.5), "": rng.uniform(1.7, 2.4), "fast": rng.uniform(2.6, 3.6)}[tempo]
+    pace = GesturePace.draw(rng, (0.4, 0.9), (3.6 / rate, max(5.0, 4.0 / rate)))
+    above = rng.uniform(0.02, 0.46) if high else rng.uniform(-0.34, -0.06)
+    ahead = rng.uniform(0.18, 0.3) if high else rng.uniform(0.25, 0.36)
+    apart = rng.uniform(0.16, 0.34) if tempo == "slow" else rng.uniform(0.09, 0.22)
+    aside, beat, gaze = rng.uniform(-0.05, 0.05), rng.uniform(0.0, 0.035), rng.uniform(-10, 8)
 
     def change(body: StandingBody) -> None:
         way = pace.way(body)
-        gap = 0.05 + apart * (0.5 - 0.5 * swings(way, rate))
+        swing = swings(way, rate)
+        gap = 0.05 + apart * (0.5 - 0.5 * swing)
+        body.lean((gaze if not high else -abs(gaze)) * way, "left", (12,))
+        body.shift(-0.4 * beat * way * (0.5 + 0.5 * swing))
         middle = body.joints[:, [ARMS[side][1] for side in SIDES]].mean(1)
         for side in SIDES:
             seen = body.from_shoulder(side, middle)
-            target = np.stack([seen[:, 0] + gap, seen[:, 1] + above, seen[:, 2] + ahead], axis=-1)
+            out = gap + (aside if side == SIDES[0] else -aside)
+            target = np.stack([seen[:, 0] + out, seen[:, 1] + above + beat * swing, seen[:, 2] + ahead], axis=-1)
             body.move_arm(side, way, *body.reach(side, target), 0.03)
 
     kinds = ("clap-high" if high else "clap", *([f"clap-{tempo}"] if tempo else []))

@@ -35,6 +35,7 @@ from marey.data.gesture_laughs import laugh
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import ARMS, StandingBody
 from marey.data.gesture_pushes import push
+from marey.data.gesture_signs import signal
 from marey.data.gesture_throws import throw
 from marey.data.gesture_trunk import bow, nod, shiver
 from marey.data.part import FPS, Part
@@ -168,7 +169,7 @@ KINDS: Mapping[str, Kind] = {
     "raise-arm": Kind(160, raise_arm, is_plain_idle),
     "bow": Kind(120, bow, is_plain_idle),
     "guide": Kind(60, guide, is_plain_idle),
-    "clap": Kind(60, clap, is_plain_idle),
+    "clap": Kind(120, clap, is_plain_idle),
     "nod": Kind(60, nod, is_plain_idle),
     "carry": Kind(120, carry, is_plain_walk),
     "reach-forward": Kind(120, reach_forward, is_plain_idle),
@@ -190,4 +191,5 @@ KINDS: Mapping[str, Kind] = {
     "stab": Kind(120, stab, is_plain_idle),
     "slash": Kind(140, slash, is_plain_idle),
     "block": Kind(120, block, is_plain_idle),
+    "signal": Kind(100, signal, is_plain_idle),
 }
