@@ -27,7 +27,7 @@ _PLACES = {
 }
 """Azimuths and elevations of upper arm and forearm, degrees; see `direction`."""
 _ALIKE = {_ACROSS: "slant"}
-"""What both arms do instead at once: they would meet across the trunk."""
+"""Signs of both arms at once instead of those in which they would meet across the trunk."""
 _SWUNG = ("side", "stop", "up")
 
 
