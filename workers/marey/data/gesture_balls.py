@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, eased, envelope
-from marey.data.gesture_steps import settle, step
+from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 

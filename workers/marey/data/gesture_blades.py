@@ -8,7 +8,7 @@ from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
-from marey.data.gesture_steps import step
+from marey.data.gesture_stances import step
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _STABS: dict[str, tuple[Point, Point, Point]] = {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES
 from marey.data.gesture_poses import LEFT, StandingBody
-from marey.data.gesture_steps import glide, settle, turn_hips
+from marey.data.gesture_stances import glide, settle, turn_hips
 
 Array = NDArray[np.floating]
 Point = Sequence[float]

@@ -10,7 +10,7 @@ from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
-from marey.data.gesture_steps import settle, step
+from marey.data.gesture_stances import settle, step
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _OUTWARD = (1.0, 0.1, -0.2)

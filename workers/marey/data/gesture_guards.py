@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
-from marey.data.gesture_steps import LEGS, settle, step, turn_hips
+from marey.data.gesture_stances import LEGS, settle, step, turn_hips
 from marey.data.part import FPS
 
 Array = NDArray[np.floating]

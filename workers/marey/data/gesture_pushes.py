@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_poses import StandingBody, envelope
-from marey.data.gesture_steps import settle, step
+from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT

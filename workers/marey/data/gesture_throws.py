@@ -8,7 +8,7 @@ import numpy as np
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
-from marey.data.gesture_steps import glide, settle, step, turn_hips
+from marey.data.gesture_stances import glide, settle, step, turn_hips
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _NECK = (12,)
