@@ -31,6 +31,13 @@ def test_a_clip_has_the_same_captions_each_time_and_others_than_its_neighbour() 
     assert spoken("juggle", "a") == ()
 
 
+def test_words_that_are_not_true_of_a_clip_are_left_out() -> None:
+    said = " ".join(text for number in range(40) for text in spoken("climb-stairs", f"clip {number}", r"\bdown|desce"))
+    assert "up" in said
+    assert "down" not in said
+    assert "desce" not in said
+
+
 def test_every_action_has_sentences_that_are_no_held_out_prompts() -> None:
     held_out = {prompt.text.casefold() for prompt in (*action_prompts(), *development_prompts(), *studio_prompts())}
     assert set(all_sayings()) == set(ACTIONS)

@@ -31,6 +31,7 @@ class Gesture:
         base: what is taken of a captured clip before the change, (T, 22, 3), or None if the clip does not do; without
             it, `seconds` of an idle.
         content: the action of the captured clips that it may be put onto, or empty for all clips of its kind.
+        untrue: see `marey.data.spoken.spoken`.
     """
 
     seconds: float
@@ -40,6 +41,7 @@ class Gesture:
     times: int = 1
     base: Callable[[Part], Array | None] | None = None
     content: str = ""
+    untrue: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Loads that are carried on captured walks, and sprints of captured runs; see `marey.data.gestures`."""
+"""Loads that are carried on captured walks, and which walks and runs are plain; see `marey.data.gestures`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from marey.checks.kinematics import heading
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of, respond
 from marey.data.gesture_poses import ARMS, StandingBody
 from marey.data.part import FPS, Part
-from marey.data.retarget import resample_points
-from marey.data.retime import LIMIT, loop
-from marey.data.splice import with_bones
+from marey.data.retime import LIMIT
 
 Array = NDArray[np.floating]
 
@@ -24,9 +22,7 @@ _HIPS = 0.78  # metres over the floor
 _STRAIGHT = 30.0  # degrees of all turning
 _WALKS = (0.6, 1.9)  # m/s
 _LEAST_RUN = 20
-_RUNS = 3.0  # m/s of a run that may become a sprint
-_SPRINTS = (4.15, 5.0)
-_LARGEST_FACTOR = 1.42
+_RUNS = 3.0  # m/s
 
 
 def is_plain_walk(part: Part) -> bool:
@@ -38,7 +34,7 @@ def is_plain_walk(part: Part) -> bool:
     tilt = np.degrees(np.arccos(trunk[:, 1] / np.linalg.norm(trunk, axis=-1)))
     wrists, shoulders = (joints[:, [ARMS[side][k] for side in SIDES]] for k in (3, 1))
     return bool(
-        _WALKS[0] < _speed(joints) < _WALKS[1]
+        _WALKS[0] < speed_of(joints) < _WALKS[1]
         and tilt.max() < _UPRIGHT
         and joints[:, 0, 1].min() > _HIPS
         and (shoulders - wrists)[..., 1].min() > _HANGS
@@ -52,12 +48,12 @@ def is_quick_run(part: Part) -> bool:
     return (
         part.content == "run"
         and len(joints) >= _LEAST_RUN
-        and _speed(joints) > _RUNS
+        and speed_of(joints) > _RUNS
         and bool(np.ptp(heading(joints, FPS)) < _STRAIGHT)
     )
 
 
-def _speed(joints: Array) -> float:
+def speed_of(joints: Array) -> float:
     """Metres per second between the ends of (T, 22, 3)."""
     return float(np.linalg.norm((joints[-1, 0] - joints[0, 0])[[0, 2]])) * FPS / (len(joints) - 1)
 
@@ -92,21 +88,3 @@ def carry(rng: random.Random) -> Gesture:
 
     kinds = ("carry", form, *(["carry-both"] if side == BOTH else []))
     return Gesture(0.0, kinds, change, side, base=lambda part: part.joints[:LIMIT].astype(np.float64))
-
-
-def sprint(rng: random.Random) -> Gesture:
-    wanted, seconds, stoop = rng.uniform(*_SPRINTS), rng.uniform(1.3, 4.0), rng.uniform(0, 5)
-
-    def base(part: Part) -> Array | None:
-        """A run that is looped and played faster."""
-        factor = wanted / _speed(part.joints)
-        if not 1 < factor < _LARGEST_FACTOR:
-            return None
-        frames = round(seconds * FPS * factor)
-        looped = (part.joints.astype(np.float64),) if len(part.joints) >= frames else loop(part, frames)
-        return None if looped is None else with_bones(resample_points(looped[0], FPS * factor, FPS))
-
-    def change(body: StandingBody) -> None:
-        body.lean(np.full(len(body.joints), stoop), "left")
-
-    return Gesture(seconds, ("sprint",), change, base=base)

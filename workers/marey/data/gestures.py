@@ -1,6 +1,6 @@
-"""Synthetic gestures on captured idles, walks and runs, for actions that few captures show.
+"""Synthetic gestures on captured idles, walks, runs, jumps and climbs, for actions that few captures show.
 
-Each gesture modifies a captured clip and keeps its feet, breath and sway; side, height, pace, length and number are
+Each gesture modifies a captured clip and keeps its breath and sway; side, height, pace, length and number are
 random. These clips are marked as `made`, are used for training only, and are at most half of the draws of an action
 (`marey.data.sampling`). The files `gestures*.toml` have captions of each kind in three voices.
 """
@@ -26,17 +26,25 @@ from marey.data.gesture_archery import draw_bow
 from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_balls import dribble
 from marey.data.gesture_blades import slash, stab
-from marey.data.gesture_drawing import SIDES, Gesture
+from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
+from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_fights import block, punch
-from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run, sprint
+from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
 from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
+from marey.data.gesture_idles import is_plain_idle, of_length
 from marey.data.gesture_laughs import laugh
+from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
-from marey.data.gesture_poses import ARMS, StandingBody
+from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
 from marey.data.gesture_signs import signal
+from marey.data.gesture_sneaks import sneak
+from marey.data.gesture_spins import is_single_jump, jump_turn, spin
+from marey.data.gesture_stairs import climb_stairs
+from marey.data.gesture_steps import sidestep, turn_around
 from marey.data.gesture_throws import throw
+from marey.data.gesture_travel import bent_walk, is_plain_gait, run, sprint, starts_backward, turn, walk_backward
 from marey.data.gesture_trunk import bow, nod, shiver
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
@@ -47,13 +55,6 @@ Array = NDArray[np.floating]
 
 CAPTIONS = 2
 """Number of captions per voice and clip."""
-_BASE = "idle"
-_LEAST_BASE = 30  # frames of an idle
-_STANDS = 0.15  # metres that the hips of an idle may move
-_UPRIGHT = 0.88  # metres of the hips over the floor; about 1.0 when upright
-_ANKLES = 0.16  # metres over the floor
-_HANGS = 0.2  # metres that the wrists are below the shoulders
-_ASIDE = 0.42  # metres, horizontal distance of the wrists from the hips
 _SLIPS = 0.01  # metres, largest error of a foot after solving the legs
 _TIMES = {2: "twice", 3: "three times"}
 
@@ -74,27 +75,11 @@ class Kind:
 
 
 def made_gestures(parts: Sequence[Part]) -> Iterator[Part]:
-    """Make gestures on the idles, walks and runs among the parts of the training split."""
+    """Make gestures on the clips among the parts of the training split."""
     for action, kind in KINDS.items():
         if bases := [part for part in parts if kind.is_base(part)]:
             made = (_made(f"G-{action}-{number:05}", action, bases) for number in range(TRIES * kind.count))
             yield from islice((part for part in made if part is not None), kind.count)
-
-
-def is_plain_idle(part: Part) -> bool:
-    """Return True for an idle that stands upright on both feet without moving away, with both arms down."""
-    joints = part.joints
-    if part.content != _BASE or len(joints) < _LEAST_BASE:
-        return False
-    wrists, shoulders = (joints[:, [ARMS[side][k] for side in SIDES]] for k in (3, 1))
-    aside = np.linalg.norm((wrists - joints[:, :1])[..., [0, 2]], axis=-1)
-    return bool(
-        np.ptp(joints[:, 0], axis=0).max() < _STANDS
-        and joints[:, 0, 1].min() > _UPRIGHT
-        and joints[:, [7, 8], 1].max() < _ANKLES
-        and (shoulders - wrists)[..., 1].min() > _HANGS
-        and aside.max() < _ASIDE
-    )
 
 
 def _is_plain(part: Part) -> bool:
@@ -109,7 +94,7 @@ def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
     if not (bases := [part for part in bases if gesture.content in ("", part.content)]):
         return None
     base = rng.choice(bases)
-    taken = gesture.base(base) if gesture.base else _of_length(base.joints, round(gesture.seconds * FPS), rng)
+    taken = gesture.base(base) if gesture.base else of_length(base.joints, round(gesture.seconds * FPS), rng)
     if taken is None:
         return None
     body = StandingBody(taken)
@@ -118,19 +103,10 @@ def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
     feet = [7, 8, 10, 11]
     if is_broken(joints, FPS) or np.linalg.norm(joints[:, feet] - body.joints[:, feet], axis=-1).max() > _SLIPS:
         return None
-    told = (*_captions_of(gesture, rng), spoken(action, name))
+    told = (*_captions_of(gesture, rng), spoken(action, name, gesture.untrue))
     source = replace(base.source, content=action, side=gesture.side, captions=told, facts="")
     facts = describe_text(told, joints, FPS)
     return Part(name, source, action, base.mirrored, joints.astype(np.float32), facts, made=True)
-
-
-def _of_length(joints: Array, frames: int, rng: random.Random) -> Array:
-    """Take `frames` frames of an idle; play a shorter one forward and backward, which suits breath and sway."""
-    if len(joints) < frames:
-        there_and_back = np.concatenate([joints, joints[-2:0:-1]])
-        joints = np.tile(there_and_back, (-(-frames // len(there_and_back)), 1, 1))
-    first = rng.randint(0, len(joints) - frames)
-    return joints[first : first + frames]
 
 
 def _captions_of(gesture: Gesture, rng: random.Random) -> tuple[tuple[str, ...], ...]:
@@ -177,7 +153,6 @@ KINDS: Mapping[str, Kind] = {
     "shoot-basket": Kind(100, shoot_basket, is_plain_idle),
     "talk": Kind(100, talk, is_plain_idle),
     "shiver": Kind(60, shiver, is_plain_idle),
-    "sprint": Kind(60, sprint, is_quick_run),
     "drink": Kind(120, drink, is_plain_idle),
     "reach-up": Kind(120, reach_up, is_plain_idle),
     "arm-circles": Kind(120, arm_circles, is_plain_idle),
@@ -192,4 +167,18 @@ KINDS: Mapping[str, Kind] = {
     "slash": Kind(140, slash, is_plain_idle),
     "block": Kind(120, block, is_plain_idle),
     "signal": Kind(100, signal, is_plain_idle),
+    "sprint": Kind(100, sprint, is_quick_run),
+    "walk-backward": Kind(140, walk_backward, starts_backward),
+    "run": Kind(120, run, is_quick_run),
+    "turn": Kind(120, turn, is_plain_gait),
+    "walk": Kind(40, bent_walk, is_plain_walk),
+    "turn-around": Kind(140, turn_around, is_plain_idle),
+    "sidestep": Kind(140, sidestep, is_plain_idle),
+    "spin": Kind(120, spin, is_plain_idle),
+    "jump-turn": Kind(80, jump_turn, is_single_jump),
+    "climb-stairs": Kind(120, climb_stairs, is_plain_idle),
+    "leap": Kind(100, leap, is_quick_run),
+    "climb-onto": Kind(60, climb_onto, is_climb_down),
+    "climb-ladder": Kind(60, climb_ladder, is_ladder),
+    "sneak": Kind(120, sneak, is_plain_walk),
 }

@@ -26,7 +26,7 @@ class Part:
         joints: (T, 22, 3) float32 metres at 20 fps.
         facts: labels and measurements.
         speed: speed relative to the capture.
-        made: True if its gesture was added to a captured idle; see `marey.data.gestures`.
+        made: True if its action was made of a captured clip of another; see `marey.data.gestures`.
     """
 
     id: str

@@ -96,7 +96,7 @@ def _blend(first: Array, second: Array, frames: int, fps: float) -> tuple[Array,
         toes[..., 1] + _lift(ends[0], ends[1], frames, fps), np.minimum(target[:, [10, 11], 1], 0)
     )
     directions = turned(_directions(ends[0]), _directions(ends[1]), _directions(target))
-    return root, directions, toes, turned(_poles(ends[0]), _poles(ends[1]), _poles(target))
+    return root, directions, toes, turned(knee_poles(ends[0]), knee_poles(ends[1]), knee_poles(target))
 
 
 def turned(first: Array, second: Array, target: Array) -> Array:
@@ -133,8 +133,8 @@ def _directions(joints: Array) -> Array:
     return normalize(joints - joints[:, _PARENTS]).astype(np.float64)
 
 
-def _poles(joints: Array) -> Array:
-    """Unit vectors (n, 2, 3) from the line between hip and ankle to the knee, with a little forward added."""
+def knee_poles(joints: Array) -> Array:
+    """Unit vectors (T, 2, 3) from the line between hip and ankle to the knee, with a little forward added."""
     left = joints[:, 1] - joints[:, 2]
     forward = normalize(cross(left, np.broadcast_to([0.0, 1.0, 0.0], left.shape)))
     out = []
@@ -164,7 +164,7 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
 
 def with_bones(joints: Array) -> Array:
     """Restore the skeleton's bone lengths in poses (T, 22, 3); the toes stay in place."""
-    return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], _poles(joints))
+    return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], knee_poles(joints))
 
 
 # -- where to cut --------------------------------------------------------------------------------------------------

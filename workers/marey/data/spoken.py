@@ -27,17 +27,20 @@ _SIDED = re.compile(r"\b(left|right)\b")  # true of some clips only
 _MARKED = re.compile(r"[~=]")  # patterns for matching, no words
 
 
-def spoken(action: str, seed: str) -> tuple[str, ...]:
+def spoken(action: str, seed: str, untrue: str = "") -> tuple[str, ...]:
     """Return different captions for a clip of one action, none for an action that is not in the vocabulary.
 
     Args:
         action: id of the vocabulary.
         seed: the clip's name, so that a clip has the same captions on every machine.
+        untrue: pattern of words that are not true of the clip, though of the action.
     """
     if action not in load_vocabulary().actions:
         return ()
     rng = seeded("spoken", seed)
     verbs, nouns = _words(action)
+    if untrue:
+        verbs, nouns = (tuple(word for word in words if not re.search(untrue, word)) for words in (verbs, nouns))
     said: dict[str, None] = {}
     for _ in range(PHRASES):
         if nouns and rng.random() < _SHARE_OF_NOUNS:
