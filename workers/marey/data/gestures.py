@@ -25,19 +25,25 @@ from marey.data.gesture_aims import aim, shoot_basket
 from marey.data.gesture_archery import draw_bow
 from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_balls import dribble
+from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
 from marey.data.gesture_drawing import Gesture
+from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
 from marey.data.gesture_fights import block, punch
+from marey.data.gesture_floor import get_up, lie, lie_down, sit_floor
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
 from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
 from marey.data.gesture_idles import is_plain_idle, of_length
+from marey.data.gesture_kicks import balance, kick, kick_ball
+from marey.data.gesture_kneels import kneel
 from marey.data.gesture_laughs import laugh
 from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
+from marey.data.gesture_seats import sit, sit_down, stand_up
 from marey.data.gesture_signs import signal
 from marey.data.gesture_sneaks import sneak
 from marey.data.gesture_spins import is_single_jump, jump_turn, spin
@@ -55,6 +61,7 @@ Array = NDArray[np.floating]
 
 CAPTIONS = 2
 """Number of captions per voice and clip."""
+_FLAT = 0.05  # metres between the heights of the ankles
 _SLIPS = 0.01  # metres, largest error of a foot after solving the legs
 _TIMES = {2: "twice", 3: "three times"}
 
@@ -84,6 +91,11 @@ def made_gestures(parts: Sequence[Part]) -> Iterator[Part]:
 
 def _is_plain(part: Part) -> bool:
     return is_plain_idle(part) or is_plain_walk(part)
+
+
+def is_flat_idle(part: Part) -> bool:
+    """Return True for a plain idle with both feet flat on the floor."""
+    return is_plain_idle(part) and bool(np.ptp(part.joints[:, [7, 8], 1]) < _FLAT)
 
 
 def _made(name: str, action: str, bases: Sequence[Part]) -> Part | None:
@@ -181,4 +193,21 @@ KINDS: Mapping[str, Kind] = {
     "climb-onto": Kind(60, climb_onto, is_climb_down),
     "climb-ladder": Kind(60, climb_ladder, is_ladder),
     "sneak": Kind(120, sneak, is_plain_walk),
+    "squat": Kind(140, squat, is_plain_idle),
+    "bend-over": Kind(120, bend_over, is_flat_idle),
+    "pick-up": Kind(140, pick_up, is_plain_idle),
+    "sit-down": Kind(120, sit_down, is_plain_idle),
+    "stand-up": Kind(120, stand_up, is_plain_idle),
+    "sit": Kind(100, sit, is_plain_idle),
+    "kick": Kind(120, kick, is_plain_idle),
+    "kick-ball": Kind(120, kick_ball, is_plain_idle),
+    "balance": Kind(120, balance, is_plain_idle),
+    "jumping-jacks": Kind(100, jumping_jacks, is_plain_idle),
+    "kneel": Kind(120, kneel, is_plain_idle),
+    "push-ups": Kind(80, push_ups, is_plain_idle),
+    "sit-ups": Kind(80, sit_ups, is_plain_idle),
+    "lie-down": Kind(100, lie_down, is_plain_idle),
+    "get-up": Kind(100, get_up, is_plain_idle),
+    "sit-floor": Kind(100, sit_floor, is_plain_idle),
+    "lie": Kind(80, lie, is_plain_idle),
 }
