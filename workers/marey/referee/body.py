@@ -97,6 +97,10 @@ class Body:
         """(T, 3) position of a joint from another in the body's frame: to its left, upward, forward."""
         return self._in_frame(self.at(joint) - self.at(origin))
 
+    def ahead(self, joint: str) -> Floats:
+        """Distance of a joint before the chest the way that it faces, m."""
+        return ((self.at(joint) - self.at("spine3")) * self.chest_forward).sum(-1)
+
     def own_velocity(self, joint: str, origin: str = "pelvis", window: float = SMOOTHING_S) -> Floats:
         """(T, 3) velocity of a joint from another in the body's frame, its turning left out."""
         return self._in_frame(self.velocity(joint, window) - self.velocity(origin, window))
@@ -118,7 +122,16 @@ class Body:
     @cached_property
     def forward(self) -> Floats:
         """(T, 3) horizontal direction that the pelvis faces; kept from before where it faces up or down."""
-        across = self.at("L_hip") - self.at("R_hip")
+        return self._facing("hip")
+
+    @cached_property
+    def chest_forward(self) -> Floats:
+        """(T, 3) horizontal direction that the chest faces, which may be turned against the pelvis."""
+        return self._facing("shoulder")
+
+    def _facing(self, joint: str) -> Floats:
+        """(T, 3) horizontal direction across which a pair of joints lies; kept from before where they lie upright."""
+        across = self.at(f"L_{joint}") - self.at(f"R_{joint}")
         width = np.linalg.norm(across, axis=-1)
         across = across * [1.0, 0.0, 1.0]
         level = np.linalg.norm(across, axis=-1)

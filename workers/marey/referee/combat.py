@@ -156,17 +156,18 @@ def block(body: Body) -> bool:
 
 
 def _aiming(body: Body) -> Mask:
+    """Return where the body stands and holds a hand still, ahead of its chest and as high as breast to eyes."""
     held = np.zeros(len(body), np.bool_)
     for side in SIDES:
-        hand = body.own(f"{side}_wrist", "spine3")
+        height = body.own(f"{side}_wrist", "spine3")[:, 1]
         still = np.linalg.norm(body.smooth(body.own_velocity(f"{side}_wrist", "spine3"), 0.3), axis=-1) < 0.3
-        held |= (hand[:, 2] >= 0.33) & (hand[:, 1] > -0.1) & (hand[:, 1] < 0.45) & still
-    return held
+        held |= (body.ahead(f"{side}_wrist") >= 0.35) & (height > -0.1) & (height < 0.45) & still
+    return held & (body.height("pelvis") > 0.75 * HIPS) & (body.lowest_foot < 0.12) & (body.lean < 40)
 
 
 @rule("aim")
 def aim(body: Body) -> bool:
-    return body.longest(_aiming(body)) >= 1.0 and body.most(body.standing)
+    return body.longest(_aiming(body)) >= 1.0
 
 
 @rule("shoot")

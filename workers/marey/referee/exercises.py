@@ -23,11 +23,12 @@ def push_ups(body: Body) -> bool:
 
 @rule("sit-ups")
 def sit_ups(body: Body) -> bool:
+    """Lies on the back, hips no higher than the bent knees and below seats; the trunk rises by 30 degrees and lies back."""
     bent = np.minimum(body.bend("L", "knee"), body.bend("R", "knee")) > 40
-    floor = body.height("pelvis") < 0.3
-    rises = swings(body.smooth(body.lean, 0.15), 30.0)
-    lies = body.lean > 55
-    return len(rises) >= 2 and bool((bent & floor).mean() >= 0.5) and bool((lies & floor).any())
+    knees = np.minimum(body.height("L_knee"), body.height("R_knee"))
+    down = (body.height("pelvis") < 0.55) & (body.height("pelvis") < knees + 0.1)
+    rises = swings(body.smooth(body.tip, 0.15), 30.0)
+    return len(rises) >= 2 and bool((bent & down).mean() >= 0.5) and bool(((body.tip < -55) & down).any())
 
 
 @rule("squat")

@@ -151,14 +151,14 @@ def idle(body: Body) -> bool:
         body.height("L_wrist") - body.height("L_shoulder"), body.height("R_wrist") - body.height("R_shoulder")
     )
     calm = (hands < 0.5) & (low < 0) & (body.height("pelvis") > 0.78 * HIPS) & (body.lean < 30)
-    feet = max(_spread(body, f"{side}_foot") for side in SIDES)
+    feet = max(spread(body, f"{side}_foot") for side in SIDES)
     upright = float(np.ptp(body.smooth(body.tip, 0.2))) < 15
     path = body.at("pelvis")[:, [0, 2]]
     stays = float(np.linalg.norm(path - path.mean(0), axis=-1).max()) < 0.15
     return upright and stays and calm.mean() >= 0.6 and feet < 0.15
 
 
-def _spread(body: Body, joint: str) -> float:
+def spread(body: Body, joint: str) -> float:
     """Horizontal extent of the middle 90 % of a joint's positions, m."""
     low, high = np.percentile(body.at(joint)[:, [0, 2]], [5, 95], axis=0)
     return float(np.linalg.norm(high - low))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.referee.body import HEAD, HIPS, SIDES, Body, Floats, Mask, runs, swings
-from marey.referee.gaits import gait, passage, planted, travel
+from marey.referee.body import HEAD, HIPS, MOST, SIDES, Body, Floats, Mask, runs, swings
+from marey.referee.gaits import gait, passage, planted, spread, travel
 from marey.referee.postures import seated_frames
 from marey.referee.rules import rule
 
@@ -195,28 +195,48 @@ def guide(body: Body) -> bool:
 
 @rule("shiver")
 def shiver(body: Body) -> bool:
-    close = body.hand_apart() < 0.6
-    shakes = 0.0
+    """Hands held close before the body; a joint shakes by 4 mm and more at 4 Hz, for most of the clip."""
+    close = (body.hand_apart() < 0.45) & (body.height("pelvis") > 0.6 * HIPS)
+    for side in SIDES:
+        close &= body.own(f"{side}_wrist")[:, 1] > -0.1
+    if not (_stays(body) and planted(body) and body.most(close)):
+        return False
+    least = MOST * (body.core.stop - body.core.start)
     for joint in ("L_wrist", "R_wrist", "L_shoulder", "R_shoulder", "L_knee", "R_knee"):
         place = body.own(joint)
         fine = place - body.smooth(place, 0.3)
         _, _, axes = np.linalg.svd(fine, full_matrices=False)
-        shakes = max(shakes, len(swings(fine @ axes[0], 0.004)) / 2 / (len(body) / body.fps))
-    return body.most(close & (body.height("pelvis") > 0.6 * HIPS)) and shakes >= 3.5 and _stays(body)
+        along = fine @ axes[0]
+        shakes = swings(along, 0.004)
+        time = shakes[-1][1] - shakes[0][0] if shakes else 0
+        if time >= least and len(shakes) / 2 >= 4.0 * time / body.fps and float(np.ptp(along)) < 0.06:
+            return True
+    return False
 
 
 @rule("talk")
 def talk(body: Body) -> bool:
+    """Hands move in small gestures between waist and shoulders; feet and hips stay, and no hand goes over a shoulder."""
     gestures, speed = np.zeros(len(body), np.bool_), np.zeros(len(body))
     for side in SIDES:
         hand = body.own(f"{side}_wrist")
-        between = (hand[:, 1] > -0.05) & (body.height(f"{side}_wrist") < body.height(f"{side}_shoulder") + 0.1)
-        moves = body.smooth(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 0.3)
-        gestures |= between & (moves >= 0.2) & (hand[:, 2] > 0.05)
+        over = body.height(f"{side}_wrist") - body.height(f"{side}_shoulder")
+        moves = body.smooth(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 0.1)
+        gesturing = (hand[:, 1] > 0.05) & (over < 0.1) & (hand[:, 2] > 0.05) & (moves >= 0.2)
+        if (over > 0.05).mean() > 0.05 or (gesturing.any() and _extent(hand[gesturing]) > 0.45):
+            return False
+        gestures |= gesturing
         speed = np.maximum(speed, moves)
     small = float(np.percentile(speed, 90)) < 1.5
-    steady = float(np.ptp(body.smooth(body.height("pelvis"), 0.2))) < 0.12 and planted(body, 0.1)
-    return travel(body) < 0.4 and steady and small and body.share(gestures) >= 1 / 3
+    level = float(np.ptp(body.smooth(body.height("pelvis"), 0.2))) < 0.12
+    feet = planted(body, 0.1) and max(spread(body, f"{side}_foot") for side in SIDES) < 0.15
+    return travel(body) < 0.4 and level and feet and small and body.share(gestures) >= 1 / 3
+
+
+def _extent(places: Floats) -> float:
+    """Largest extent of the middle 80 % of places (T, 3) along an axis, m."""
+    low, high = np.percentile(places, [10, 90], axis=0)
+    return float((high - low).max())
 
 
 # -- everyday ---------------------------------------------------------------------------------------------------------
@@ -239,8 +259,7 @@ def wash(body: Body) -> bool:
         hand = body.smooth(hand_place(body, side), 0.06)
         if _half_swings(body, side, np.ones(len(body), np.bool_), 0.1) < 5:
             continue
-        low, high = np.percentile(hand, [10, 90], axis=0)
-        if float((high - low).max()) <= 0.7 and is_gesturing(body):
+        if _extent(hand) <= 0.7 and is_gesturing(body):
             return True
     return False
 
@@ -268,16 +287,25 @@ def reach_up(body: Body) -> bool:
     return False
 
 
+def _before_trunk(body: Body, side: str) -> Floats:
+    """Distance of a hand before the trunk, m: before the hips, or before the chest where it is turned against them."""
+    return np.maximum(body.own(f"{side}_wrist")[:, 2], body.ahead(f"{side}_wrist"))
+
+
 @rule("reach-forward")
 def reach_forward(body: Body) -> bool:
-    for side in SIDES:
-        hand = body.own(f"{side}_wrist")
-        level = (hand[:, 1] > -0.1) & (body.height(f"{side}_wrist") < body.height(f"{side}_shoulder") + 0.08)
-        calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6
-        out = level & (hand[:, 2] >= 0.38) & calm & body.standing
-        back = hand[:, 2] < 0.3
-        for begin, end in runs(out):
-            if (end - begin) / body.fps >= 0.12 and back.any() and is_gesturing(body):
+    """One hand goes 0.4 m ahead, stops going out for 0.2 s and comes back; the other stays back."""
+    if not is_gesturing(body):
+        return False
+    for side, other in (("L", "R"), ("R", "L")):
+        ahead = _before_trunk(body, side)
+        over_hips = body.own(f"{side}_wrist")[:, 1] > -0.1
+        level = over_hips & (body.height(f"{side}_wrist") < body.height(f"{side}_shoulder") + 0.08)
+        stops = np.abs(np.gradient(body.smooth(ahead, 0.1))) * body.fps < 0.8
+        alone = _before_trunk(body, other) < 0.3
+        for begin, end in runs((ahead >= 0.4) & level & stops & alone & (body.height("pelvis") > 0.75 * HIPS)):
+            came, went = ahead[: begin + 1].min() < 0.3, ahead[end - 1 :].min() < 0.3
+            if (end - begin) / body.fps >= 0.2 and came and went:
                 return True
     return False
 
