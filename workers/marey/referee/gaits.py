@@ -270,12 +270,26 @@ def spin(body: Body) -> bool:
     return False
 
 
+def _floor_velocity(body: Body) -> Floats:
+    """(3,) mean velocity of a gait in place against the floor, m/s: its standing foot goes the other way."""
+    way = np.zeros((0, 3))
+    for side in SIDES:
+        stands = body.lift(side) < OFF_FLOOR
+        way = np.concatenate([way, (body.velocity("pelvis") - body.velocity(f"{side}_ankle"))[stands]])
+    return way.mean(axis=0) if len(way) else np.zeros(3)
+
+
 @rule("sidestep")
 def sidestep(body: Body) -> bool:
+    """Steps across the way that the chest faces; hips and legs may turn the way of the steps."""
+    ahead_way = body.chest_forward
+    left_way = np.stack([ahead_way[:, 2], np.zeros(len(body)), -ahead_way[:, 0]], axis=-1)
     velocity = body.velocity("pelvis", SLOW_S)
-    across = np.cumsum((velocity * body.left).sum(-1)) / body.fps
-    ahead = np.cumsum((velocity * body.forward).sum(-1)) / body.fps
     found = gait(body)
+    if travel(body) < 0.1 and found.steps >= 2:
+        velocity = np.tile(_floor_velocity(body), (len(body), 1))
+    across = np.cumsum((velocity * left_way).sum(-1)) / body.fps
+    ahead = np.cumsum((velocity * ahead_way).sum(-1)) / body.fps
     for begin, end in swings(across, 0.4):
         side = abs(across[end] - across[begin])
         if side >= 0.5 and abs(ahead[end] - ahead[begin]) < side and _upright(body):
