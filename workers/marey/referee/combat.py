@@ -42,29 +42,36 @@ def fight_stance(body: Body) -> bool:
 
 
 def _strikes(body: Body, side: str) -> int:
-    """Count the movements of a fist away from its shoulder or past the face at 2 m/s or more."""
+    """Count the movements of a fist at 2 m/s or more, straight ahead or past the face.
+
+    In each the elbow straightens by 40 degrees and the fist goes 0.12 m away from its shoulder, to before the body;
+    arms that swing about the shoulder do not.
+    """
     velocity = body.own_velocity(f"{side}_wrist", window=0.06)
     speed = np.linalg.norm(velocity, axis=-1)
     reach, elbow = _reach(body, side), body.bend(side, "elbow")
-    hand = body.own(f"{side}_wrist", "neck")
+    hand, before = body.own(f"{side}_wrist", "neck"), body.own(f"{side}_wrist", f"{side}_shoulder")[:, 2]
     found = 0
     for begin, end in runs(speed >= 2.0):
-        last = min(len(body), end + body.frames(0.12))
-        part = slice(max(0, begin - body.frames(0.12)), last)
-        out = reach[part].argmax() > reach[part].argmin() and float(np.ptp(reach[part])) >= 0.12
+        first, last = max(0, begin - body.frames(0.12)), min(len(body), end + body.frames(0.12))
+        part = slice(first, last)
+        far = first + int(reach[part].argmax())
+        way = slice(first, far + 1)
+        pushes = elbow[way].max() - elbow[far] >= 40 and reach[far] - reach[way].min() >= 0.12 and before[far] >= 0.2
         ahead = velocity[begin:end, 2].max() > 1.2 or velocity[begin:end, 1].max() > 1.5
-        straight = out and elbow[part].min() < 50 and hand[part][:, 2].max() > 0.25
+        straight = elbow[part].min() < 50 and hand[part][:, 2].max() > 0.25
         past_face = (
             (hand[part][:, 1].max() > -0.15) and hand[part][:, 2].max() > 0.2 and float(np.ptp(hand[part][:, 0])) > 0.2
         )
-        if ahead and (straight or past_face):
+        if ahead and pushes and (straight or past_face):
             found += 1
     return found
 
 
 @rule("punch")
 def punch(body: Body) -> bool:
-    return _standing(body) and travel(body) < 3.0 and any(_strikes(body, side) for side in SIDES)
+    still = planted(body) and travel(body) < 3.0
+    return still and _standing(body) and any(_strikes(body, side) for side in SIDES)
 
 
 def _kicks(body: Body, speed: float, height: float) -> int:
