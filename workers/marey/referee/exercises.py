@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from marey.referee.body import CHEST, HIPS, SIDES, Body, runs, swings
-from marey.referee.gaits import gait, travel
+from marey.referee.gaits import steady_gait, travel
 from marey.referee.gestures import KNEES, hand_place, is_gesturing
 from marey.referee.rules import rule
 
@@ -99,14 +99,11 @@ def dance(body: Body) -> bool:
     arms = busy(("L_wrist", "R_wrist"), 0.3)
     legs = busy(("L_ankle", "R_ankle", "L_knee", "R_knee"), 0.15)
     hips = body.share(body.smooth(body.speed("pelvis"), 0.5) > 0.08)
-    found = gait(body)
-    steady = found.steps >= 4 and found.distance > 1.5 and found.forward > 0.5
-    steady = steady and (found.end - found.begin) > 0.7 * len(body)
     rhythm = max(
         len(swings(body.smooth(body.own(f"{s}_wrist")[:, axis], 0.1), 0.15)) for s in SIDES for axis in range(3)
     )
     moving = arms >= 0.5 and legs + hips >= 0.7 and rhythm >= 3
-    return len(body) / body.fps >= DANCE_S and moving and not steady and body.most(body.height("pelvis") > 0.4)
+    return len(body) / body.fps >= DANCE_S and moving and not steady_gait(body) and body.most(body.height("pelvis") > 0.4)
 
 
 @rule("dribble")

@@ -129,6 +129,13 @@ def planted(body: Body, height: float = 0.35) -> bool:
     return max(float(body.lift(side).max()) for side in SIDES) < height
 
 
+def steady_gait(body: Body) -> bool:
+    """Return True if a walk or run ahead, straight or in a curve, fills the clip."""
+    found = gait(body)
+    goes = found.steps >= 4 and found.distance > 1.5 and found.forward > 0.5
+    return goes and (found.end - found.begin) > 0.7 * len(body)
+
+
 def travel(body: Body) -> float:
     """Largest horizontal distance of the hips from where they began, m."""
     path = body.at("pelvis")[:, [0, 2]]
