@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.referee.aerial import OTHER
+from marey.referee.aerial import OTHER, flights
 from marey.referee.body import HIPS, SIDES, Body, Floats, Mask, runs, swings
 from marey.referee.gaits import gait, passage, planted, steady_gait, travel
 from marey.referee.rules import rule
@@ -234,17 +234,29 @@ def cast_spell(body: Body) -> bool:
 
 @rule("throw")
 def throw(body: Body) -> bool:
+    """A hand from behind its shoulder goes ahead at 3 m/s (2.5 from below) and stops there; no swing of a run or jump.
+
+    In a throw from over the waist the elbow straightens; an arm may swing from below straight.
+    """
+    jumps = any(each.height > 0.1 and each.last == "both" for each in flights(body))
+    if jumps or steady_gait(body) or not _standing(body, 0.5):
+        return False
     for side in SIDES:
-        hand = body.own(f"{side}_wrist", "spine3")
+        hand, before = body.own(f"{side}_wrist", "spine3"), body.own(f"{side}_wrist", f"{side}_shoulder")[:, 2]
         velocity = body.own_velocity(f"{side}_wrist", "spine3", window=0.06)
+        speed, elbow = np.linalg.norm(velocity, axis=-1), body.bend(side, "elbow")
         for begin, end in runs(velocity[:, 2] > 0.8):
-            peak = np.linalg.norm(velocity[begin:end], axis=-1).max()
-            before = slice(max(0, begin - body.frames(0.6)), begin + 1)
+            last = min(end, len(body) - 1)
+            back = slice(max(0, begin - body.frames(0.6)), begin + 1)
             below = hand[begin:end, 1].mean() < 0
-            wound_up = hand[before][:, 2].min() < 0.15
-            last = hand[min(end, len(body) - 1), 2]
-            if peak >= (2.5 if below else 3.0) and wound_up and last > 0.15 and last - hand[before][:, 2].min() > 0.3:
-                return _standing(body, 0.5)
+            fast = velocity[begin:end, 2].max() >= (2.5 if below else 3.0)
+            swings_out = before[back].min() < -0.05 and before[last] > 0.15
+            far = hand[last, 2] - hand[back][:, 2].min() >= 0.4
+            bent = elbow[max(0, begin - body.frames(0.2)) : end].max()
+            straightens = bent - elbow[max(0, begin - 1) : last + 1].min() >= 30
+            stops = speed[end : end + body.frames(0.4)].min(initial=np.inf) < 1.0
+            if fast and swings_out and far and (below or straightens) and stops:
+                return True
     return False
 
 
