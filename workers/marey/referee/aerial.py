@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from marey.referee.body import HIPS, SIDES, Body, Floats, runs, swings
-from marey.referee.gaits import OFF_FLOOR, gait, passage, planted, travel
+from marey.referee.gaits import OFF_FLOOR, travel
 from marey.referee.rules import rule
 
 OTHER = {"L": "R", "R": "L"}
@@ -261,23 +261,3 @@ def roll(body: Body) -> bool:
     feet = body.height("pelvis")[-body.frames(0.2) :].max() > 0.4 * HIPS
     turned = max(_about(body, 0), _about(body, 2)) >= 200
     return bool((back & lower).any()) and feet and turned and not (_upside_down(body) > 0.9).any()
-
-
-@rule("dodge")
-def dodge(body: Body) -> bool:
-    """Nearly still before; the head goes 0.25 m at 0.8 m/s or more, not upward; no hand reaches for the floor."""
-    found = gait(body)
-    gone = travel(body) > 1.8 or found.steps > 5 or passage(body) or not planted(body)
-    hands = min(float(body.height(f"{side}_wrist").min()) for side in SIDES)
-    if gone or body.height("pelvis").min() < 0.5 * HIPS or hands < 0.45:
-        return False
-    head, speed = body.at("head"), body.speed("head")
-    for frame in np.flatnonzero(body.within(head, 0.6) >= 0.25):
-        part = slice(frame, frame + body.frames(0.6) + 1)
-        way = head[part] - head[frame]
-        far = way[int(np.linalg.norm(way, axis=-1).argmax())]
-        before = speed[max(0, frame - body.frames(0.2)) : frame + 1].min()
-        still = frame < body.frames(0.2) or before < 0.3
-        if still and speed[part].max() >= 0.8 and far[1] < 0.1:
-            return True
-    return False

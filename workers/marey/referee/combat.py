@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.referee.aerial import OTHER, flights
+from marey.referee.aerial import OTHER, flights, jump, jump_forward
 from marey.referee.body import HIPS, SIDES, Body, Floats, Mask, runs, swings
 from marey.referee.gaits import gait, passage, planted, steady_gait, travel
+from marey.referee.postures import sit_down, stand_up
 from marey.referee.rules import rule
 
 
@@ -257,6 +258,32 @@ def throw(body: Body) -> bool:
             stops = speed[end : end + body.frames(0.4)].min(initial=np.inf) < 1.0
             if fast and swings_out and far and (below or straightens) and stops:
                 return True
+    return False
+
+
+@rule("dodge")
+def dodge(body: Body) -> bool:
+    """Nearly still before; the head goes 0.25 m at 0.8 m/s or more, not upward; no hand reaches for the floor.
+
+    Who strikes, throws, jumps or sits down moves the head as far, and does not dodge.
+    """
+    found = gait(body)
+    gone = travel(body) > 1.8 or found.steps > 5 or passage(body) or not planted(body)
+    hands = min(float(body.height(f"{side}_wrist").min()) for side in SIDES)
+    if gone or body.height("pelvis").min() < 0.5 * HIPS or hands < 0.45:
+        return False
+    others = (jump, jump_forward, slash, punch, throw, sit_down, stand_up)
+    if any(each(body) for each in others):
+        return False
+    head, speed = body.at("head"), body.speed("head")
+    for frame in np.flatnonzero(body.within(head, 0.6) >= 0.25):
+        part = slice(frame, frame + body.frames(0.6) + 1)
+        way = head[part] - head[frame]
+        far = way[int(np.linalg.norm(way, axis=-1).argmax())]
+        before = speed[max(0, frame - body.frames(0.2)) : frame + 1].min()
+        still = frame < body.frames(0.2) or before < 0.3
+        if still and speed[part].max() >= 0.8 and far[1] < 0.1:
+            return True
     return False
 
 

@@ -23,7 +23,7 @@ def push_ups(body: Body) -> bool:
 
 @rule("sit-ups")
 def sit_ups(body: Body) -> bool:
-    """Lies on the back, hips no higher than the bent knees and below seats; the trunk rises by 30 degrees and lies back."""
+    """Lies on the back, hips no higher than bent knees and below seats; the trunk rises by 30 degrees and lies back."""
     bent = np.minimum(body.bend("L", "knee"), body.bend("R", "knee")) > 40
     knees = np.minimum(body.height("L_knee"), body.height("R_knee"))
     down = (body.height("pelvis") < 0.55) & (body.height("pelvis") < knees + 0.1)
@@ -103,7 +103,8 @@ def dance(body: Body) -> bool:
         len(swings(body.smooth(body.own(f"{s}_wrist")[:, axis], 0.1), 0.15)) for s in SIDES for axis in range(3)
     )
     moving = arms >= 0.5 and legs + hips >= 0.7 and rhythm >= 3
-    return len(body) / body.fps >= DANCE_S and moving and not steady_gait(body) and body.most(body.height("pelvis") > 0.4)
+    upright = body.most(body.height("pelvis") > 0.4)
+    return len(body) / body.fps >= DANCE_S and moving and not steady_gait(body) and upright
 
 
 @rule("dribble")

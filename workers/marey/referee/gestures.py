@@ -216,7 +216,7 @@ def shiver(body: Body) -> bool:
 
 @rule("talk")
 def talk(body: Body) -> bool:
-    """Hands move in small gestures between waist and shoulders; feet and hips stay, and no hand goes over a shoulder."""
+    """Hands move in small gestures between waist and shoulders, no higher; feet and hips stay."""
     gestures, speed = np.zeros(len(body), np.bool_), np.zeros(len(body))
     for side in SIDES:
         hand = body.own(f"{side}_wrist")
