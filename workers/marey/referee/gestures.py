@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from marey.referee.body import HEAD, HIPS, MOST, SIDES, Body, Floats, Mask, runs, swings
-from marey.referee.gaits import gait, passage, planted, spread, travel
+from marey.referee.gaits import passage, planted, spread, travel
 from marey.referee.postures import seated_frames
 from marey.referee.rules import rule
 
 KNEES = 0.5
 """Height of the knees, m."""
+SIGNS_S = 3.0
+"""Shortest clip in which an arm goes to three places, to be held or swung there."""
 WAVING_ELBOW = 0.46
 """Median speed of the elbow in a wave, as a share of that of the wrist; at most."""
 
@@ -172,7 +174,9 @@ def _signs(body: Body) -> int:
 
 @rule("signal")
 def signal(body: Body) -> bool:
-    return is_gesturing(body) and body.most(body.standing) and gait(body).steps < 4 and _signs(body) >= 3
+    """Stands nearly all the time, at its place, and makes three signs, which take three seconds."""
+    stands = is_gesturing(body) and _stays(body) and body.most(body.standing, 0.9)
+    return stands and len(body) / body.fps >= SIGNS_S and _signs(body) >= 3
 
 
 @rule("guide")
