@@ -112,17 +112,14 @@ def kick_ball(body: Body) -> bool:
 
 
 def _sweeps(body: Body) -> int:
-    """Count arcs of a hand of 0.6 m and more at 2 m/s and more that are not thrusts along one line."""
+    """Count arcs of a hand about the chest of 0.6 m and more, all at 2 m/s and more; the trunk may turn with it."""
     found = 0
     for side in SIDES:
-        hand = body.own(f"{side}_wrist", "spine3")
-        speed = np.linalg.norm(body.own_velocity(f"{side}_wrist", "spine3"), axis=-1)
-        for begin, end in runs(speed >= 1.2):
+        hand = body.at(f"{side}_wrist") - body.at("spine3")
+        velocity = np.gradient(body.smooth(hand, 0.06), axis=0) * body.fps
+        for begin, end in runs(np.linalg.norm(velocity, axis=-1) >= 2.0):
             part = hand[max(0, begin - 1) : end + 1]
-            path = float(np.linalg.norm(np.diff(part, axis=0), axis=-1).sum())
-            extent = np.ptp(part, axis=0)
-            if speed[begin:end].max() >= 2.0 and path >= 0.6 and max(extent[0], extent[1]) >= 0.35:
-                found += 1
+            found += float(np.linalg.norm(np.diff(part, axis=0), axis=-1).sum()) >= 0.6
     return found
 
 
