@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from marey.referee.body import HIPS, SIDES, SLOW_S, Body, Floats, Mask, runs, swings
+from marey.referee.body import HIPS, MOST, SIDES, SLOW_S, Body, Floats, Mask, runs, swings
 from marey.referee.rules import rule
 
 MOVING = 0.3
@@ -312,7 +312,10 @@ def sneak(body: Body) -> bool:
     careful = 0.05 <= drop <= 0.45 or float(np.median(body.tip[part])) >= 20
     toes = float(np.median(np.minimum(body.height("L_ankle"), body.height("R_ankle"))[part])) > 0.11
     goes = (_ahead(found) and found.forward <= 1.2) or _in_place(body, found)
-    return goes and found.steps >= 2 and found.flight < 0.15 and (careful or toes)
+    fills = found.end - found.begin >= MOST * len(body)
+    hands = [np.percentile(np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1), 75) for side in SIDES]
+    softly = planted(body) and found.cadence <= 2.0 and max(hands) < 1.2
+    return goes and fills and softly and found.steps >= 2 and found.flight < 0.15 and (careful or toes)
 
 
 @rule("crouch")
