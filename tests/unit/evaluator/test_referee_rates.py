@@ -48,6 +48,6 @@ def test_the_list_holds_the_accepted_rules() -> None:
 def test_the_page_has_a_row_for_each_action_and_fold() -> None:
     text = page([_clip("walk", "walk"), _clip("dance", "kick", source="two")], ["cmu"])
     assert text.count("\n| fold ") == 5
-    assert "| walk | 1 | 100.0% | 0.0% | — |  | yes |" in text
-    assert "| kick | 0 | — | 50.0% | 0.0% | dance 1 | no clips |" in text
+    assert "| walk | 1 | 100.0% | 0.0% | — | 1/1 —, 0/0 — |  | yes |" in text
+    assert "| kick | 0 | — | 50.0% | 0.0% | 0/0 0.0%, 0/0 — | dance 1 | no clips |" in text
     assert "| all | 2 | 50.0% |" in text

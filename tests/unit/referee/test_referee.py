@@ -14,7 +14,7 @@ from marey.motion.skeleton import HUMANML3D
 from marey.referee import RULES, Body, shows, shows_in_order
 from marey.referee.body import runs, swings
 from marey.vocabulary.entries import load_vocabulary
-from tests.unit.referee.bodies import FPS, Joints, arm_to, body, seconds, standing, tipped, walking
+from tests.unit.referee.bodies import FPS, LEGS, Joints, arm_to, body, seconds, standing, tipped, walking
 
 
 def test_every_action_of_the_vocabulary_has_a_rule_and_no_other() -> None:
@@ -185,3 +185,121 @@ def test_swings_are_as_large_as_asked_and_alternate(values: list[float], size: f
 def test_runs_hold_every_true_frame_once(mask: list[bool]) -> None:
     covered = [frame for begin, end in runs(np.array(mask, np.bool_)) for frame in range(begin, end)]
     assert covered == [frame for frame, value in enumerate(mask) if value]
+
+
+# -- rules by the definitions of their actions -------------------------------------------------------------------------
+
+_BELOW = np.array([0.12, -0.3, 0.2])  # a hand before the belly, from its shoulder
+
+
+def _both_hands(length: float, hand: Joints) -> Joints:
+    """Put both wrists at (T, 3) offsets from their shoulders; sideways is outward."""
+    joints = arm_to(standing(length), "L", np.broadcast_to(hand, (len(seconds(length)), 3)))
+    return arm_to(joints, "R", np.broadcast_to(hand * [-1.0, 1.0, 1.0], (len(seconds(length)), 3)))
+
+
+def _talking(size: float) -> Joints:
+    """Move both hands before the belly by `size` metres to each side, 1.5 times a second."""
+    swing = size * np.sin(2 * np.pi * 1.5 * seconds(4.0))[:, None] * [0.6, 0.8, 0.0]
+    return _both_hands(4.0, _BELOW + swing)
+
+
+def test_who_talks_makes_small_gestures_with_the_hands() -> None:
+    assert shows("talk", body(_talking(0.06)))
+    assert not shows("talk", body(_talking(0.005)))  # holds the hands still
+    assert not shows("talk", body(_talking(0.3)))
+    assert not shows("talk", body(_waving()))
+
+
+def test_who_shivers_trembles_all_the_time_with_the_hands_before_the_body() -> None:
+    shake = 0.008 * np.sin(2 * np.pi * 5 * seconds(3.0))[:, None] * [1.0, 0.0, 0.0]
+    assert shows("shiver", body(_both_hands(3.0, np.array([-0.1, -0.25, 0.25]) + shake)))
+    assert not shows("shiver", body(_both_hands(3.0, np.array([0.08, -0.5, 0.05]) + shake)))  # the arms hang
+    brief = np.concatenate([shake[:45], np.zeros((135, 3))])
+    assert not shows("shiver", body(_both_hands(6.0, np.array([-0.1, -0.25, 0.25]) + brief)))
+
+
+_AHEAD = np.array([-0.1, -0.1, 0.5])
+
+
+def test_who_reaches_comes_back_and_who_aims_stays() -> None:
+    time = seconds(3.0)
+    out = np.clip((time - 0.5) * 2, 0, 1)
+    reaching = arm_to(standing(3.0), "R", _between(_hanging(3.0), _AHEAD, out * np.clip((2.5 - time) * 2, 0, 1)))
+    aiming = arm_to(standing(3.0), "R", _between(_hanging(3.0), _AHEAD, out))
+    assert shows("reach-forward", body(reaching))
+    assert not shows("reach-forward", body(aiming))
+    assert shows("aim", body(aiming))
+    assert not shows("aim", body(_showing()))  # to the side
+
+
+def test_ahead_is_where_the_chest_faces() -> None:
+    aiming = arm_to(standing(3.0), "R", _between(_hanging(3.0), _AHEAD, np.clip(seconds(3.0) * 2, 0, 1)))
+    angle = np.deg2rad(55)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    upper = [i for i, name in enumerate(HUMANML3D.joint_names) if name.split("_")[-1] not in LEGS]
+    aiming[:, upper] = aiming[:, upper] @ turn.T
+    assert shows("aim", body(aiming))
+
+
+def _striking(begin: Joints, end: Joints) -> Joints:
+    """Hold a hand at `begin`, bring it to `end` within 0.15 s and hold it there."""
+    return arm_to(standing(2.0), "R", _between(np.tile(begin, (60, 1)), end, np.clip((seconds(2.0) - 1) / 0.15, 0, 1)))
+
+
+def test_a_punch_is_driven_out_by_the_elbow() -> None:
+    assert shows("punch", body(_striking(np.array([-0.02, -0.1, 0.12]), np.array([0.0, 0.0, 0.5]))))
+    assert not shows("punch", body(_striking(np.array([-0.1, -0.48, 0.0]), np.array([0.0, 0.0, 0.5]))))  # swings up
+
+
+def test_a_strike_is_no_dodge() -> None:
+    lean = 30 * np.clip((seconds(2.0) - 1) / 0.3, 0, 1)
+    dodging, striking = standing(2.0), _striking(np.array([-0.02, -0.1, 0.12]), np.array([0.0, 0.0, 0.5]))
+    assert shows("dodge", body(tipped(dodging, lean)))
+    assert not shows("dodge", body(tipped(striking, lean)))
+
+
+def test_a_throw_comes_from_behind_and_stops_ahead() -> None:
+    assert shows("throw", body(_striking(np.array([-0.15, 0.15, -0.2]), np.array([0.0, 0.0, 0.5]))))
+    assert not shows("throw", body(_striking(np.array([-0.02, -0.1, 0.12]), np.array([0.0, 0.0, 0.5]))))
+
+
+@pytest.mark.parametrize("facing", [-90, 90])
+def test_a_sidestep_goes_across_the_way_that_the_body_faces(facing: float) -> None:
+    angle = np.deg2rad(facing)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    upper = [i for i, name in enumerate(HUMANML3D.joint_names) if name.split("_")[-1] not in LEGS]
+    joints = walking(3.0, 0.8)
+    middle = joints[:, :1] * [1.0, 0.0, 1.0]
+    assert not shows("sidestep", body(joints))
+    joints[:, upper] = (joints[:, upper] - middle) @ turn.T + middle
+    assert shows("sidestep", body(joints))
+    assert shows("sidestep", body(joints - middle))  # in place
+
+
+def test_sit_ups_are_done_on_the_back() -> None:
+    joints, length = standing(4.0), 4.0
+    joints[..., 1] -= joints[:, :1, 1] - 0.2
+    for side, across in (("L", 0.1), ("R", -0.1)):
+        for part, place in (
+            ("hip", (0.18, 0.0)),
+            ("knee", (0.5, 0.35)),
+            ("ankle", (0.08, 0.55)),
+            ("foot", (0.03, 0.67)),
+        ):
+            joints[:, HUMANML3D.index(f"{side}_{part}")] = [across, *place]
+    tip = -45 - 35 * np.cos(2 * np.pi * seconds(length) / length)
+    assert shows("sit-ups", body(tipped(joints, tip)))
+    assert not shows("sit-ups", body(tipped(joints, tip + 80)))  # bends forward and back over the legs
+
+
+def test_signs_take_three_seconds_and_three_places() -> None:
+    time = seconds(5.0)
+    places = np.array([[0.45, 0.0, 0.1], [0.1, 0.0, 0.45], [0.15, 0.45, 0.1], [0.45, 0.0, 0.1], [0.1, 0.0, 0.45]])
+    step = np.minimum(time.astype(int), 4)
+    share = np.clip((time - step) / 0.3, 0, 1)[:, None]
+    hand = places[np.maximum(step - 1, 0)] * (1 - share) + places[step] * share
+    signs = arm_to(standing(5.0), "L", hand)
+    assert shows("signal", body(signs))
+    assert not shows("signal", body(signs[:60]))
+    assert not shows("signal", body(_showing()))

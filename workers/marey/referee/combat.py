@@ -7,6 +7,7 @@ import numpy as np
 from marey.referee.aerial import OTHER, flights, jump, jump_forward
 from marey.referee.body import HIPS, SIDES, Body, Floats, Mask, runs, swings
 from marey.referee.gaits import gait, passage, planted, sneak, steady_gait, travel, turn, walk
+from marey.referee.gestures import bow
 from marey.referee.postures import sit_down, stand_up
 from marey.referee.rules import rule
 
@@ -262,14 +263,14 @@ def throw(body: Body) -> bool:
 def dodge(body: Body) -> bool:
     """Nearly still before; the head goes 0.25 m at 0.8 m/s or more, not upward; no hand reaches for the floor.
 
-    Who strikes, throws, jumps, sits down or walks moves the head as far, and does not dodge.
+    Who strikes, throws, jumps, bows, sits down or walks moves the head as far, and does not dodge.
     """
     found = gait(body)
     gone = travel(body) > 1.8 or found.steps > 5 or passage(body) or not planted(body)
     hands = min(float(body.height(f"{side}_wrist").min()) for side in SIDES)
     if gone or body.height("pelvis").min() < 0.5 * HIPS or hands < 0.45:
         return False
-    others = (jump, jump_forward, walk, sneak, turn, slash, punch, throw, sit_down, stand_up)
+    others = (bow, jump, jump_forward, walk, sneak, turn, slash, punch, throw, sit_down, stand_up)
     if any(each(body) for each in others):
         return False
     head, speed = body.at("head"), body.speed("head")

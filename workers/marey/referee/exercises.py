@@ -23,7 +23,10 @@ def push_ups(body: Body) -> bool:
 
 @rule("sit-ups")
 def sit_ups(body: Body) -> bool:
-    """Lies on the back, hips no higher than bent knees and below seats; the trunk rises by 30 degrees and lies back."""
+    """Lies on the back with bent knees; the trunk rises by 30 degrees and lies back.
+
+    Captured bodies that lie may float, so the hips are compared with the knees.
+    """
     bent = np.minimum(body.bend("L", "knee"), body.bend("R", "knee")) > 40
     knees = np.minimum(body.height("L_knee"), body.height("R_knee"))
     down = (body.height("pelvis") < 0.55) & (body.height("pelvis") < knees + 0.1)

@@ -168,7 +168,6 @@ def _signs(body: Body) -> int:
             if end - begin >= body.frames(0.1) and (not places or np.linalg.norm(middle - places[-1]) > 0.2):
                 places.append(middle)
         found += len(places)
-        found += len(swings(body.smooth(hand[:, 0], 0.1)[away], 0.35)) // 2 if away.sum() > 3 else 0
     return found
 
 
