@@ -11,21 +11,33 @@ import numpy as np
 import torch
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves
 
 from marey.training.recorded import tensors_of
 from marey.training.stages import RecordableStage, StepContext
 
 META = torch.device("meta")
+aten = torch.ops.aten
 
 
 class _NoCopies(TorchDispatchMode):
-    """Refuse operations that bring a tensor of the host to the device, which recording does not allow."""
+    """Refuse what brings numbers of the host to the device, which recording does not allow: operations of the device
+    that read a tensor of the host, and assignments of numbers (`x[0] = 1.0`), which `fill_` replaces."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._numbers: list[Tensor] = []
 
     def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        kwargs = kwargs or {}
-        if func is torch.ops.aten._to_copy.default and kwargs.get("device") == META:
-            assert args[0].device == META, f"a tensor of the host is copied to the device: {tuple(args[0].shape)}"
-        return func(*args, **kwargs)
+        found = func(*args, **(kwargs or {}))
+        given = [each for each in tree_leaves((args, kwargs)) if isinstance(each, Tensor)]
+        on_device = any(each.device == META for each in tree_leaves((found, given)) if isinstance(each, Tensor))
+        assert not on_device or all(each.device == META for each in given), f"{func} reads a tensor of the host"
+        number = any(each is known for each in given for known in self._numbers)
+        assert func is not aten.copy_.default or not number, "a number is assigned; use `fill_`"
+        if func is aten.scalar_tensor.default or (number and func in (aten.view.default, aten.expand.default)):
+            self._numbers.append(found)
+        return found
 
 
 def moved(value: Any, device: torch.device) -> Any:

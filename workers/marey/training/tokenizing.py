@@ -138,7 +138,7 @@ def swing_weights(name: str, device: torch.device, weight: float) -> Tensor:
     weights = torch.ones(len(names), device=device)
     for number, joint in enumerate(names):
         if joint in SWINGING:
-            weights[number] = weight
+            weights[number].fill_(weight)  # an assignment would copy the number from the host
     return weights / weights.mean()
 
 
@@ -147,7 +147,7 @@ def feature_weights(config: TokenizerTraining, device: torch.device, swing: floa
     `swing` times as high for positions of `SWINGING`."""
     weights = torch.ones(config.features, device=device)
     start = 4 + 3 * (config.joints - 1)
-    weights[start : start + 6 * (config.joints - 1)] = config.tokenizer.rotation_weight
+    weights[start : start + 6 * (config.joints - 1)].fill_(config.tokenizer.rotation_weight)
     if swing != 1:
         weights[4:start] = swing_weights(config.layout, device, swing)[1:].repeat_interleave(3)
     return weights

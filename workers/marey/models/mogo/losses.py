@@ -40,7 +40,7 @@ class LevelSums:
         """Return eq. 11 as a mean over codes (ours: its sum would weigh clips by their length), `first_level` times the
         weight on level 0."""
         weights = torch.ones_like(self.losses)
-        weights[0] = first_level
+        weights[0].fill_(first_level)  # an assignment would copy the number from the host
         return (weights * self.means).sum() / weights.sum()
 
 
