@@ -226,7 +226,9 @@ OPEN = replace(
     # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
     phases=1,
     speeds=False,
-    residual=replace(STARTER.residual, layers=6, feedforward=768),
+    # Waves and claps must be in the first level: upper levels are drawn without regard to their neighbours.
+    tokenizer=replace(STARTER.tokenizer, level_dropout=0.4, swing_weight=4.0),
+    residual=replace(STARTER.residual, layers=6, feedforward=768, dropout=0.1),
     # Decoding reads the whole condition from the first pass on; hard masks cost a third of a step.
     mining=replace(STARTER.mining, conditions="specific", mask="random"),
 )
