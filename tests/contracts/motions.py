@@ -18,11 +18,17 @@ PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 
 
 
 def processor() -> str:
-    """The features that decide the order in which a matrix product is summed: only equal machines give equal bits."""
-    flags = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")).split()
-    known = [flag for flag in ("avx2", "avx512f", "avx512_bf16", "amx_bf16") if flag in flags]
-    vendor = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("vendor_id"))
-    return " ".join([vendor.split()[-1], *known, f"torch {torch.__version__.partition('+')[0]}"])
+    """The features that decide the order in which a matrix product is summed: only equal machines give equal bits.
+
+    Two generations of a vendor with the same flags differ: the family and the model are part of it.
+    """
+    lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text().splitlines())
+    first: dict[str, str] = {}
+    for name, _, value in lines:
+        first.setdefault(name.strip(), value.strip())
+    known = [flag for flag in ("avx2", "avx512f", "avx512_bf16", "amx_bf16") if flag in first["flags"].split()]
+    kind = [first.get(name, "") for name in ("vendor_id", "cpu family", "model")]
+    return " ".join([*kind, *known, f"torch {torch.__version__.partition('+')[0]}"])
 
 
 def motion(name: str) -> dict[str, Any]:
