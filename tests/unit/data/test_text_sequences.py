@@ -46,7 +46,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
 
 def test_clips_of_different_actions_are_joined_and_told_in_order(data: PreparedData) -> None:
     made = [clip for clip in data.clips if clip.spliced and not any(id.startswith("G-") for id in clip.spliced)]
-    assert len(made) > 20
+    assert len(made) > 5
     assert {len(clip.acts) for clip in made} == {2, 3}
     for clip in made:
         assert clip.length <= MAX_FRAMES

@@ -1,4 +1,4 @@
-"""What the training loop asks of a stage."""
+"""Protocols of the stages that the training loop runs."""
 
 from __future__ import annotations
 
