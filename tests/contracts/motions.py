@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 
 def processor() -> str:
     """The features that decide the order in which a matrix product is summed: only equal machines give equal bits.
 
-    Two generations of a vendor with the same flags differ: the family and the model are part of it.
+    Two generations of a vendor with the same flags differ: the family and the model are part of it, and the kernels that
+    numpy's OpenBLAS is told to use.
     """
     lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text().splitlines())
     first: dict[str, str] = {}
@@ -28,7 +30,8 @@ def processor() -> str:
         first.setdefault(name.strip(), value.strip())
     known = [flag for flag in ("avx2", "avx512f", "avx512_bf16", "amx_bf16") if flag in first["flags"].split()]
     kind = [first.get(name, "") for name in ("vendor_id", "cpu family", "model")]
-    return " ".join([*kind, *known, f"torch {torch.__version__.partition('+')[0]}"])
+    told = [f"OpenBLAS {name}"] if (name := os.environ.get("OPENBLAS_CORETYPE")) else []
+    return " ".join([*kind, *known, *told, f"torch {torch.__version__.partition('+')[0]}"])
 
 
 def motion(name: str) -> dict[str, Any]:
