@@ -21,8 +21,8 @@ PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 
 def processor() -> str:
     """The features that decide the order in which a matrix product is summed: only equal machines give equal bits.
 
-    Two generations of a vendor with the same flags differ: the family and the model are part of it, and the kernels that
-    numpy's OpenBLAS is told to use.
+    Two generations of a vendor with the same flags differ, so the family and the model are part of it, and the kernels
+    that numpy's OpenBLAS is told to use.
     """
     lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text().splitlines())
     first: dict[str, str] = {}
