@@ -6,8 +6,8 @@ import random
 
 from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_guards import begun, near
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
+from marey.data.gesture_guards import begun, near, on_guard
+from marey.data.gesture_poses import LEFT, RIGHT, StandingBody
 from marey.data.gesture_stances import step
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
@@ -55,10 +55,7 @@ def stab(rng: random.Random) -> Gesture:
     lowers = stance is None and rng.random() < 0.8
 
     def change(body: StandingBody) -> None:
-        frames = len(body.joints)
-        way = envelope(frames, start, 0.55, seconds - 0.95 - start if lowers else 60.0, 0.6)
-        if stance:
-            stance(body, way)
+        way = on_guard(body, stance, start, seconds - 0.95 if lowers else None)
         for blow in blows if lunges else ():
             step(body, lead, (0.0, stride), blow.begin + 0.6 * blow.wind, blow.out + 0.4 * blow.wind)
             step(body, lead, (0.0, -stride), blow.hit + blow.stay, blow.back)
@@ -124,10 +121,7 @@ def slash(rng: random.Random) -> Gesture:
     lowers = stance is None and rng.random() < 0.8
 
     def change(body: StandingBody) -> None:
-        frames = len(body.joints)
-        way = envelope(frames, start, 0.55, seconds - 0.95 - start if lowers else 60.0, 0.6)
-        if stance:
-            stance(body, way)
+        way = on_guard(body, stance, start, seconds - 0.95 if lowers else None)
         strike(body, way, guards, blows)
 
     kinds = ["slash", *([form] if form else []), "slash-both" if both else "slash-hand"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_guards import begun, near
+from marey.data.gesture_guards import begun, near, on_guard
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
 from marey.data.gesture_stances import settle, step
 
@@ -61,10 +61,7 @@ def punch(rng: random.Random) -> Gesture:
     lowers = stance is None and rng.random() < 0.8
 
     def change(body: StandingBody) -> None:
-        frames = len(body.joints)
-        way = envelope(frames, start, 0.55, seconds - 0.95 - start if lowers else 60.0, 0.6)
-        if stance:
-            stance(body, way)
+        way = on_guard(body, stance, start, seconds - 0.95 if lowers else None)
         strike(body, way, guards, blows)
 
     kinds = ["punch", *([f"punch-{form}"] if form else []), *(["punch-hand"] if hand else [])]

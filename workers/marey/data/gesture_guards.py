@@ -122,3 +122,12 @@ def fight_stance(rng: random.Random) -> Gesture:
     kinds = ["guard", form, f"guard-{mood}", "guard-lead"]
     kinds += [] if begins else ["guard-enter"]
     return Gesture(seconds, tuple(kinds), change, lead)
+
+
+def on_guard(body: StandingBody, stance: Stance | None, start: float, end: float | None) -> Array:
+    """Take a stance, if there is one, from `start` to `end` in seconds, or to the last frame; return the way into the
+    guard and out of it, (T,) 0 to 1."""
+    way = envelope(len(body.joints), start, 0.55, 60.0 if end is None else end - start, 0.6)
+    if stance:
+        stance(body, way)
+    return way
