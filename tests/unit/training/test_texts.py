@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import cast
 
 import numpy as np
@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.bundles import TextSpec
+from marey.core.errors import InvalidInput
 from marey.text.graph import SemanticGraph, build_graph
 from marey.text.pipeline import TextPipeline
 from marey.text.roles import Argument, Frame
 from marey.training import texts as module
-from marey.training.texts import CaptionTexts
+from marey.training.texts import KINDS, CaptionTexts, KnownCaptions
 from tests.support.texts import shared_pipeline
 
 CAPTIONS = (("a person walks forward", "Someone walks, then waves the left hand."), ("a person bows deeply",))
@@ -44,6 +45,42 @@ def test_two_processes_read_captions_as_one_does(monkeypatch: pytest.MonkeyPatch
         assert (a == b) if field.name == "spec" else np.array_equal(a, b), field.name
     assert steps == sorted(steps)
     assert steps[-1][1] == 2 * len(captions)
+
+
+def test_captions_that_were_read_before_are_not_read_again():
+    pipeline = shared_pipeline()
+    before = (("a person bows deeply", "a person jumps"), ("Someone walks, then waves the left hand.",))
+    asked: list[str] = []
+
+    class Watched:
+        spec = pipeline.spec
+
+        def parse(self, prompts: Sequence[str]) -> list[SemanticGraph]:
+            asked.extend(prompts)
+            return pipeline.parse(prompts)
+
+        def pooled(self, texts: Sequence[str]) -> list[np.ndarray]:
+            return pipeline.pooled(texts)
+
+    flat = [caption for clip in before for caption in clip]
+    known = KnownCaptions(CaptionTexts.build(before, pipeline), {text: row for row, text in enumerate(flat)})
+    reused = CaptionTexts.build(CAPTIONS, cast("TextPipeline", Watched()), known=known)
+    assert asked == ["a person walks forward"]
+    fresh = CaptionTexts.build(CAPTIONS, pipeline)
+    vectors = [texts.strings[texts.node_string] for texts in (fresh, reused)]
+    assert np.allclose(*vectors, atol=1e-3)  # compiled networks round the last bit differently
+    for name in KINDS.keys() - {"strings", "node_string"}:
+        field = "first" if name == "caption_start" else name
+        assert np.array_equal(getattr(fresh, field), getattr(reused, field)), name
+
+
+def test_captions_of_another_encoder_are_not_reused():
+    pipeline = shared_pipeline()
+    known = KnownCaptions(
+        replace(CaptionTexts.build(CAPTIONS, pipeline), spec=TextSpec(width=1)), {"a person walks forward": 0}
+    )
+    with pytest.raises(InvalidInput, match="another encoder"):
+        CaptionTexts.build(CAPTIONS, pipeline, known=known)
 
 
 class OneGraph:

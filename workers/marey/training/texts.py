@@ -9,7 +9,7 @@ their caption · `spec`, `clips_sha256`: strings.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from pydantic import ValidationError
 from marey.bundles import TextSpec
 from marey.core.arrays import check_array, read_npz, text_of
 from marey.core.documents import parse_json
-from marey.core.errors import InvalidFile, NotFound
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
 from marey.data.manifest import CLIPS, TEXTS
 from marey.data.prepared import PreparedData
@@ -45,6 +45,29 @@ KINDS = {
 
 
 @dataclass(frozen=True)
+class KnownCaptions:
+    """Captions that were read before.
+
+    Attributes:
+        texts: their features.
+        rows: the row of each caption in them.
+    """
+
+    texts: CaptionTexts
+    rows: Mapping[str, int]
+
+    @classmethod
+    def load(cls, data: PreparedData) -> KnownCaptions:
+        """Read those of a prepared folder.
+
+        Raises:
+            NotFound, InvalidFile: as `CaptionTexts.load`.
+        """
+        captions = (caption for clip in data.clips for caption in clip.captions + clip.act_captions)
+        return cls(CaptionTexts.load(data), {caption: row for row, caption in enumerate(captions)})
+
+
+@dataclass(frozen=True)
 class CaptionTexts:
     """Text features of all captions, ordered by clip."""
 
@@ -63,6 +86,7 @@ class CaptionTexts:
         captions: Sequence[Sequence[str]],
         pipeline: TextPipeline,
         *,
+        known: KnownCaptions | None = None,
         processes: int = 1,
         encoder_path: Path | None = None,
         progress: Callable[[int, int], None] | None = None,
@@ -72,37 +96,100 @@ class CaptionTexts:
         Args:
             captions: captions of each clip.
             pipeline: text pipeline for the single-process case.
+            known: captions that were read before; only the others are parsed and encoded. A node's text that both have
+                is kept twice.
             processes: number of parallel processes, each with the weights of its `spec`.
             encoder_path: folder of the encoder's weights in those processes; None = where they are installed.
             progress: called with the number of done captions and of all.
+
+        Raises:
+            InvalidInput: `known` was read by another pipeline.
         """
         flat = [caption for clip in captions for caption in clip]
         unique = list(dict.fromkeys(flat))
+        if known is not None and known.texts.spec != pipeline.spec:
+            hint = "Read all captions again, or choose the encoder and labeller of that folder."
+            raise InvalidInput("captions were read by another encoder or labeller", where="known", hint=hint)
+        rows = {} if known is None else known.rows
+        texts = cls._read([text for text in unique if text not in rows], pipeline, processes, encoder_path, progress)
+        if known is None:
+            row_of = {text: row for row, text in enumerate(unique)}
+        else:
+            unread = (text for text in unique if text not in rows)
+            row_of = {**rows, **{text: row for row, text in enumerate(unread, len(known.texts.node_start) - 1)}}
+            texts = known.texts._with(texts)
+        return texts._arranged(np.array([row_of[text] for text in flat], np.int64), [len(clip) for clip in captions])
+
+    @classmethod
+    def _read(
+        cls,
+        unique: Sequence[str],
+        pipeline: TextPipeline,
+        processes: int,
+        encoder_path: Path | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> CaptionTexts:
+        """Read different captions, each as a clip of its own."""
         with _readers(pipeline, processes, encoder_path) as (parse, encode):
-            graphs: dict[str, SemanticGraph] = {}
+            graphs: list[SemanticGraph] = []
             for found in parse(_chunks(unique)):
-                graphs.update(zip(unique[len(graphs) :], found, strict=False))
+                graphs += found
                 if progress:
                     progress(len(graphs), 2 * len(unique))
             table: dict[str, int] = {}
-            node_string = [table.setdefault(n.text, len(table)) for text in flat for n in graphs[text].nodes]
-            rows: list[NDArray[np.float16]] = []
+            node_string = [table.setdefault(n.text, len(table)) for graph in graphs for n in graph.nodes]
+            strings: list[NDArray[np.float16]] = [np.zeros((0, pipeline.spec.width), np.float16)]
             for block in encode(_chunks(list(table))):
-                rows.append(block)
+                strings.append(block)
                 if progress:
-                    progress(len(unique) + len(rows) * CHUNK * len(unique) // len(table), 2 * len(unique))
-        strings = np.concatenate(rows)
-        nodes = [graphs[text].nodes for text in flat]
-        edges = [(e.source, e.target, EDGE_TYPES.index(e.type)) for text in flat for e in graphs[text].edges]
+                    progress(len(unique) + (len(strings) - 1) * CHUNK * len(unique) // len(table), 2 * len(unique))
+        edges = [(e.source, e.target, EDGE_TYPES.index(e.type)) for graph in graphs for e in graph.edges]
         return cls(
             pipeline.spec,
-            strings,
-            _starts([len(clip) for clip in captions]),
-            _starts([len(each) for each in nodes]),
+            np.concatenate(strings),
+            np.arange(len(unique) + 1),
+            _starts([len(graph.nodes) for graph in graphs]),
             np.array(node_string, np.int32),
-            np.array([LEVELS.index(n.level) for each in nodes for n in each], np.int8),
-            _starts([len(graphs[text].edges) for text in flat]),
+            np.array([LEVELS.index(n.level) for graph in graphs for n in graph.nodes], np.int8),
+            _starts([len(graph.edges) for graph in graphs]),
             np.array(edges, np.int16).reshape(-1, 3),
+        )
+
+    def _with(self, more: CaptionTexts) -> CaptionTexts:
+        """Return the captions of both, each as a clip of its own."""
+        return CaptionTexts(
+            self.spec,
+            np.concatenate([self.strings, more.strings]),
+            np.arange(len(self.node_start) + len(more.node_start) - 1),
+            np.concatenate([self.node_start, self.node_start[-1] + more.node_start[1:]]),
+            np.concatenate([self.node_string, (more.node_string + len(self.strings)).astype(np.int32)]),
+            np.concatenate([self.node_level, more.node_level]),
+            np.concatenate([self.edge_start, self.edge_start[-1] + more.edge_start[1:]]),
+            np.concatenate([self.edges, more.edges]),
+        )
+
+    def _arranged(self, rows: NDArray[np.int64], counts: Sequence[int]) -> CaptionTexts:
+        """Return these captions in another order, with the strings they use in the order of their first use.
+
+        Args:
+            rows: (K,) caption of each place.
+            counts: captions of each clip.
+        """
+        node_start, nodes = _gathered(self.node_start, rows)
+        edge_start, edges = _gathered(self.edge_start, rows)
+        used, first, inverse = np.unique(self.node_string[nodes], return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        place = np.empty(len(used), np.int32)
+        place[order] = np.arange(len(used), dtype=np.int32)
+        return CaptionTexts(
+            self.spec,
+            self.strings[used[order]],
+            _starts(counts),
+            node_start,
+            place[inverse],
+            self.node_level[nodes],
+            edge_start,
+            self.edges[edges],
         )
 
     def save(self, folder: Path) -> None:
@@ -250,7 +337,14 @@ def _chunks(texts: Sequence[str]) -> list[Sequence[str]]:
     return [texts[at : at + CHUNK] for at in range(0, len(texts), CHUNK)]
 
 
-def _starts(counts: Sequence[int]) -> NDArray[np.int64]:
+def _gathered(starts: NDArray[np.int64], rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the parts of `rows` begin when they follow each other, (R + 1,), and the index of each element."""
+    sizes = np.diff(starts)[rows]
+    begins = _starts(sizes)
+    return begins, np.arange(begins[-1]) - np.repeat(begins[:-1] - starts[rows], sizes)
+
+
+def _starts(counts: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
 
 

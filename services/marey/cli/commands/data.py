@@ -152,13 +152,17 @@ def text(
         bool,
         typer.Option("--as-written", help="Keep the order of words; default: several actions in the order of time."),
     ] = False,
+    reuse: Annotated[
+        Path | None,
+        typer.Option("--reuse", help="Prepared folder, read before: only captions that it has not are read."),
+    ] = None,
 ) -> None:
     """Parse and encode the captions, once for all training runs."""
     from marey.cli.roles import data
 
     with console.bar() as bar:
         task = bar.add_task("captions", total=None)
-        choice = data.TextChoice(model, encoder, labeller, weights, as_written)
+        choice = data.TextChoice(model, encoder, labeller, weights, as_written, reuse)
         count = data.encode_captions(folder, choice, lambda done, total: bar.update(task, completed=done, total=total))
     console.say(f"{count} captions encoded")
 

@@ -188,6 +188,7 @@ class TextChoice:
         encoder, labeller: names.
         weights: folder of the encoder's weights.
         as_written: keep captions of several actions in their own order.
+        reuse: prepared folder whose captions need not be read again.
     """
 
     model: str | None = None
@@ -195,19 +196,20 @@ class TextChoice:
     labeller: str | None = None
     weights: Path | None = None
     as_written: bool = False
+    reuse: Path | None = None
 
 
 def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, int], None]) -> int:
     """Write `texts.npz` of a prepared folder, and return the number of its captions.
 
     Raises:
-        InvalidInput: options that exclude each other, or an unknown encoder.
+        InvalidInput: options that exclude each other, an unknown encoder, or captions to reuse that were read by another.
         NotFound, InvalidBundle, InvalidFile: the data or the weights; see `TextPipeline.load`.
     """
     try:
         from marey.data.prepared import PreparedData
         from marey.text.pipeline import TextPipeline
-        from marey.training.texts import CHUNK, CaptionTexts
+        from marey.training.texts import CHUNK, CaptionTexts, KnownCaptions
     except ImportError as error:
         raise needs_extra("worker", error) from error
     spec = _text_spec(choice)
@@ -215,9 +217,15 @@ def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, i
     captions = [clip.captions + clip.act_captions for clip in data.clips]
     pipeline = TextPipeline.load(spec, encoder_path=choice.weights)
     processes = min(os.cpu_count() or 1, -(-sum(map(len, captions)) // CHUNK))  # each loads the weights
-    CaptionTexts.build(captions, pipeline, processes=processes, encoder_path=choice.weights, progress=progress).save(
-        folder
-    )
+    known = None if choice.reuse is None else KnownCaptions.load(PreparedData.open(choice.reuse))
+    CaptionTexts.build(
+        captions,
+        pipeline,
+        known=known,
+        processes=processes,
+        encoder_path=choice.weights,
+        progress=progress,
+    ).save(folder)
     return sum(map(len, captions))
 
 
