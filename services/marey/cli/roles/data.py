@@ -203,7 +203,7 @@ def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, i
     """Write `texts.npz` of a prepared folder, and return the number of its captions.
 
     Raises:
-        InvalidInput: options that exclude each other, an unknown encoder, or captions to reuse that were read by another.
+        InvalidInput: options that exclude each other, an unknown encoder, or captions that another encoder has read.
         NotFound, InvalidBundle, InvalidFile: the data or the weights; see `TextPipeline.load`.
     """
     try:
