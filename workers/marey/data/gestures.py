@@ -28,8 +28,10 @@ from marey.data.gesture_balls import dribble
 from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
+from marey.data.gesture_dodges import dodge, flinch
 from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
+from marey.data.gesture_falls import die
 from marey.data.gesture_fights import block, punch
 from marey.data.gesture_floor import get_up, lie, lie_down, sit_floor
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
@@ -210,4 +212,7 @@ KINDS: Mapping[str, Kind] = {
     "get-up": Kind(100, get_up, is_plain_idle),
     "sit-floor": Kind(100, sit_floor, is_plain_idle),
     "lie": Kind(80, lie, is_plain_idle),
+    "die": Kind(100, die, is_plain_idle),
+    "dodge": Kind(100, dodge, is_plain_idle),
+    "flinch": Kind(100, flinch, is_plain_idle),
 }

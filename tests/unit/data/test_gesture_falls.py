@@ -1,0 +1,93 @@
+"""Made clips of deaths, dodges, hits, rolls, flips and swimming: the numbers that define their actions."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from marey.data import gestures
+from marey.data.gestures import made_gestures
+from marey.data.part import MAX_FRAMES, Part
+from marey.motion.skeleton import HUMANML3D
+from tests.support.bodies import FPS
+from tests.unit.data.test_gestures import FALLS, OTHER, few, idle
+
+COUNT = 24
+HEAD, CHEST, TOES = 15, 9, [10, 11]
+
+
+@pytest.fixture(scope="module")
+def made() -> list[Part]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gestures, "KINDS", {action: few(COUNT)[action] for action in FALLS})
+        return list(made_gestures([idle(), idle(2.0)]))
+
+
+def of(made: list[Part], action: str) -> list[Part]:
+    found = [part for part in made if part.content == action]
+    assert len(found) == COUNT
+    return found
+
+
+def texts(part: Part) -> list[str]:
+    return [text.lower() for author in part.source.captions[:-1] for text in author]  # without the vocabulary's
+
+
+def moved(part: Part, joint: int, seconds: float) -> float:
+    """Largest distance, metres, of a joint between two frames at most `seconds` apart."""
+    joints, longest = part.joints[:, joint], round(seconds * FPS)
+    return max(float(np.linalg.norm(joints[lag:] - joints[:-lag], axis=-1).max()) for lag in range(1, longest + 1))
+
+
+def test_bodies_keep_their_bones_and_stay_over_the_floor(made: list[Part]) -> None:
+    assert Counter(part.content for part in made) == dict.fromkeys(FALLS, COUNT)
+    lengths = np.linalg.norm(HUMANML3D.offsets[1:], axis=-1)
+    for part in made:
+        assert 1.5 * FPS <= len(part.joints) <= MAX_FRAMES + 1
+        bones = np.linalg.norm(part.joints[:, 1:] - part.joints[:, list(HUMANML3D.parents[1:])], axis=-1)
+        assert np.abs(bones - lengths).max() < 1e-4
+        assert part.joints[..., 1].min() > -0.06, part.source.captions
+        assert np.linalg.norm(np.diff(part.joints, axis=0), axis=-1).max() * FPS < 12, part.source.captions
+        assert not any("{" in text for text in texts(part))
+
+
+def test_the_dead_fall_from_standing_with_gravity_and_stay_down(made: list[Part]) -> None:
+    for part in of(made, "die"):
+        height = part.joints[:, [0, CHEST, HEAD], 1]
+        assert height[0].min() > 0.8
+        assert height[-8:].max() < 0.4, part.source.captions
+        speed = np.diff(part.joints[:, HEAD, 1]) * FPS
+        assert -7.0 < speed.min() < -2.0, part.source.captions
+        up = part.joints[-1, 16:18].mean(0) - part.joints[-1, 0]
+        faces = np.cross(part.joints[-1, 16] - part.joints[-1, 17], up)[1]
+        told = " ".join(texts(part))
+        if re.search(r"\b(face down|on (his|her|their) (front|face))\b", told):
+            assert faces < 0
+        if re.search(r"\b(face up|on (the|his|her|its) back)\b", told):
+            assert faces > 0
+
+
+def test_a_dodge_moves_the_head_fast_and_ends_on_the_feet(made: list[Part]) -> None:
+    sides = Counter(part.source.side for part in of(made, "dodge"))
+    assert {"left", "right", ""} == sides.keys()
+    for part in of(made, "dodge"):
+        assert moved(part, HEAD, 0.6) >= 0.25, part.source.captions
+        assert part.joints[:, 0, 1].min() > 0.45
+        assert part.joints[-1, 0, 1] > 0.75
+        if side := part.source.side:
+            assert OTHER[side] not in " ".join(texts(part))
+            aside = part.joints[:, HEAD, 0] - part.joints[0, HEAD, 0]  # the body faces +Z
+            assert aside[np.abs(aside).argmax()] * (1 if side == "left" else -1) > 0.2
+
+
+def test_a_hit_jerks_head_and_chest_and_the_body_stands_again(made: list[Part]) -> None:
+    for part in of(made, "flinch"):
+        assert moved(part, HEAD, 0.3) >= 0.08
+        assert moved(part, CHEST, 0.3) >= 0.08, part.source.captions
+        assert part.joints[:, 0, 1].min() > 0.55
+        np.testing.assert_allclose(part.joints[-1, HEAD], part.joints[0, HEAD], atol=0.15)
+        if side := part.source.side:
+            assert OTHER[side] not in " ".join(texts(part))
