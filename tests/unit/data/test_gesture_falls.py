@@ -91,3 +91,23 @@ def test_a_hit_jerks_head_and_chest_and_the_body_stands_again(made: list[Part]) 
         np.testing.assert_allclose(part.joints[-1, HEAD], part.joints[0, HEAD], atol=0.15)
         if side := part.source.side:
             assert OTHER[side] not in " ".join(texts(part))
+
+
+def test_a_roll_goes_over_back_or_shoulders_and_comes_up_on_the_feet(made: list[Part]) -> None:
+    for part in of(made, "roll"):
+        hips, head = part.joints[:, 0, 1], part.joints[:, HEAD, 1]
+        lies = (part.joints[:, [9, 12, 16, 17], 1].min(-1) < 0.2) & (head < hips)
+        assert lies.any(), part.source.captions
+        assert part.joints[:, [0, CHEST], 1].min() < 0.3
+        assert hips[0] > 0.8
+        assert hips[-1] > 0.45
+        assert (part.joints[-1, [7, 8], 1] < 0.15).all()
+        went = part.joints[-1, 0] - part.joints[0, 0]  # the body faces +Z
+        told = " ".join(texts(part))
+        if part.source.side:
+            assert went[0] * (1 if part.source.side == "left" else -1) > 1.0
+            assert OTHER[part.source.side] not in told
+        elif "backward" in told:
+            assert went[2] < -1.0
+        else:
+            assert went[2] > 1.0 or not re.search("forward|ahead", told)
