@@ -13,7 +13,7 @@ from marey.data.gestures import made_gestures
 from marey.data.part import MAX_FRAMES, Part
 from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import FPS
-from tests.unit.data.test_gestures import FALLS, OTHER, few, idle
+from tests.unit.data.test_gestures import FALLS, OTHER, few, idle, tilt
 
 COUNT = 24
 HEAD, CHEST, TOES = 15, 9, [10, 11]
@@ -111,3 +111,16 @@ def test_a_roll_goes_over_back_or_shoulders_and_comes_up_on_the_feet(made: list[
             assert went[2] < -1.0
         else:
             assert went[2] > 1.0 or not re.search("forward|ahead", told)
+
+
+def test_a_swimmer_lies_level_or_leans_and_strokes_off_the_floor(made: list[Part]) -> None:
+    for part in of(made, "swim"):
+        told = " ".join(texts(part))
+        assert part.joints[..., 1].min() > 0.05
+        treads = bool(re.search(r"tread|upright", told))
+        degrees = tilt(part)
+        assert (degrees.min() > 5 and degrees.max() < 35) or (degrees.min() > 60 and not treads), part.source.captions
+        for ends in ([20, 21], [7, 8]):
+            place = part.joints[:, ends] - part.joints[:, :1]
+            path = np.linalg.norm(np.diff(place, axis=0), axis=-1).sum(0)
+            assert path.min() > 0.4 * len(part.joints) / FPS  # metres a second

@@ -154,3 +154,59 @@ def _roll_aside(rng: random.Random, done: Tumble, pace: float) -> tuple[float, f
     for seconds, whole in ((0.5, low), (0.28, side), (0.28, back), (0.28, last), (0.3, up)):
         done.then(seconds * pace, whole)
     return (-far, 0.0)
+
+
+# -- flips ---------------------------------------------------------------------------------------------------------
+
+
+def flip(rng: random.Random) -> Gesture:
+    """A somersault in the air, backward or forward, from standing or out of steps, tucked or half open."""
+    form = rng.choices(["back", "front"], (3, 2))[0]
+    turn = 1.0 if form == "front" else -1.0
+    done = Tumble(times=[rng.uniform(0.15, 0.8)])
+    steps = form == "front" and rng.random() < 0.6
+    start = _steps_in(rng, done, 0.9) if steps else 0.0
+    far = rng.uniform(0.9, 1.3) if steps else rng.uniform(0.35, 0.8)
+    end, lasts = start + turn * far, rng.uniform(0.62, 0.72)
+    swung = pair(Limb((0.22, -0.34, -0.24), towards=(0.7, 0.1, -0.7)))
+    raised = pair(Limb((0.2, 0.46, 0.12), towards=(0.8, 0.2, 0.4)))
+    low = Whole((0.0, start - 0.06), 0.72, (26, 0, 0), (16, 0, 0), (-10, 0, 0), swung, stood(0, start), splay=0.2)
+    toes = {side: Limb((0.0, 0.06, start), OWN) for side in SIDES}
+    off = Whole(
+        (0.0, start + 0.1 * turn), 1.07, (16 * turn, 0, 0), (-6, 0, 0), (-6 * turn, 0, 0), raised, toes, splay=0.1
+    )
+    tight = rng.uniform(0.0, 1.0)
+    feet = pair(Limb((0.1, -0.4 - 0.2 * tight, 0.36 - 0.1 * tight), towards=(0.1, -0.8, 0.5)))
+    spine = (34 - 14 * tight, 0, 0)
+    middle = Whole((0.0, start), 1.45, (0, 0, 0), spine, (16, 0, 0), _SHINS, feet, splay=0.2)
+    arms = pair(Limb((0.34, -0.24, 0.3), towards=(0.8, -0.6, -0.2)))
+    opened = pair(Limb((0.1, -0.72, 0.16 if form == "back" else 0.1), towards=(0.1, -0.5, 0.8)))
+    landed = Whole(
+        (0.0, end - 0.04 * turn),
+        0.84,
+        (turn * 360 + 14, 0, 0),
+        (14, 0, 0),
+        (-12, 0, 0),
+        arms,
+        stood(0, end),
+        splay=0.25,
+    )
+    sunk = replace(landed, height=rng.uniform(0.6, 0.74), tilt=(turn * 360 + 26, 0, 0), spine=(20, 0, 0))
+    if not steps:
+        done.then(rng.uniform(0.4, 0.6), low)
+    else:
+        done.then(0.22, low)
+    done.then(rng.uniform(0.22, 0.28), off)
+    begins = done.times[-1]
+    for share, angle in ((0.3, 108), (0.5, 200), (0.72, 296)):
+        whole = replace(middle, at=(0.0, start + share * (end - start)), tilt=(turn * angle, 0, 0))
+        done.then(begins + share * lasts - done.times[-1], replace(whole, feet=opened) if share > 0.7 else whole)
+    done.then(begins + lasts - done.times[-1], landed)
+    done.flights.append((begins, begins + lasts))
+    done.then(rng.uniform(0.16, 0.24), sunk)
+    done.then(
+        rng.uniform(0.5, 0.8), Whole((0.0, end), tilt=(turn * 360, 0, 0), feet=stood(0, end)), rng.uniform(0.2, 0.9)
+    )
+    kinds = ["flip", f"flip-{form}", "flip-steps" if steps else "flip-standing"]
+    other = "back" if form == "front" else "front|forward"
+    return done.gesture(rng, kinds, untrue=rf"({other}|handspring)")

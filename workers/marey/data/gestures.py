@@ -52,6 +52,7 @@ from marey.data.gesture_sneaks import sneak
 from marey.data.gesture_spins import is_single_jump, jump_turn, spin
 from marey.data.gesture_stairs import climb_stairs
 from marey.data.gesture_steps import sidestep, turn_around
+from marey.data.gesture_swims import swim
 from marey.data.gesture_throws import throw
 from marey.data.gesture_travel import bent_walk, is_plain_gait, run, sprint, starts_backward, turn, walk_backward
 from marey.data.gesture_trunk import bow, nod, shiver
@@ -217,4 +218,5 @@ KINDS: Mapping[str, Kind] = {
     "dodge": Kind(100, dodge, is_plain_idle),
     "flinch": Kind(100, flinch, is_plain_idle),
     "roll": Kind(100, roll, is_plain_idle),
+    "swim": Kind(100, swim, is_plain_idle),
 }
