@@ -37,7 +37,7 @@ POSTURES = {
     *("kneel", "push-ups", "sit-ups", "lie-down", "get-up", "sit-floor", "lie"),
 }
 """Actions in which the hips go far down or a foot leaves the floor."""
-FALLS = ("die", "dodge", "flinch", "roll", "swim")
+FALLS = ("die", "dodge", "flinch", "roll", "swim", "flip")
 """Actions in which the body falls, turns over or floats, or nearly so."""
 
 

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import LEFT, StandingBody
-from marey.data.gesture_tumbling import BODY, Motion, tumble
+from marey.data.gesture_tumbling import BODY, WholeMotion, tumble
 from marey.data.part import FPS
 
 Array = NDArray[np.floating]
@@ -99,7 +99,7 @@ def swim(rng: random.Random) -> Gesture:
     return Gesture(seconds, tuple(filter(None, kinds)), change, untrue=rf"({strokes[form]})")
 
 
-def _motion(form: str, phase: Array, speed: float, rate: float, shape: dict[str, float]) -> Motion:
+def _motion(form: str, phase: Array, speed: float, rate: float, shape: dict[str, float]) -> WholeMotion:
     """The motion of a form over `phase` (T,), strokes, at `speed` metres a second."""
     zero, turn = np.zeros_like(phase), 2 * np.pi * phase
     head = -1.0 if form == "backstroke" else 1.0
@@ -126,7 +126,7 @@ def _motion(form: str, phase: Array, speed: float, rate: float, shape: dict[str,
     hands = {side: {BODY: _hand(form, side, phase)} for side in SIDES}
     feet = {side: {BODY: _foot(form, side, phase, shape)} for side in SIDES}
     splay = zero + (0.5 if form in ("breaststroke", "tread") else 0.12)
-    return Motion(*stack, hands, feet, zero, splay)
+    return WholeMotion(*stack, hands, feet, zero, splay)
 
 
 def _hand(form: str, side: str, phase: Array) -> tuple[Array, Array, Array]:

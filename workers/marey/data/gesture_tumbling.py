@@ -111,17 +111,21 @@ def stood(left: float, forward: float) -> dict[str, Limb]:
 
 @dataclass
 class Tumble:
-    """Poses, the times at which they are reached, and between which of them the body flies or falls."""
+    """Poses and the times at which they are reached, seconds.
+
+    Attributes:
+        poses, times: of the same length, two or more; the first and the last pose are held.
+        falls: for each pose but the first, whether the body falls into it.
+        flights: first and last second of each flight.
+    """
 
     poses: list[Whole] = field(default_factory=lambda: [Whole()])
     times: list[float] = field(default_factory=lambda: [0.4])
     falls: list[bool] = field(default_factory=list)
     flights: list[tuple[float, float]] = field(default_factory=list)
 
-    def then(self, seconds: float, whole: Whole, hold: float = 0.0, *, fall: bool = False, flies: bool = False) -> None:
-        """Reach a pose after `seconds`, falling into it or flying there, and hold it."""
-        if flies:
-            self.flights.append((self.times[-1], self.times[-1] + seconds))
+    def then(self, seconds: float, whole: Whole, hold: float = 0.0, *, fall: bool = False) -> None:
+        """Reach a pose after `seconds`, falling into it or not, and hold it."""
         self.times.append(self.times[-1] + seconds)
         self.poses.append(whole)
         self.falls.append(fall)
@@ -153,7 +157,7 @@ class Tumble:
         def limbs(name: str, side: str) -> dict[str, tuple[Array, Array, Array]]:
             return _by_anchor([getattr(one, name).get(side, Limb(anchor=OWN)) for one in poses], track)
 
-        motion = Motion(
+        motion = WholeMotion(
             track([(one.at[0], one.height, one.at[1]) for one in poses]),
             track([one.tilt for one in poses]),
             track([one.spine for one in poses]),
@@ -175,8 +179,6 @@ class Tumble:
             for part in np.arange(1, _PARTS + 1) / _PARTS if fall else (1.0,):
                 times.append(self.times[k] + part * (self.times[k + 1] - self.times[k]))
                 rows.append((1 - part**2) * eye[k] + part**2 * eye[k + 1])
-        if len(rows) == 1:
-            times, rows = [*times, times[0] + 1.0], [*rows, rows[0]]
         return np.array(times), np.array(rows)
 
 
@@ -194,7 +196,7 @@ def _by_anchor(
 
 
 @dataclass(frozen=True)
-class Motion:
+class WholeMotion:
     """A motion over T frames, before the limbs are solved.
 
     Attributes:
@@ -214,7 +216,7 @@ class Motion:
     splay: Array
 
 
-def tumble(body: StandingBody, motion: Motion) -> None:
+def tumble(body: StandingBody, motion: WholeMotion) -> None:
     """Move an idle through a motion of the whole body."""
     joints = body.joints
     rest = joints[:, 0].mean(0)
@@ -239,7 +241,7 @@ def tumble(body: StandingBody, motion: Motion) -> None:
         _solve_arm(joints, side, motion, (axes, rest * _FLAT))
 
 
-def _turn_trunk(body: StandingBody, motion: Motion) -> None:
+def _turn_trunk(body: StandingBody, motion: WholeMotion) -> None:
     turns = [(_NECK, motion.neck, ())] + [(j, motion.spine / 3, ()) for j in reversed(_SPINE)]
     for joint, angles, besides in (*turns, (0, motion.tilt, (1, 2))):
         for axis, degrees in zip(("left", "forward", "up"), angles.T, strict=True):
@@ -255,7 +257,7 @@ def _pelvis_axes(axes: Array, tilt: Array) -> Array:
     return turned
 
 
-def _solve_leg(joints: Array, idle: Array, side: str, motion: Motion, frames: tuple[Array, Array, Array]) -> None:
+def _solve_leg(joints: Array, idle: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array, Array]) -> None:
     hip, knee, ankle, toe = _LEGS[side]
     axes, pelvis, origin = frames
     sign = np.array([_SIGN[side], 1.0, 1.0])
@@ -283,7 +285,7 @@ def _solve_leg(joints: Array, idle: Array, side: str, motion: Motion, frames: tu
     joints[:, toe] = joints[:, ankle] + _LENGTH[toe] * normalize(toes)
 
 
-def _solve_arm(joints: Array, side: str, motion: Motion, frames: tuple[Array, Array]) -> None:
+def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array]) -> None:
     _, shoulder, elbow, wrist = ARMS[side]
     axes, origin = frames
     sign = np.array([_SIGN[side], 1.0, 1.0])

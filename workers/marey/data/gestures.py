@@ -45,7 +45,7 @@ from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
-from marey.data.gesture_rolls import roll
+from marey.data.gesture_rolls import flip, roll
 from marey.data.gesture_seats import sit, sit_down, stand_up
 from marey.data.gesture_signs import signal
 from marey.data.gesture_sneaks import sneak
@@ -219,4 +219,5 @@ KINDS: Mapping[str, Kind] = {
     "flinch": Kind(100, flinch, is_plain_idle),
     "roll": Kind(100, roll, is_plain_idle),
     "swim": Kind(100, swim, is_plain_idle),
+    "flip": Kind(80, flip, is_plain_idle),
 }
