@@ -28,8 +28,10 @@ from marey.data.gesture_balls import dribble
 from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
+from marey.data.gesture_dodges import dodge, flinch
 from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
+from marey.data.gesture_falls import die
 from marey.data.gesture_fights import block, punch
 from marey.data.gesture_floor import get_up, lie, lie_down, sit_floor
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
@@ -43,12 +45,14 @@ from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
+from marey.data.gesture_rolls import flip, roll
 from marey.data.gesture_seats import sit, sit_down, stand_up
 from marey.data.gesture_signs import signal
 from marey.data.gesture_sneaks import sneak
 from marey.data.gesture_spins import is_single_jump, jump_turn, spin
 from marey.data.gesture_stairs import climb_stairs
 from marey.data.gesture_steps import sidestep, turn_around
+from marey.data.gesture_swims import swim
 from marey.data.gesture_throws import throw
 from marey.data.gesture_travel import bent_walk, is_plain_gait, run, sprint, starts_backward, turn, walk_backward
 from marey.data.gesture_trunk import bow, nod, shiver
@@ -210,4 +214,10 @@ KINDS: Mapping[str, Kind] = {
     "get-up": Kind(100, get_up, is_plain_idle),
     "sit-floor": Kind(100, sit_floor, is_plain_idle),
     "lie": Kind(80, lie, is_plain_idle),
+    "die": Kind(100, die, is_plain_idle),
+    "dodge": Kind(100, dodge, is_plain_idle),
+    "flinch": Kind(100, flinch, is_plain_idle),
+    "roll": Kind(100, roll, is_plain_idle),
+    "swim": Kind(100, swim, is_plain_idle),
+    "flip": Kind(80, flip, is_plain_idle),
 }
