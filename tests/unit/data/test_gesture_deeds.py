@@ -1,5 +1,5 @@
-"""Made clips of crouches, cheers, hops, jumps, twists, hangs, drives, spells, shots, washing, standing crunches and
-arabesques: the numbers that define their actions."""
+"""Made clips of crawls, crouches, cheers, hops, jumps, twists, hangs, drives, spells, shots, washing, standing crunches
+and arabesques: the numbers that define their actions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from marey.data.part import MAX_FRAMES, Part
 from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import FPS
 from tests.unit.data.test_gesture_acts import swings
-from tests.unit.data.test_gestures import DEEDS, OTHER, few, idle
+from tests.unit.data.test_gestures import DEEDS, OTHER, few, idle, tilt
 
 COUNT = 14
 HEAD, HIPS = 15, 0
@@ -162,6 +162,20 @@ def test_a_body_hangs_from_hands_that_stay(made: list[Part]) -> None:
         assert part.joints[:, [10, 11], 1].min() > 0.2
         straight = np.linalg.norm(part.joints[:, 20] - part.joints[:, 16], axis=-1)
         assert straight.max() > 0.48
+
+
+def test_limbs_move_in_turn_under_a_level_trunk_in_a_crawl(made: list[Part]) -> None:
+    for part in of(made, "crawl"):
+        assert np.abs(tilt(part) - 90).max() < 45
+        assert part.joints[:, [HIPS, 16, 17], 1].max() < 0.6 * 1.4
+        assert part.joints[:, [4, 5], 1].max() < 0.15
+        along = part.joints[-1, HIPS, 2] - part.joints[0, HIPS, 2]
+        assert abs(along) > 0.3
+        assert (along < 0) == bool(re.search("back|reverse", told(part)))
+        for limb in (20, 21, 7, 8):
+            still = speeds(part.joints[:, limb] * [1, 0, 1]) < 0.05
+            assert 0.25 < still.mean() < 0.85
+            assert len(runs(still)) >= 2
 
 
 def test_hands_turn_a_wheel_before_a_seated_driver(made: list[Part]) -> None:

@@ -39,7 +39,7 @@ POSTURES = {
 """Actions in which the hips go far down or a foot leaves the floor."""
 DEEDS = {
     *("crouch", "cheer", "hop", "twist", "hang", "drive", "cast-spell", "shoot", "wash", "arabesque", "knee-to-elbow"),
-    *("jump", "jump-forward"),
+    *("jump", "jump-forward", "crawl"),
 }
 """Actions of `test_gesture_deeds`."""
 

@@ -22,7 +22,7 @@ from marey.motion.skeleton import HUMANML3D
 Array = NDArray[np.floating]
 
 _WRISTS = [20, 21]
-_SHOULDERS, _HALF, _ARM = 0.485, 0.168, 0.509
+_SHOULDERS, _HALF, _ARM = 0.495, 0.168, 0.516
 """Metres from the hips up to the shoulders with lifted collars, from the middle out to them, and of a straight arm."""
 _BEHIND = 0.04
 """Metres of the hips behind the bar."""

@@ -36,6 +36,8 @@ _WORDS = {
 }
 _FARTHEST = (0.2, 0.2, 0.44)
 """Metres of a wrist outward, up and ahead of the middle of the shoulders: an elbow that is locked takes no recoil."""
+_SHORTEST = 1.9
+"""Seconds of a clip of an aimed gun."""
 _PUMP = 0.14
 """Metres by which the hand at the barrel pumps a shotgun."""
 
@@ -58,6 +60,8 @@ def shoot(rng: random.Random) -> Gesture:
         while len(times) > 1 and times[-1] > 6.2:
             times.pop()
     hold = times[-1] + fall + (0.9 if pumps else 0.2) + rng.uniform(0.3, 0.9) - start - rise
+    if aimed:
+        hold = max(hold, _SHORTEST - start - rise)
     lower = rise * rng.uniform(0.9, 1.4)
     pace = GesturePace(start, rise, hold, 99.0 if aimed else lower)
     seconds = start + rise + hold + (0.0 if aimed else lower + rng.uniform(0.2, 0.8))

@@ -29,6 +29,7 @@ from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_cheers import cheer
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
+from marey.data.gesture_crawls import crawl
 from marey.data.gesture_crouches import crouch
 from marey.data.gesture_crunches import arabesque, knee_to_elbow
 from marey.data.gesture_drawing import Gesture
@@ -221,6 +222,7 @@ KINDS: Mapping[str, Kind] = {
     "sit-floor": Kind(100, sit_floor, is_plain_idle),
     "lie": Kind(80, lie, is_plain_idle),
     "crouch": Kind(80, crouch, is_plain_idle),
+    "crawl": Kind(60, crawl, is_plain_idle),
     "hop": Kind(80, hop, is_plain_idle),
     "twist": Kind(60, twist, is_plain_idle),
     "cheer": Kind(80, cheer, is_plain_idle),
