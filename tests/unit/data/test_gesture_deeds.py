@@ -56,7 +56,7 @@ def floor(part: Part, joint: int) -> float:
     return float(part.joints[0, joint, 1])
 
 
-def told(part: Part) -> str:
+def captions(part: Part) -> str:
     return " ".join(text.lower() for author in part.source.captions for text in author)
 
 
@@ -88,7 +88,7 @@ def test_knees_are_bent_and_hips_low_for_most_of_a_crouch(made: list[Part]) -> N
         assert low.mean() > 0.5, part.id
         assert part.joints[:, [20, 21], 1].min() > 0.08
         assert part.joints[:, [7, 8], 1].max() < 0.25
-        if re.search("crouch down, then stand up|rises|stands up again", told(part)):
+        if re.search("crouch down, then stand up|rises|stands up again", captions(part)):
             assert hips[-1] > 0.9
 
 
@@ -117,12 +117,12 @@ def test_a_hop_leaves_and_lands_on_one_foot_while_the_other_is_up(made: list[Par
         side = part.source.side
         hops = flights(part, [10, 11])
         assert len(hops) >= 1
-        assert OTHER[side] not in told(part).replace("other", "")
+        assert OTHER[side] not in captions(part).replace("other", "")
         first, last = hops[0][0], hops[-1][1]
         free = part.joints[first - 2 : last + 2, ANKLE[OTHER[side]], 1]
         assert free.min() > 0.15
         travels.append(np.linalg.norm((part.joints[-1, 0] - part.joints[0, 0])[[0, 2]]))
-        assert bool(re.search("in place|on the spot", told(part))) is False or travels[-1] < 0.15
+        assert bool(re.search("in place|on the spot", captions(part))) is False or travels[-1] < 0.15
     assert min(travels) < 0.15
     assert max(travels) > 0.6
 
@@ -139,7 +139,7 @@ def test_both_feet_leave_the_floor_at_once_and_fall_as_bodies_fall(made: list[Pa
             assert middle.mean() == pytest.approx(-GRAVITY, rel=0.35)
         if part.content == "jump":
             assert abs(far) < 0.2
-            assert ("up and down" in told(part)) <= (len(found) > 1)
+            assert ("up and down" in captions(part)) <= (len(found) > 1)
         else:
             assert far / len(found) > 0.6
 
@@ -171,7 +171,7 @@ def test_limbs_move_in_turn_under_a_level_trunk_in_a_crawl(made: list[Part]) -> 
         assert part.joints[:, [4, 5], 1].max() < 0.15
         along = part.joints[-1, HIPS, 2] - part.joints[0, HIPS, 2]
         assert abs(along) > 0.3
-        assert (along < 0) == bool(re.search("back|reverse", told(part)))
+        assert (along < 0) == bool(re.search("back|reverse", captions(part)))
         for limb in (20, 21, 7, 8):
             still = speeds(part.joints[:, limb] * [1, 0, 1]) < 0.05
             assert 0.25 < still.mean() < 0.85
@@ -242,7 +242,7 @@ def test_elbow_and_knee_meet_over_one_standing_foot(made: list[Part]) -> None:
         assert gap[met] < 0.25
         assert part.joints[met, KNEE[knee], 1] > part.joints[met, HIPS, 1] - 0.15
         assert part.joints[met, ANKLE[OTHER[knee]], 1] < 0.12
-        assert ("cross" in told(part)) <= (knee != elbow)
+        assert ("cross" in captions(part)) <= (knee != elbow)
 
 
 def test_a_straight_leg_is_stretched_behind_in_an_arabesque(made: list[Part]) -> None:
@@ -254,7 +254,7 @@ def test_a_straight_leg_is_stretched_behind_in_an_arabesque(made: list[Part]) ->
         held = (part.joints[:, ANKLE[side], 1] > 0.4) & (behind > 0.35) & (leg > 0.75)
         assert held.sum() >= 0.5 * FPS, part.id
         assert part.joints[held][:, ANKLE[OTHER[side]], 1].max() < 0.15
-        assert OTHER[side] not in told(part)
+        assert OTHER[side] not in captions(part)
 
 
 def test_vocabulary_words_that_are_not_true_of_a_clip_are_left_out() -> None:
