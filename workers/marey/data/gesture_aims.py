@@ -25,7 +25,7 @@ def aim(rng: random.Random) -> Gesture:
     else:
         pace = GesturePace.draw(rng, (0.3, 0.9), (1.5, 4.5))
         seconds, kinds = pace.total(rng), ("aim", form, "aim-raise")
-    hands, twist, head = _GUNS[form](rng, side), _TWISTS[form], rng.uniform(0, 7)
+    hands, twist, head = GUNS[form](rng, side), TWISTS[form], rng.uniform(0, 7)
     degrees, turned = rng.uniform(*twist), _OTHER[side] if form == "aim-rifle" else side
     stoop = rng.uniform(0, 7)
 
@@ -42,7 +42,7 @@ def aim(rng: random.Random) -> Gesture:
     return Gesture(seconds, kinds, change, side if form == "aim-one" else BOTH)
 
 
-_TWISTS = {"aim-rifle": (10, 28), "aim-pistol": (-4, 8), "aim-one": (4, 20)}
+TWISTS = {"aim-rifle": (10, 28), "aim-pistol": (-4, 8), "aim-one": (4, 20)}
 """Degrees by which the trunk turns the leading shoulder forward."""
 Hands = dict[str, tuple[Array, tuple[float, float, float]]]
 """The point of each hand, see `StandingBody.hold`, and where its elbow points."""
@@ -69,7 +69,7 @@ def _one_hand(rng: random.Random, side: str) -> Hands:
     return {side: (point, (0.7, -1.0, -0.3))}
 
 
-_GUNS = {"aim-rifle": _rifle, "aim-pistol": _pistol, "aim-one": _one_hand}
+GUNS = {"aim-rifle": _rifle, "aim-pistol": _pistol, "aim-one": _one_hand}
 
 
 def shoot_basket(rng: random.Random) -> Gesture:

@@ -27,7 +27,11 @@ from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_balls import dribble
 from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
+from marey.data.gesture_cheers import cheer
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
+from marey.data.gesture_crawls import crawl
+from marey.data.gesture_crouches import crouch
+from marey.data.gesture_crunches import arabesque, knee_to_elbow
 from marey.data.gesture_dodges import dodge, flinch
 from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
@@ -37,6 +41,8 @@ from marey.data.gesture_floor import get_up, lie, lie_down, sit_floor
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
 from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
+from marey.data.gesture_hangs import hang
+from marey.data.gesture_hops import hop, jump, jump_forward
 from marey.data.gesture_idles import is_plain_idle, of_length
 from marey.data.gesture_kicks import balance, kick, kick_ball
 from marey.data.gesture_kneels import kneel
@@ -47,8 +53,10 @@ from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
 from marey.data.gesture_rolls import flip, roll
 from marey.data.gesture_seats import sit, sit_down, stand_up
+from marey.data.gesture_shots import shoot
 from marey.data.gesture_signs import signal
 from marey.data.gesture_sneaks import sneak
+from marey.data.gesture_spells import cast_spell
 from marey.data.gesture_spins import is_single_jump, jump_turn, spin
 from marey.data.gesture_stairs import climb_stairs
 from marey.data.gesture_steps import sidestep, turn_around
@@ -56,6 +64,9 @@ from marey.data.gesture_swims import swim
 from marey.data.gesture_throws import throw
 from marey.data.gesture_travel import bent_walk, is_plain_gait, run, sprint, starts_backward, turn, walk_backward
 from marey.data.gesture_trunk import bow, nod, shiver
+from marey.data.gesture_twists import twist
+from marey.data.gesture_washes import wash
+from marey.data.gesture_wheels import drive
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
@@ -220,4 +231,18 @@ KINDS: Mapping[str, Kind] = {
     "roll": Kind(100, roll, is_plain_idle),
     "swim": Kind(100, swim, is_plain_idle),
     "flip": Kind(80, flip, is_plain_idle),
+    "crouch": Kind(80, crouch, is_plain_idle),
+    "crawl": Kind(60, crawl, is_plain_idle),
+    "hop": Kind(80, hop, is_plain_idle),
+    "twist": Kind(60, twist, is_plain_idle),
+    "cheer": Kind(80, cheer, is_plain_idle),
+    "hang": Kind(60, hang, is_plain_idle),
+    "drive": Kind(60, drive, is_plain_idle),
+    "cast-spell": Kind(80, cast_spell, is_plain_idle),
+    "shoot": Kind(80, shoot, is_plain_idle),
+    "wash": Kind(80, wash, is_plain_idle),
+    "arabesque": Kind(60, arabesque, is_plain_idle),
+    "knee-to-elbow": Kind(60, knee_to_elbow, is_plain_idle),
+    "jump": Kind(60, jump, is_plain_idle),
+    "jump-forward": Kind(60, jump_forward, is_plain_idle),
 }
