@@ -142,7 +142,8 @@ class CaptionTexts:
             for block in encode(_chunks(list(table))):
                 strings.append(block)
                 if progress:
-                    progress(len(unique) + (len(strings) - 1) * CHUNK * len(unique) // len(table), 2 * len(unique))
+                    encoded = min((len(strings) - 1) * CHUNK, len(table))
+                    progress(len(unique) + encoded * len(unique) // len(table), 2 * len(unique))
         edges = [(e.source, e.target, EDGE_TYPES.index(e.type)) for graph in graphs for e in graph.edges]
         return cls(
             pipeline.spec,
