@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from marey.core.errors import InvalidInput
 from marey.items.problems import Problem
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.items.values import outside_range
@@ -51,11 +50,6 @@ def _outside(spec: ModelSpec, seconds: float) -> str | None:
 
 def _unsettable(spec: ModelSpec, settings: Mapping[str, float]) -> dict[str, str]:
     """The message for each setting that the model has and that cannot have its value."""
-    found: dict[str, str] = {}
-    for setting in spec.settings:
-        try:
-            if setting.name in settings:
-                setting.check(settings[setting.name])
-        except InvalidInput as error:
-            found[setting.name] = error.message
-    return found
+    given = [setting for setting in spec.settings if setting.name in settings]
+    problems = {setting.name: setting.problem(settings[setting.name]) for setting in given}
+    return {name: f"{name}: {problem}" for name, problem in problems.items() if problem}

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
+from marey.core.configs import Between
 from marey.core.errors import InvalidInput, NotFound, PluginError
 from marey.registry.imports import IMPORTS, ImportKind
 from marey.registry.plugins import PlugIns
@@ -49,16 +50,25 @@ class Setting:
     help: str = ""
     whole: bool = False
 
+    @property
+    def range(self) -> Between:
+        """The range, for the field of a configuration that holds a bundle's default."""
+        return Between(self.low, self.high)
+
+    def problem(self, value: float) -> str | None:
+        """Return what is wrong with a value: not a whole number where one is needed, or out of range; else None."""
+        if self.whole and not float(value).is_integer():
+            return f"is {value:g}, not a whole number"
+        return None if self.range.contains(value) else f"{value:g} is outside {self.range}"
+
     def check(self, value: float) -> float:
         """Return the value as a float, or as an int where the setting is whole.
 
         Raises:
-            InvalidInput: not a whole number where one is needed, or out of range.
+            InvalidInput: see `problem`; the message begins with the setting's name.
         """
-        if self.whole and not float(value).is_integer():
-            raise InvalidInput(f"{self.name}: is {value:g}, not a whole number")
-        if not self.low <= value <= self.high:
-            raise InvalidInput(f"{self.name}: {value:g} is outside {self.low:g} to {self.high:g}")
+        if problem := self.problem(value):
+            raise InvalidInput(f"{self.name}: {problem}")
         return int(value) if self.whole else float(value)
 
 
@@ -172,6 +182,14 @@ class ModelSpec:
         changed = {} if self.variety is None else {**self.variety.low, **self.variety.high}
         if unknown := sorted(set(changed) - {setting.name for setting in self.settings}):
             raise ValueError(f"the variety of {self.name!r} changes {unknown[0]!r}, which is none of its settings")
+
+    def range_of(self, setting: str) -> Between:
+        """Return the range of a setting.
+
+        Raises:
+            KeyError: the model has no such setting.
+        """
+        return {each.name: each for each in self.settings}[setting].range
 
 
 MODELS = PlugIns(GROUP, ModelSpec, lambda spec: spec.name)

@@ -18,6 +18,8 @@ from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
 from marey.models.hgm3.decoding import DecodeOptions, condition_level
 from marey.models.hgm3.generate import Generated, Generator, SamplingSettings
+from marey.models.hgm3.spec import SPEC
+from marey.registry import Setting
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
 
@@ -154,18 +156,12 @@ def test_seeds_out_of_range_are_refused(generator: Generator, seed: int) -> None
         generator.generate([Request(text_features(0), seed, 40)])
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        SamplingSettings(steps=0),
-        SamplingSettings(top_k=0.0),
-        SamplingSettings(guidance=-1.0),
-        SamplingSettings(temperature=1000.0),
-    ],
-)
-def test_settings_out_of_range_are_refused(generator: Generator, settings: SamplingSettings) -> None:
-    with pytest.raises(InvalidInput, match="must lie"):
-        generator.generate([Request(text_features(0), 1, 40)], settings)
+@pytest.mark.parametrize("setting", SPEC.settings, ids=lambda each: each.name)
+@pytest.mark.parametrize("value", [-1, 101])
+def test_settings_out_of_range_are_refused(generator: Generator, setting: Setting, value: int) -> None:
+    with pytest.raises(InvalidInput, match=f"{value} is outside") as refused:
+        generator.generate([Request(text_features(0), 1, 40)], SamplingSettings(**{setting.name: value}))
+    assert refused.value.where == setting.name
 
 
 def test_features_of_another_encoder_are_refused(generator: Generator) -> None:

@@ -24,6 +24,7 @@ from marey.models.mogo.spec import SPEC
 from marey.models.mogo.state import NEVER
 from marey.models.mogo.train import train_stage
 from marey.motion.skeleton import HUMANML3D
+from marey.registry import Setting
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.prepared import text_features, write_prepared
@@ -116,12 +117,12 @@ def test_a_request_out_of_range_is_refused(generator: Generator, request_of, whe
     assert error.value.where == where
 
 
-@pytest.mark.parametrize(
-    "settings", [SamplingSettings(top_k=0.0), SamplingSettings(temperature=-1.0), SamplingSettings(guidance=101.0)]
-)
-def test_settings_out_of_range_are_refused(generator: Generator, settings: SamplingSettings) -> None:
-    with pytest.raises(InvalidInput):
-        generator.generate([Request(text_features(0), 0, 20)], settings)
+@pytest.mark.parametrize("setting", SPEC.settings, ids=lambda each: each.name)
+@pytest.mark.parametrize("value", [-1, 101])
+def test_settings_out_of_range_are_refused(generator: Generator, setting: Setting, value: int) -> None:
+    with pytest.raises(InvalidInput, match=f"{value} is outside") as refused:
+        generator.generate([Request(text_features(0), 0, 20)], SamplingSettings(**{setting.name: value}))
+    assert refused.value.where == setting.name
 
 
 def test_a_run_becomes_a_bundle_that_generates(tmp_path: Path) -> None:

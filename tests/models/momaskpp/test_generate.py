@@ -15,8 +15,10 @@ from marey.generation.port import KeptFrames, Request
 from marey.models.momaskpp.bundle import load_networks, random_bundle
 from marey.models.momaskpp.config import CONFIGS, TINY, MoMaskPPConfig
 from marey.models.momaskpp.generate import Generated, Generator, SamplingSettings
+from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.words import pad_states
 from marey.nn.batch_threads import BatchThreads
+from marey.registry import Setting
 from tests.support.prepared import text_features
 
 COUNT = 6
@@ -140,10 +142,16 @@ def test_lengths_out_of_range_are_refused(generator: Generator, frames: int) -> 
         generator.generate([request(0, 1, frames)])
 
 
-@pytest.mark.parametrize("values", [{"steps": 0}, {"top_k": 0.0}, {"guidance": -1.0}, {"temperature": 1000.0}])
-def test_settings_out_of_range_are_refused(generator: Generator, values: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match="must lie"):
-        generator.settings(values)
+@pytest.mark.parametrize("setting", SPEC.settings, ids=lambda each: each.name)
+@pytest.mark.parametrize("value", [-1, 101])
+def test_settings_out_of_range_are_refused(generator: Generator, setting: Setting, value: int) -> None:
+    for refuse in (
+        lambda: generator.settings({setting.name: value}),
+        lambda: generator.generate([request(0, 1, 40)], SamplingSettings(**{setting.name: value})),
+    ):
+        with pytest.raises(InvalidInput, match=f"{value} is outside") as refused:
+            refuse()
+        assert refused.value.where == setting.name
 
 
 def test_settings_are_described_in_full_and_unknown_ones_refused(generator: Generator) -> None:

@@ -6,7 +6,6 @@ The limit of a measure is a quantile of the captured clips (not mirrored or spli
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,7 +15,7 @@ import numpy as np
 
 from marey.core.errors import InvalidInput
 from marey.data.manifest import Clip
-from marey.data.measured_files import write_measured
+from marey.data.measured_files import provenance, write_measured
 from marey.data.prepared import PreparedData
 from marey.quality.limits import FILE, LIMITED, OFF_FLOOR, Expected, expected_of
 from marey.quality.measure import Measures, measure
@@ -111,12 +110,7 @@ def document(data: PreparedData, clips: Sequence[Real]) -> str:
     quantile, table = compute(level)
     counts = Counter(support for clip in level for support in clip.expected.supports)
     lines = [
-        "# Written by `python -m marey.data.quality_limits`; docs/reference/quality.md explains it.",
-        "",
-        "[provenance]",
-        f'prepared_sha256 = "{data.sha256}"',
-        f"sources = {json.dumps([source.name for source in data.manifest.sources])}",
-        f'tier = "{data.manifest.tier}"',
+        *provenance("marey.data.quality_limits", data),
         f"quantile = {quantile}",
         f"clips = {len(level)}",
         f"passing = {share(level, table):.4f}",
@@ -131,11 +125,5 @@ def document(data: PreparedData, clips: Sequence[Real]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the limits of a prepared folder."""
-    description = "Compute the limits of the quality of motions."
-    write_measured(arguments, description, FILE, lambda data: document(data, read_real(data)))
-
-
 if __name__ == "__main__":
-    main()
+    write_measured("Compute the limits of the quality of motions.", FILE, lambda data: document(data, read_real(data)))

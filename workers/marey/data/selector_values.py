@@ -6,13 +6,12 @@ A motion's percentile among real clips of its action is read from the quantiles 
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from marey.data.measured_files import write_measured
+from marey.data.measured_files import provenance, write_measured
 from marey.data.prepared import PreparedData
 from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion, WantedAction, match
@@ -40,12 +39,7 @@ def document(data: PreparedData, values: Mapping[str, Sequence[float]]) -> str:
     enough = {action: of for action, of in values.items() if _is_enough(of)}
     percents = np.arange(0, 101, PERCENT) / 100
     lines = [
-        "# Written by `python -m marey.data.selector_values`; docs/reference/quality.md explains it.",
-        "",
-        "[provenance]",
-        f'prepared_sha256 = "{data.sha256}"',
-        f"sources = {json.dumps([source.name for source in data.manifest.sources])}",
-        f'tier = "{data.manifest.tier}"',
+        *provenance("marey.data.selector_values", data),
         "",
         "[clips]",
         *(f"{action} = {len(of)}" for action, of in enough.items()),
@@ -62,11 +56,7 @@ def _is_enough(values: Sequence[float]) -> bool:
     return len(values) >= ENOUGH and sum(value >= SHOWN for value in values) >= PASSING * len(values)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the values of a prepared folder."""
-    description = "Compute the values of real clips by the selector."
-    write_measured(arguments, description, FILE, lambda data: document(data, read_values(data)))
-
-
 if __name__ == "__main__":
-    main()
+    write_measured(
+        "Compute the values of real clips by the selector.", FILE, lambda data: document(data, read_values(data))
+    )

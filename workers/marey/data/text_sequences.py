@@ -58,12 +58,17 @@ def joined_texts(actions: Sequence[Facts], seed: str) -> tuple[tuple[str, ...], 
     """Up to two captions of a sequence by each author with short captions of all its actions."""
     rng = seeded("texts", seed)
     told = []
-    for author in range(min(len(facts.text) for facts in actions)):
-        short = [[text for text in facts.text[author] if len(text.split()) <= WORDS] for facts in actions]
-        if all(short):
-            chosen = (_joined([rng.choice(texts) for texts in short], rng) for _ in range(2))
-            told.append(tuple(dict.fromkeys(chosen)))
+    for short in _short_texts(actions):
+        chosen = (_joined([rng.choice(texts) for texts in short], rng) for _ in range(2))
+        told.append(tuple(dict.fromkeys(chosen)))
     return tuple(told)
+
+
+def _short_texts(actions: Sequence[Facts]) -> list[list[list[str]]]:
+    """The captions of each action that are short enough to be joined, by author; of authors who have some of all."""
+    authors = range(min(len(facts.text) for facts in actions))
+    short = [[[text for text in of.text[author] if len(text.split()) <= WORDS] for of in actions] for author in authors]
+    return [of_author for of_author in short if all(of_author)]
 
 
 def _joined(texts: Sequence[str], rng: random.Random) -> str:
@@ -152,6 +157,6 @@ def _join(name: str, parts: Sequence[Part], starts: Sequence[int], stops: Sequen
         for part, a, b in zip(parts, seams, seams[1:], strict=False)
         if b - a >= MIN_FRAMES
     )
-    if len(facts) < len(parts) or len(joints) > LIMIT or is_broken(joints, FPS) or not joined_texts(facts, name):
+    if len(facts) < len(parts) or len(joints) > LIMIT or is_broken(joints, FPS) or not _short_texts(facts):
         return None
     return Composed(name, tuple(parts), joints, facts, tuple(seams[1:-1]))

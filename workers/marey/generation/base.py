@@ -5,37 +5,52 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import torch
 
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
+from marey.core.errors import InvalidInput
 from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, read_settings
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
+from marey.registry import ModelSpec
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+C = TypeVar("C", bound="DataclassInstance")
+"""A bundle's values of the settings, and other numbers that decide how tokens are drawn."""
 
-class Sampling(Protocol):
-    """A model's own sampling settings: a dataclass, in which None = the bundle's value."""
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]
+@dataclass(frozen=True)
+class Sampling(Generic[C]):
+    """Base class of a model's sampling settings, uniform over a batch; None = the bundle's value.
 
-    def inference(self, default: Any) -> Any:
+    Attributes:
+        spec: of the model; declares the ranges.
+    """
+
+    spec: ClassVar[ModelSpec]
+
+    def inference(self, default: C) -> C:
         """Return the bundle's values with these changes.
 
         Raises:
-            InvalidInput: a value out of range.
+            InvalidInput: a value out of the range that the model declares; `where` is the setting.
         """
-        ...
+        given = {each.name: getattr(self, each.name, None) for each in fields(default)}
+        config = replace(default, **{name: value for name, value in given.items() if value is not None})
+        for setting in self.spec.settings:
+            if problem := setting.problem(getattr(config, setting.name)):
+                raise InvalidInput(problem, where=setting.name)
+        return config
 
 
-P = TypeVar("P", bound=Sampling)
+P = TypeVar("P", bound=Sampling[Any])
 """Sampling settings of a model."""
 G = TypeVar("G")
 """One motion as a model generates it."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -98,8 +99,8 @@ def tokenizer_loss(
     output, quantized = model(features, lengths)
     target = model.normalize(features)
     valid = torch.ones_like(features[..., 0]) if lengths is None else frame_mask(lengths, features.shape[1]).float()
-    weights = feature_weights(config, features.device, t.swing_weight)  # (D,)
     joint_weights = swing_weights(config.layout, features.device, t.swing_weight)  # (J,), their mean is 1
+    weights = feature_weights(config, joint_weights)  # (D,)
     l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
     restored, body = model.restore(output), (config.joints, unit_of(config.layout))
@@ -142,14 +143,18 @@ def swing_weights(name: str, device: torch.device, weight: float) -> Tensor:
     return weights / weights.mean()
 
 
-def feature_weights(config: TokenizerTraining, device: torch.device, swing: float = 1.0) -> Tensor:
-    """Return the weight of each feature column (D,) in the L1 term: 1, `rotation_weight` for the 6-D rotations, and
-    `swing` times as high for positions of `SWINGING`."""
-    weights = torch.ones(config.features, device=device)
+def feature_weights(config: TokenizerTraining, joint_weights: Tensor) -> Tensor:
+    """Return the weight of each feature column (D,) in the L1 term: for positions that of their joint, for 6-D
+    rotations `rotation_weight`, for all others 1.
+
+    Args:
+        config: the layout's sizes, and `rotation_weight`.
+        joint_weights: (J,), see `swing_weights`.
+    """
+    weights = torch.ones(config.features, device=joint_weights.device)
     start = 4 + 3 * (config.joints - 1)
     weights[start : start + 6 * (config.joints - 1)].fill_(config.tokenizer.rotation_weight)
-    if swing != 1:
-        weights[4:start] = swing_weights(config.layout, device, swing)[1:].repeat_interleave(3)
+    weights[4:start] = joint_weights[1:].repeat_interleave(3)
     return weights
 
 
@@ -165,22 +170,25 @@ of another content or style, and three times the error of the second if clips ar
 class ClipWindows:
     """Windows of random training clips, in whole tokens."""
 
-    def __init__(self, data: MotionData, rate: int, smallest: int) -> None:
+    def __init__(self, data: MotionData, rate: int, sizes: Sequence[int], batch: int) -> None:
         """Take the clips of the training split.
 
         Args:
             data: the prepared data.
             rate: frames of a token.
-            smallest: frames of the shortest window that is drawn.
+            sizes: frames of windows, one of which is drawn for each batch.
+            batch: windows of the smallest size; a batch of larger ones has about as many frames.
         """
-        self._data = data
+        self._data, self._sizes, self._batch = data, sizes, batch
         clips = tokenizer_clips(data.prepared.split("train"), rate)
-        self._weights = tokenizer_weights(clips, smallest)
+        self._weights = tokenizer_weights(clips, min(sizes))
         self._first = np.array([c.start for c in clips])
         self._lengths = np.array([c.length - c.length % rate for c in clips])
 
-    def draw(self, rng: np.random.Generator, batch: int, window: int) -> tuple[Tensor, NDArray[np.int64]]:
-        """Return the features (B, T, D) of windows of T frames, and the frames (B,) that are the clip's own."""
+    def draw(self, rng: np.random.Generator) -> tuple[Tensor, NDArray[np.int64]]:
+        """Return the features (B, T, D) of windows of one size, and the frames (B,) that are the clip's own."""
+        window = int(rng.choice(self._sizes))
+        batch = max(1, self._batch * min(self._sizes) // window)
         chosen = rng.choice(len(self._first), size=batch, p=self._weights)
         slack = np.maximum(self._lengths[chosen] - window, 0)
         offsets = np.floor(rng.random(batch) * (slack + 1)).astype(np.int64)
@@ -188,26 +196,25 @@ class ClipWindows:
         return self._data.windows(starts, window), np.minimum(self._lengths[chosen], window)
 
 
-class TokenizerStage:
-    """Windows of random clips; `module` is the tokenizer itself."""
+C = TypeVar("C", bound=TokenizerTraining)
+"""A model's configuration."""
+M = TypeVar("M", bound=MotionTokenizer)
+"""A model's tokenizer."""
+
+
+class WindowStage(ABC, Generic[C, M]):
+    """Base class of the training stages of tokenizers, on windows of random clips; `module` is the tokenizer."""
 
     name = "tokenizer"
 
-    def __init__(
-        self,
-        config: TokenizerTraining,
-        data: MotionData,
-        module: MotionTokenizer,
-        penalty: Callable[[], Tensor] | None = None,
-    ) -> None:
-        """Train `module` on the data's statistics; `penalty` is added to its loss."""
+    def __init__(self, config: C, data: MotionData, module: M) -> None:
+        """Train `module` on the data's statistics."""
         self.config = config
         self.optimisation = config.train_tokenizer
         self.data = data
-        self.penalty = penalty
         self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
-        self.windows = ClipWindows(data, module.frames_per_token, min(config.windows))
+        self.windows = ClipWindows(data, module.frames_per_token, config.windows, self.optimisation.batch)
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Return one group."""
@@ -220,10 +227,48 @@ class TokenizerStage:
 
     def batch(self, context: StepContext) -> tuple[Tensor, Tensor, Tensor]:
         """Return the features (B, T, D) of windows, the frames (B,) that are the clips' own, and the factor of the term
-        in space. All windows of a step have one size; the batch is scaled to a constant number of frames."""
-        features, lengths = self._windows(context)
+        in space."""
+        features, lengths = self.windows.draw(context.rng)
         device = features.device
         return features, torch.from_numpy(lengths).to(device), torch.tensor(world_share(context.fraction)).to(device)
+
+    @abstractmethod
+    def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of a batch; see `RecordableStage`."""
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Return the loss of one batch of windows."""
+        return self.batch_loss(self.batch(context))
+
+    def after_step(self, context: StepContext) -> None:
+        """Do nothing: codebooks are updated in the forward pass."""
+
+    @abstractmethod
+    def errors(self, split: str) -> dict[str, float]:
+        """Return errors on the whole captured clips of a split, by name."""
+
+    def validate(self) -> Mapping[str, float]:
+        """Return errors on whole validation clips."""
+        return self.errors("val")
+
+    def test(self) -> dict[str, float]:
+        """Return errors on whole captured test clips."""
+        return {f"test/{name}": value for name, value in self.errors("test").items()}
+
+
+class TokenizerStage(WindowStage[TokenizerTraining, MotionTokenizer]):
+    """Training of a tokenizer by `tokenizer_loss`."""
+
+    def __init__(
+        self,
+        config: TokenizerTraining,
+        data: MotionData,
+        module: MotionTokenizer,
+        penalty: Callable[[], Tensor] | None = None,
+    ) -> None:
+        """Train `module` on the data's statistics; `penalty` is added to its loss."""
+        super().__init__(config, data, module)
+        self.penalty = penalty
 
     def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return the loss of a batch; see `RecordableStage`."""
@@ -231,16 +276,11 @@ class TokenizerStage:
         return self._loss(features, lengths, world)
 
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the loss of one batch of windows."""
-        features, lengths = self._windows(context)
+        """Return the loss of one batch of windows; full windows are not masked, which is faster."""
+        features, lengths = self.windows.draw(context.rng)
         full = bool((lengths == features.shape[1]).all())
         own = None if full else torch.from_numpy(lengths).to(features.device)
         return self._loss(features, own, world_share(context.fraction))
-
-    def _windows(self, context: StepContext) -> tuple[Tensor, NDArray[np.int64]]:
-        window = int(context.rng.choice(self.config.windows))
-        size = max(1, self.optimisation.batch * min(self.config.windows) // window)
-        return self.windows.draw(context.rng, size, window)
 
     def _loss(
         self, features: Tensor, lengths: Tensor | None, world: float | Tensor
@@ -258,17 +298,9 @@ class TokenizerStage:
         }
         return loss.total if self.penalty is None else loss.total + self.penalty(), logs
 
-    def after_step(self, context: StepContext) -> None:
-        """Do nothing: the codebooks are updated in the forward pass."""
-
-    def validate(self) -> Mapping[str, float]:
-        """Return errors on whole validation clips."""
-        return reconstruction_errors(self.module, self.config, self.data, self.data.originals("val"))
-
-    def test(self) -> dict[str, float]:
-        """Return errors on whole captured test clips."""
-        errors = reconstruction_errors(self.module, self.config, self.data, self.data.originals("test"))
-        return {f"test/{name}": value for name, value in errors.items()}
+    def errors(self, split: str) -> dict[str, float]:
+        """Return errors on the whole captured clips of a split; see `reconstruction_errors`."""
+        return reconstruction_errors(self.module, self.config, self.data, self.data.originals(split))
 
 
 def tokenizer_clips(clips: Sequence[Clip], rate: int) -> list[Clip]:

@@ -6,16 +6,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
-from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
+from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Positive, Share, Weight, Whole, named
 from marey.core.errors import InvalidInput
+from marey.models.hgm3.spec import SPEC
 from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
 
 LEVELS = 3
 """Levels of condition: motion, action, specific."""
 Levels = Annotated[int, Between(2)]  # the residual transformer predicts all but the first
-Steps = Annotated[int, Between(1, 100)]
-Scale = Annotated[float, Between(0, 100)]
+Steps = Annotated[int, SPEC.range_of("steps")]
+Guidance = Annotated[float, SPEC.range_of("guidance")]
+Temperature = Annotated[float, SPEC.range_of("temperature")]
+TopK = Annotated[float, SPEC.range_of("top_k")]
 
 
 @dataclass(frozen=True)
@@ -100,12 +103,12 @@ class InferenceConfig:
     steps: Steps = 10  # L, passes of the base level
     motion_steps: Whole = 2  # L_M, the last pass with the motion node alone
     action_steps: Whole = 5  # L_A, the last pass without specific nodes
-    guidance: Scale = 4.0  # weight of the prompt at the base level; 1 = none
-    temperature: Scale = 1.0  # randomness of the base level; 0 = the likeliest token
-    top_k: Part = 0.1  # share of the codes that may be drawn
-    residual_guidance: Scale = 5.0  # the same three for the residual levels
-    residual_temperature: Scale = 1.0
-    residual_top_k: Part = 0.1
+    guidance: Guidance = 4.0  # weight of the prompt at the base level; 1 = none
+    temperature: Temperature = 1.0  # randomness of the base level; 0 = the likeliest token
+    top_k: TopK = 0.1  # share of the codes that may be drawn
+    residual_guidance: Guidance = 5.0  # the same three for the residual levels
+    residual_temperature: Temperature = 1.0
+    residual_top_k: TopK = 0.1
 
 
 @dataclass(frozen=True)

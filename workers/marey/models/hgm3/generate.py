@@ -10,8 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from marey.bundles import Bundle
-from marey.core.errors import InvalidInput
-from marey.generation.base import GroupedGenerator
+from marey.generation.base import GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import write_kept
 from marey.generation.port import GenerationControl, Limits, Request, open_bundle
@@ -20,6 +19,7 @@ from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
 from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
 from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
+from marey.models.hgm3.spec import SPEC
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
 from marey.nn.sampling import draw_class
@@ -29,8 +29,10 @@ BUCKET = 8
 
 
 @dataclass(frozen=True)
-class SamplingSettings:
+class SamplingSettings(Sampling[InferenceConfig]):
     """Sampling settings, uniform over a batch; None = the bundle's value."""
+
+    spec = SPEC
 
     steps: int | None = None
     motion_steps: int | None = None
@@ -51,24 +53,15 @@ class SamplingSettings:
         Raises:
             InvalidInput: a value out of range.
         """
-        names = [n for n in InferenceConfig.__dataclass_fields__ if getattr(self, n, None) is not None]
-        config = replace(default, **{n: getattr(self, n) for n in names})
-        if config.steps != default.steps:
-            share = config.steps / default.steps
-            config = replace(
-                config,
-                motion_steps=round(config.motion_steps * share) if self.motion_steps is None else config.motion_steps,
-                action_steps=round(config.action_steps * share) if self.action_steps is None else config.action_steps,
-            )
-        if not 1 <= config.steps <= 100:
-            raise InvalidInput("must lie between 1 and 100", where="steps")
-        for name in ("top_k", "residual_top_k"):
-            if not 0 < getattr(config, name) <= 1:
-                raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where=name)
-        for name in ("temperature", "residual_temperature", "guidance", "residual_guidance"):
-            if not 0 <= getattr(config, name) <= 100:
-                raise InvalidInput("must lie between 0 and 100", where=name)
-        return config
+        config = super().inference(default)
+        if config.steps == default.steps:
+            return config
+        share = config.steps / default.steps
+        return replace(
+            config,
+            motion_steps=round(config.motion_steps * share) if self.motion_steps is None else config.motion_steps,
+            action_steps=round(config.action_steps * share) if self.action_steps is None else config.action_steps,
+        )
 
 
 @dataclass(frozen=True)

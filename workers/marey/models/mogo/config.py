@@ -6,13 +6,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
-from marey.core.configs import ADDED, Between, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
+from marey.core.configs import ADDED, Count, ModelConfig, Momentum, Part, Positive, Share, Weight, Whole, named
 from marey.core.errors import InvalidInput
+from marey.models.mogo.spec import SPEC
 from marey.nn.scaled_quantizer import Scale
 from marey.training.config_checks import check_body, check_heads, check_windows
 from marey.training.optimisation import StageConfig
 
-Amount = Annotated[float, Between(0, 100)]
+Guidance = Annotated[float, SPEC.range_of("guidance")]
+Temperature = Annotated[float, SPEC.range_of("temperature")]
+TopK = Annotated[float, SPEC.range_of("top_k")]
 
 
 @dataclass(frozen=True)
@@ -85,12 +88,12 @@ class ConditionConfig:
 class InferenceConfig:
     """Sampling of tokens."""
 
-    temperature: Amount = 1.0  # randomness of level 0; 0 = the likeliest code
-    top_k: Part = 0.1  # share of the codes that level 0 may draw
-    upper_temperature: Amount = 0.6  # of all other levels: against jitter
-    upper_top_k: Part = 0.1  # share of the codes that all other levels may draw
-    guidance: Amount = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
-    upper_guidance: Amount = 1.0  # of all other levels: level 0 decides the action, the others its details
+    temperature: Temperature = 1.0  # randomness of level 0; 0 = the likeliest code
+    top_k: TopK = 0.1  # share of the codes that level 0 may draw
+    upper_temperature: Temperature = 0.6  # of all other levels: against jitter
+    upper_top_k: TopK = 0.1  # share of the codes that all other levels may draw
+    guidance: Guidance = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
+    upper_guidance: Guidance = 1.0  # of all other levels: level 0 decides the action, the others its details
     window: Count = 196  # frames that attention reaches back, at most `max_frames`
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.base import SampledGenerator
+from marey.generation.base import SampledGenerator, Sampling
 from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle
 from marey.models.mogo.bundle import load_networks
 from marey.models.mogo.config import InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel, sessions_of_product
+from marey.models.mogo.spec import SPEC
 from marey.models.mogo.state import NEVER
 from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.tokenizer import Tokenizer
@@ -29,8 +30,10 @@ MAX_SESSIONS = 32
 
 
 @dataclass(frozen=True)
-class SamplingSettings:
+class SamplingSettings(Sampling[InferenceConfig]):
     """Sampling settings, uniform over a batch; None = the bundle's value."""
+
+    spec = SPEC
 
     temperature: float | None = None
     top_k: float | None = None
@@ -38,20 +41,6 @@ class SamplingSettings:
     upper_top_k: float | None = None
     guidance: float | None = None
     upper_guidance: float | None = None
-
-    def inference(self, default: InferenceConfig) -> InferenceConfig:
-        """Return the bundle's sampling settings with this batch's changes.
-
-        Raises:
-            InvalidInput: a value out of range.
-        """
-        changed = {name: value for name, value in vars(self).items() if value is not None}
-        for name, value in changed.items():
-            if name.endswith("top_k") and not 0 < value <= 1:
-                raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where=name)
-            if not 0 <= value <= 100:
-                raise InvalidInput("must lie between 0 and 100", where=name)
-        return replace(default, **changed)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.generation.base import GroupedGenerator
+from marey.generation.base import GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.port import GenerationControl, Limits, Request, open_bundle
 from marey.models.momask.bundle import Networks, load_networks
@@ -27,8 +27,10 @@ BUCKET = 8
 
 
 @dataclass(frozen=True)
-class SamplingSettings:
+class SamplingSettings(Sampling[InferenceConfig]):
     """Sampling settings, uniform over a batch; None = the bundle's value."""
+
+    spec = SPEC
 
     steps: int | None = None
     guidance: float | None = None
@@ -37,18 +39,6 @@ class SamplingSettings:
     residual_guidance: float | None = None
     residual_temperature: float | None = None
     residual_top_k: float | None = None
-
-    def inference(self, default: InferenceConfig) -> InferenceConfig:
-        """Return the bundle's decoding settings with this batch's changes.
-
-        Raises:
-            InvalidInput: a value out of range.
-        """
-        changes = {name: value for name, value in asdict(self).items() if value is not None}
-        config = replace(default, **changes)
-        for setting in SPEC.settings:
-            setting.check(getattr(config, setting.name))
-        return config
 
 
 @dataclass(frozen=True)

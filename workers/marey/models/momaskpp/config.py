@@ -7,13 +7,18 @@ the paper in heads, steps and guidance; their weights need them as they are.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from marey.core.configs import ADDED, Count, ModelConfig, named
+from marey.models.momaskpp.spec import SPEC
 from marey.training.optimisation import StageConfig
 
 Layout = Literal["padded", "own"]
 Conditioning = Literal["in-context", "cross-attention"]
+Steps = Annotated[int, SPEC.range_of("steps")]
+Guidance = Annotated[float, SPEC.range_of("guidance")]
+Temperature = Annotated[float, SPEC.range_of("temperature")]
+TopK = Annotated[float, SPEC.range_of("top_k")]
 
 
 @dataclass(frozen=True)
@@ -108,10 +113,10 @@ class PerturbationConfig:
 class InferenceConfig:
     """Decoding (Sec. 4.2.2)."""
 
-    steps: int = 18  # L
-    guidance: float = 4.0  # weight of the text; 1 = none
-    temperature: float = 1.0  # of the draws; 0 = the likeliest token
-    top_k: float = 0.1  # share of the codes that may be drawn
+    steps: Steps = 18  # L
+    guidance: Guidance = 4.0  # weight of the text; 1 = none
+    temperature: Temperature = 1.0  # of the draws; 0 = the likeliest token
+    top_k: TopK = 0.1  # share of the codes that may be drawn
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -12,7 +12,7 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.base import GroupedGenerator
+from marey.generation.base import GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import bridged, whole_tokens
 from marey.generation.port import GenerationControl, Limits, Request, open_bundle
@@ -20,6 +20,7 @@ from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
 from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, ScaleItems, bucket_of, decode
 from marey.models.momaskpp.model import ROOT_VELOCITY, RootRefiner, inputs_of
+from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.words import WordReader, pad_states
 from marey.nn.batch_threads import BatchThreads
 from marey.nn.quantizer import NO_TOKEN
@@ -27,29 +28,15 @@ from marey.nn.sampling import draw_class, uniform
 
 
 @dataclass(frozen=True)
-class SamplingSettings:
+class SamplingSettings(Sampling[InferenceConfig]):
     """Sampling settings, uniform over a batch; None = the bundle's value."""
+
+    spec = SPEC
 
     steps: int | None = None
     guidance: float | None = None
     temperature: float | None = None
     top_k: float | None = None
-
-    def inference(self, default: InferenceConfig) -> InferenceConfig:
-        """Return the bundle's decoding settings with this batch's changes.
-
-        Raises:
-            InvalidInput: a value out of range.
-        """
-        config = replace(default, **{name: value for name, value in asdict(self).items() if value is not None})
-        if not 1 <= config.steps <= 100:
-            raise InvalidInput("must lie between 1 and 100", where="steps")
-        if not 0 < config.top_k <= 1:
-            raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where="top_k")
-        for name in ("temperature", "guidance"):
-            if not 0 <= getattr(config, name) <= 100:
-                raise InvalidInput("must lie between 0 and 100", where=name)
-        return config
 
 
 @dataclass(frozen=True)

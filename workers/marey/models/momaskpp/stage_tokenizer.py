@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 import torch.nn.functional as F
-from torch import Tensor, nn
+from torch import Tensor
 
 from marey.models.momaskpp.config import MoMaskPPConfig
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.motion.features import layout
 from marey.nn.convolution import frame_mask
-from marey.nn.motion_tokenizer import ROOT, biased_std
+from marey.nn.motion_tokenizer import ROOT
 from marey.training.joints import heading_joints, unit_of, world_joints
-from marey.training.motions import MotionData
-from marey.training.stages import StepContext
 from marey.training.tokenizing import (
-    ClipWindows,
+    WindowStage,
     feature_weights,
     reconstruction_errors,
     swing_weights,
-    world_share,
 )
 
 
@@ -61,10 +58,11 @@ def tokenizer_loss(
     valid = frame_mask(lengths, features.shape[1]).float()
     error = F.smooth_l1_loss(output, model.normalize(features), reduction="none")  # (B, T, D)
 
-    weights = feature_weights(config, features.device, t.swing_weight)  # (D,)
+    joint_weights = swing_weights(config.layout, features.device, t.swing_weight)  # (J,)
+    weights = feature_weights(config, joint_weights)  # (D,)
     whole = _average((error * weights).sum(-1) / weights.sum(), valid)
     essential = _average(error[..., slice(*t.essential)].mean(-1), valid)
-    joints = _joint_losses(model.restore(output), features, valid, config, world)
+    joints = _joint_losses(model.restore(output), features, valid, joint_weights, config, world)
     total = whole + t.commitment * quantized.commitment + t.essential_weight * essential + joints
     if t.root_weight:
         total = total + t.root_weight * _average(error[..., ROOT].mean(-1), valid)
@@ -79,7 +77,12 @@ def tokenizer_loss(
 
 
 def _joint_losses(
-    restored: Tensor, features: Tensor, valid: Tensor, config: MoMaskPPConfig, world: float | Tensor
+    restored: Tensor,
+    features: Tensor,
+    valid: Tensor,
+    joint_weights: Tensor,
+    config: MoMaskPPConfig,
+    world: float | Tensor,
 ) -> Tensor:
     """Return the weighted sum of the terms on joints; 0 where none has a weight."""
     t, total = config.tokenizer, features.new_zeros(())
@@ -88,9 +91,8 @@ def _joint_losses(
     body = config.joints, unit_of(config.layout)
     if t.position_weight or t.velocity_weight:
         local = heading_joints(restored, *body) - heading_joints(features, *body)
-        weights = swing_weights(config.layout, features.device, t.swing_weight)
-        total = total + t.position_weight * _average((local.abs().sum(-1) * weights).mean(-1), valid)
-        speed = (local.diff(dim=1).abs().sum(-1) * weights).mean(-1) * config.fps
+        total = total + t.position_weight * _average((local.abs().sum(-1) * joint_weights).mean(-1), valid)
+        speed = (local.diff(dim=1).abs().sum(-1) * joint_weights).mean(-1) * config.fps
         total = total + t.velocity_weight * _average(speed, valid[:, 1:])
     if t.world_weight:
         drift = world_joints(restored, *body) - world_joints(features, *body)
@@ -102,37 +104,8 @@ def _average(values: Tensor, valid: Tensor) -> Tensor:
     return (values * valid).sum() / valid.sum().clamp(min=1)
 
 
-class ScaleTokenizerStage:
-    """Windows of random clips; `module` is the tokenizer itself."""
-
-    name = "tokenizer"
-
-    def __init__(self, config: MoMaskPPConfig, data: MotionData, module: Tokenizer) -> None:
-        """Train `module` on the data's statistics."""
-        self.config = config
-        self.optimisation = config.train_tokenizer
-        self.data = data
-        self.module = module.to(data.features.device)
-        self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
-        self.windows = ClipWindows(data, module.frames_per_token, min(config.windows))
-
-    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
-        """Return one group."""
-        return [list(self.module.parameters())]
-
-    @property
-    def recordable(self) -> bool:
-        """Return True."""
-        return True
-
-    def batch(self, context: StepContext) -> tuple[Tensor, Tensor, Tensor]:
-        """Return the features (B, T, D) of windows, the frames (B,) that are the clips' own, and the factor of the term
-        in space. All windows of a step have one size; the batch is scaled to a constant number of frames."""
-        window = int(context.rng.choice(self.config.windows))
-        size = max(1, self.optimisation.batch * min(self.config.windows) // window)
-        features, lengths = self.windows.draw(context.rng, size, window)
-        device = features.device
-        return features, torch.from_numpy(lengths).to(device), torch.tensor(world_share(context.fraction)).to(device)
+class ScaleTokenizerStage(WindowStage[MoMaskPPConfig, Tokenizer]):
+    """Training of the tokenizer by `tokenizer_loss`."""
 
     def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:
         """Return the loss of a batch; see `RecordableStage`."""
@@ -140,23 +113,10 @@ class ScaleTokenizerStage:
         logs = {name: value.detach() for name, value in vars(losses).items() if name != "total"}
         return losses.total, {"loss": losses.total.detach(), **logs}
 
-    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
-        """Return the loss of one batch of windows."""
-        return self.batch_loss(self.batch(context))
-
-    def after_step(self, context: StepContext) -> None:
-        """Do nothing: the codebook is updated in the forward pass."""
-
-    def validate(self) -> Mapping[str, float]:
-        """Return errors on whole validation clips."""
-        return self._errors("val")
-
-    def test(self) -> dict[str, float]:
-        """Return errors on whole captured test clips."""
-        return {f"test/{name}": value for name, value in self._errors("test").items()}
-
     @torch.no_grad()
-    def _errors(self, split: str) -> dict[str, float]:
+    def errors(self, split: str) -> dict[str, float]:
+        """Return errors on the captured clips of a split, each at most `max_frames` long: see `reconstruction_errors`;
+        where the features hold no positions, `error` of normalised features."""
         longest = self.config.max_frames
         clips = [c.model_copy(update={"length": min(c.length, longest)}) for c in self.data.originals(split)]
         if has_positions(self.config):
