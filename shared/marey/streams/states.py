@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Literal
 
 
 class StreamState(StrEnum):
@@ -14,6 +15,11 @@ class StreamState(StrEnum):
     ENDED = "ended"
     FAILED = "failed"
 
+
+WaitsFor = Literal["slot", "worker"]
+"""What a waiting stream waits for. `slot`: one of a worker; `worker`: one that has loaded its bundle, as none has."""
+LIVE_QUEUE = "live"
+"""Queue name of live workers in their rows."""
 
 STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
     StreamState.WAITING: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
