@@ -17,7 +17,7 @@ class StreamState(StrEnum):
 
 
 WaitsFor = Literal["slot", "worker"]
-"""What a waiting stream waits for. `slot`: one of a worker; `worker`: one that has loaded its bundle, as none has."""
+"""Reason of a wait. `slot`: every slot is taken; `worker`: no live worker has loaded the bundle of the stream."""
 LIVE_QUEUE = "live"
 """Queue name of live workers in their rows."""
 
