@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from uuid import UUID, uuid4
 
 import sqlalchemy as sa
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 from sqlalchemy import exc
 from sqlalchemy.dialects.postgresql import insert
 
@@ -21,7 +21,8 @@ from marey.jobs import tables
 from marey.jobs.leases import AssetDigest
 from marey.jobs.states import ENDED, ItemStage, JobControl, JobKind, Review
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, Edits
-from marey.vocabulary.scope import ScopePolicy
+from marey.motion.provenance import check_manifest
+from marey.vocabulary.scope import ScopePolicy, Verdict
 
 CHUNK = 1000  # rows per statement
 Row = TypeVar("Row")
@@ -30,6 +31,50 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _Reason(_Record):
+    """The reason why an item failed, as `FailureReason`."""
+
+    type: str
+    message: str
+    where: str | None = None
+    hint: str | None = None
+
+
+class _NamedAction(_Record):
+    text: str
+    verdict: Verdict
+    action: str | None = None
+    read_as: str | None = None
+
+
+class _Scope(_Record):
+    """The scope of a prompt, as `Scope.as_json` writes it; flags may be those of another release."""
+
+    version: int
+    by: Literal["words", "encoder"]
+    verdict: Verdict
+    actions: list[_NamedAction]
+    flags: list[str]
+    rows: list[_Scope] = Field(default_factory=list["_Scope"])
+
+
+def _of_form(record: type[_Record]) -> AfterValidator:
+    """Return a check that an object has the form of a record; it stays as it was written."""
+
+    def check(value: dict[str, Any]) -> dict[str, Any]:
+        record.model_validate(value)
+        return value
+
+    return AfterValidator(check)
+
+
+def _as_manifest(value: dict[str, Any]) -> dict[str, Any]:
+    try:
+        return check_manifest(value, "metadata")
+    except InvalidFile as error:
+        raise ValueError(error.message) from None
 
 
 class FileRecord(_Record):
@@ -49,7 +94,7 @@ class MotionRecord(_Record):
     frames: int = Field(ge=0)
     fps: float
     elapsed: float
-    metadata: dict[str, Any]
+    metadata: Annotated[dict[str, Any], AfterValidator(_as_manifest)]
     created_at: AwareDatetime
     review: Review | None
     reviewed_at: AwareDatetime | None
@@ -78,11 +123,11 @@ class ItemRecord(_Record):
     state: Literal["succeeded", "failed", "dead", "cancelled"]
     reason: str | None
     attempts: int = Field(ge=0)
-    problem: dict[str, Any] | None
+    problem: Annotated[dict[str, Any], _of_form(_Reason)] | None
     created_at: AwareDatetime
     finished_at: AwareDatetime
     replaces: UUID | None
-    scope: dict[str, Any] | None = None
+    scope: Annotated[dict[str, Any], _of_form(_Scope)] | None = None
     edits: dict[str, Any] | None = None
     timeline: list[dict[str, Any]] | None = None
     constraints: list[dict[str, Any]] | None = None

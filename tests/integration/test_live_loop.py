@@ -103,9 +103,10 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     generator = load(streaming.bundle)
     stream = studio.begin("a person walks")
     assert (studio.row(stream).state, studio.row(stream).position) == (StreamState.WAITING, 0)
+    assert studio.row(stream).waits_for == "worker"
     start()
     studio.until(lambda: studio.row(stream).frames > 0, "a record")
-    assert studio.row(stream).state is StreamState.LIVE
+    assert (studio.row(stream).state, studio.row(stream).waits_for) == (StreamState.LIVE, None)
     studio.send(stream, StreamControl("steer", "a person waves"))
     studio.until(lambda: any(f.prompt == 1 for f in whole(studio, stream)), "the second prompt")
     studio.until(lambda: studio.shown(stream) >= generator.limits.min_frames, "frames enough for a clip")
@@ -275,7 +276,7 @@ def test_streams_wait_while_every_slot_is_taken(studio: Studio, start: Start) ->
     start(slots=2)
     studio.until(lambda: all(studio.shown(stream) > 0 for stream in streams[:2]), "frames of two")
     waiting = studio.row(streams[2])
-    assert (waiting.state, waiting.position) == (StreamState.WAITING, 0)
+    assert (waiting.state, waiting.position, waiting.waits_for) == (StreamState.WAITING, 0, "slot")
     studio.send(streams[0], StreamControl("stop"))
     studio.until(lambda: studio.shown(streams[2]) > 0, "frames of the third")
     assert studio.row(streams[0]).state is StreamState.ENDED

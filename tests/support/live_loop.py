@@ -19,12 +19,13 @@ from marey.db import transaction
 from marey.jobs import WorkerHeartbeat
 from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import Parse, SessionPool
-from marey.runtime.live.supervisor import QUEUE, StreamSupervisor
+from marey.runtime.live.supervisor import StreamSupervisor
 from marey.streams import NewStream, StreamRow, create_stream, get_stream
 from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.frames import Frame, decode_frame
 from marey.streams.presence import ViewerPresence
 from marey.streams.redis import FrameStream, Gap
+from marey.streams.states import LIVE_QUEUE
 from marey.tenants import create_key
 from marey.text.features import TextFeatures
 from tests.support.prepared import text_features
@@ -58,7 +59,7 @@ class LiveWorker:
     ) -> None:
         self._stopping = threading.Event()
         self.loop = LiveLoop(open_pool, lambda over: self.supervisor.over(over))
-        beat = WorkerHeartbeat(f"live-{id(self)}", QUEUE, "test", os.getpid(), "cpu", self.loop.pool.bundle)
+        beat = WorkerHeartbeat(f"live-{id(self)}", LIVE_QUEUE, "test", os.getpid(), "cpu", self.loop.pool.bundle)
         self.supervisor = StreamSupervisor(
             engine, client, beat, parse, stopping=self._stopping,
             idle_seconds=idle_seconds, paused_seconds=paused_seconds,

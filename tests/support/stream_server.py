@@ -44,6 +44,7 @@ class Plan:
         frames: after which it ends by itself.
         speed: frames a second by the clock on the wall.
         waiting: how many go before it; one does each twentieth of a second.
+        waits_for: what it waits for meanwhile.
         drops: the socket breaks, without a word, where it would send these frames.
         gaps: how many frames are not sent, told by a `gap`, by the number of the first.
         silent: the same without a message.
@@ -59,6 +60,7 @@ class Plan:
     frames: int = 30
     speed: float = 200.0
     waiting: int = 0
+    waits_for: str = "slot"
     drops: set[int] = field(default_factory=set)
     gaps: dict[int, int] = field(default_factory=dict)
     silent: dict[int, int] = field(default_factory=dict)
@@ -130,6 +132,7 @@ class StreamServer:
             "seed": body.get("seed", 7),
             "state": self.state,
             "position": self.position,
+            "waits_for": self.plan.waits_for if self.state == "waiting" else None,
             "reason": self.reason,
             "fps": FPS,
             "error": {"type": "x", "message": "the worker is out of memory", "where": None, "hint": "Try again."}

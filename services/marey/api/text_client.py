@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -94,7 +95,7 @@ class TextService:
             try:
                 async with (
                     asyncio.timeout(self._seconds),
-                    self._http.stream("POST", path, content=body.model_dump_json(), headers=headers) as answer,
+                    self._http.stream("POST", path, content=json.dumps(body.model_dump()), headers=headers) as answer,
                 ):
                     return await _passed_on(answer, view)
             except TimeoutError:

@@ -29,7 +29,7 @@ Command = Literal["steer", "pause", "resume", "stop"]
 
 @dataclass(frozen=True, kw_only=True)
 class StreamChanged:
-    """A new description of the stream: its state, position or prompts.
+    """A new description of the stream: its state, position, what it waits for, or prompts.
 
     Attributes:
         stream: the whole description.

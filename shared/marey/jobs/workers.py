@@ -92,5 +92,11 @@ def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
     return [SchedulerRow(**row) for row in rows.mappings()]
 
 
+def has_loaded(bundle: sa.ColumnElement[str], queue: str, *, rules: Policy | None = None) -> sa.ColumnElement[bool]:
+    """Return the condition that a live worker of a queue has loaded a bundle, for a query on rows that name one."""
+    table = tables.worker.c
+    return sa.exists().where(table.queue == queue, table.bundle == bundle, _live(rules or policy()))
+
+
 def _live(rules: Policy) -> sa.ColumnElement[bool]:
     return tables.worker.c.seen_at > CLOCK - interval(rules.worker_live)

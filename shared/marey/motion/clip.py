@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.motion.files import read_limited, write_atomically
 from marey.motion.kinematics import forward_kinematics
+from marey.motion.provenance import check_manifest
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton, skeleton_of
 
@@ -185,8 +186,6 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         skeleton = skeleton_of(names, parents, floats("offsets", count, 3))
     except (ValueError, InvalidInput) as error:
         raise InvalidFile(str(error), where=where) from None
-    if not isinstance(manifest, dict):
-        raise InvalidFile("`manifest` is not a JSON object", where=where)
     return MotionClip(
         skeleton=skeleton,
         rotations=rotations,
@@ -196,5 +195,5 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         fps=fps,
         features=floats("features", None, None),
         features_fps=features_fps,
-        manifest=cast("dict[str, Any]", manifest),
+        manifest=check_manifest(manifest, where),
     )

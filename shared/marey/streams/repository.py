@@ -21,10 +21,11 @@ from marey.db.sql import CLOCK, check_text, interval
 from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
 from marey.jobs.types import FailureReason, NewItem, NewJob
+from marey.jobs.workers import has_loaded
 from marey.streams import tables
 from marey.streams.actions import ActionStart
 from marey.streams.rewrites import PromptRewrite
-from marey.streams.states import OPEN_STREAMS, StreamState
+from marey.streams.states import LIVE_QUEUE, OPEN_STREAMS, StreamState
 from marey.streams.types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
 from marey.tenants import tables as tenant_tables
 from marey.tenants.repository import get_tenant
@@ -259,11 +260,13 @@ def _streams() -> sa.Select[*tuple[Any, ...]]:
         .scalar_subquery()
     )
     c = table.c
+    waits_for = sa.case((has_loaded(c.bundle, LIVE_QUEUE), "slot"), else_="worker")
     return sa.select(
         *(c.id, c.tenant_id.label("tenant"), c.name, c.prompt, c.model, c.bundle, c.seed, c.max_frames),
         *(c.state, c.reason, c.problem, c.fence, c.worker, c.control, c.frames, c.job_id.label("job")),
         *(c.created_at.label("created"), c.started_at.label("started"), c.ended_at.label("ended")),
         sa.case((c.state == StreamState.WAITING, before), else_=None).label("position"),
+        sa.case((c.state == StreamState.WAITING, waits_for), else_=None).label("waits_for"),
     )
 
 

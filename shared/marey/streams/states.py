@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Literal
 
 
 class StreamState(StrEnum):
@@ -14,6 +15,11 @@ class StreamState(StrEnum):
     ENDED = "ended"
     FAILED = "failed"
 
+
+WaitsFor = Literal["slot", "worker"]
+"""Reason of a wait. `slot`: every slot is taken; `worker`: no live worker has loaded the bundle of the stream."""
+LIVE_QUEUE = "live"
+"""Queue name of live workers in their rows."""
 
 STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
     StreamState.WAITING: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),

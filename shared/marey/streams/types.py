@@ -11,7 +11,7 @@ from uuid import UUID
 from marey.jobs.types import FailureReason
 from marey.streams.actions import ActionStart
 from marey.streams.rewrites import PromptRewrite
-from marey.streams.states import StreamState
+from marey.streams.states import StreamState, WaitsFor
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,8 @@ class StreamRow:
     state: StreamState
     position: int | None
     """Number of streams that wait before it; None if it does not wait."""
+    waits_for: WaitsFor | None
+    """None if it does not wait."""
     reason: str | None
     problem: FailureReason | None
     fence: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Iterator
 from itertools import dropwhile, pairwise
@@ -18,13 +19,15 @@ Flag = Literal[
     "counts",
     "length",
     "several-people",
+    "subject",
     "other-subject",
     "other-language",
     "no-action",
     "gibberish",
 ]
-"""`objects`: mimed, the motion shows the body alone; `length`: a stated one is that of a part, or out of the bundle's
-range; `counts`: may be done another number of times."""
+"""`subject`: a noun that is in no list acts, and is read as a person; `objects`: mimed, the motion shows the body
+alone; `length`: a stated one is that of a part, or out of the bundle's range; `counts`: may be done another number of
+times."""
 
 _FOREIGN_SHARE = 0.3
 """Share of the words that are another language's and not English, from which on the prompt is; twice that with any."""
@@ -33,6 +36,7 @@ _LEAST_WORDS = 4
 """Words of a prompt with an action that may be gibberish nevertheless ("lorem ipsum dolor sit amet")."""
 _TOGETHER = frozenset([("each", "other"), ("one", "another")])
 """Of people, unless parts of one are named before."""
+_NEGATIONS = frozenset([("rather", "than"), ("w", "o")])
 _ARM_IN_ARM = frozenset([("hand", "in", "hand"), ("arm", "in", "arm")])
 _SPEAKERS = frozenset(["i", "you", "we", "me"])
 """Those who ask for a motion, and are asked: "I need a guard"."""
@@ -44,8 +48,15 @@ _LIKE = frozenset(["like", "as"])
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we"])
 _NAMELESS = _PRONOUNS | {"someone", "somebody"}
 _INDEFINITE = frozenset(["a", "an", "another"])
+_DEFINITE = frozenset(["the", "his", "her", "its", "their", "my", "your"])
 _LIGHT = frozenset(["do", "make", "give", "take", "have", "get", "perform", "be"])
 """Verbs whose object is an action: "does a shimmy"."""
+_PARTICLES = frozenset(["up", "down", "away", "off", "out", "back"])
+"""Between a verb and its object: "picks up a gauntlet"."""
+_DOERS = re.compile(r"(?:[^aeiou]er|or|ist|ian|eer|ess|man|men|woman|women|boy|girl|lady)s?$")
+"""Endings of nouns that name people by what they do."""
+_ANGLES = range(45, 100, 15)
+"""Degrees that a turn may have: "turns 90"."""
 _MAX_SUBJECT = 5
 """Words within which the subject stands."""
 
@@ -53,14 +64,16 @@ _MAX_SUBJECT = 5
 class Flagger:
     """Reads flags from the words of a prompt."""
 
-    def __init__(self, lexicon: Lexicon, lists: WordLists, travels: frozenset[str]) -> None:
+    def __init__(self, lexicon: Lexicon, lists: WordLists, travels: frozenset[str], handling: frozenset[str]) -> None:
         """Keep the tables.
 
         Args:
             travels: ids of actions whose words say travel: what stands behind their verbs is a place.
+            handling: verbs that the vocabulary has with an object right behind them: "lift a box".
         """
         self._lexicon = lexicon
         self._travels = travels
+        self._handling = handling
         self._lists = lists
         self._likened = lists.likened | {form for verb in lists.likened for form in verb_forms(verb)}
 
@@ -68,9 +81,10 @@ class Flagger:
         """Yield the flags of a prompt whatever it names."""
         lists = self._lists
         texts = [word.text for word in words]
-        if any(text in lists.negations for text in texts) or ("rather", "than") in pairwise(texts):
+        if any(text in lists.negations for text in texts) or _NEGATIONS & {*pairwise(texts)}:
             yield "negation"
-        verbs = {match.start for match in found if match.end - match.start == 1}
+        named = (m.start for m in found if m.end - m.start == 1 or not all(meaning.noun for meaning in m.meanings))
+        verbs = {*named}  # "bows deeply" has no bow
         listed = any(word.base in lists.objects and at not in verbs for at, word in enumerate(words))
         if listed or any(self._handles(words, at) for at in range(len(words))):
             yield "objects"
@@ -78,6 +92,8 @@ class Flagger:
             yield "counts"
         if self._several(words):
             yield "several-people"
+        if self._has_strange_subject(words, found):
+            yield "subject"
 
     def foreign(self, words: list[Word], found: list[Match]) -> Flag | None:
         """Return the flag of a prompt that names no person's action in English."""
@@ -95,27 +111,59 @@ class Flagger:
         )
 
     def _counts(self, words: list[Word], at: int) -> bool:
-        text = words[at].text
-        if text not in self._lists.counts and not (text.isdecimal() and len(text) < 3):
+        text, lists = words[at].text, self._lists
+        before, after = (words[k] if 0 <= k < len(words) else Word("", "") for k in (at - 1, at + 1))
+        if text == "one":  # "does one jump", but not "one walks", nor "one step after another"
+            node, third = self._lexicon.root.get(after.base), words[at + 2 : at + 3]
+            begins = at == 0 or before.base in _LIGHT
+            if after.text != after.base or node is None or not node.meanings or not begins:
+                return False
+            if third and third[0].text in lists.breaks | lists.prepositions:
+                return False
+        elif text.isdecimal():
+            ends = not after.text or after.text in lists.breaks | lists.prepositions | lists.auxiliaries | lists.sides
+            if ends and before.text != "x" and (before.text == before.base or int(text) in _ANGLES):
+                return False  # a number of a file ("Jump_2"), or an angle; "squats 10" and "jump x3" are counts
+            if text.startswith("0") or len(text) > 2:
+                return False
+        elif text not in lists.counts:
             return False
-        after = words[at + 1] if at + 1 < len(words) else Word("", "")
         return after.base not in self._lists.uncounted and after.text.removesuffix("s") not in self._lists.uncounted
 
     def _handles(self, words: list[Word], at: int) -> bool:
         """Return True if a verb, but one of travel, is followed by "a" and a noun that is in no list: "swings a
-        halberd", but not "walks a tightrope"."""
+        halberd", but not "walks a tightrope". Behind "the" and possessives, which places and parts of the body have
+        as well, only verbs count that the vocabulary has with objects."""
         verb, rest = words[at], words[at + 1 :]
-        if not self._lexicon.is_verb_form(verb.text) or not rest or rest[0].text not in _INDEFINITE:
+        if rest and rest[0].text in _PARTICLES:
+            rest = rest[1:]
+        if not self._lexicon.is_verb_form(verb.text) or not rest or rest[0].text not in _DEFINITE | _INDEFINITE:
+            return False
+        if rest[0].text in _DEFINITE and verb.base not in self._handling:
             return False
         node = self._lexicon.root.get(verb.base)
         meanings = () if node is None else node.meanings
-        if verb.base in _LIGHT or any(each.action in self._travels and not each.near for each in meanings):
+        moves = rest[0].text in _INDEFINITE and verb.base not in self._handling  # "pushes a gurney" does, and handles
+        if verb.base in _LIGHT or (moves and any(each.action in self._travels and not each.near for each in meanings)):
             return False
         noun, after = [*(word.text for word in dropwhile(self._is_skipped, rest[1:])), "", ""][:2]
         if len(noun) < 3 or not noun.isalpha() or self._is_english(noun) or self._is_english(_single(noun)):
             return False
         lists = self._lists  # "a timid bow" and "a series of" name no object
         return not after or (after != "of" and after in lists.breaks | lists.prepositions | lists.auxiliaries)
+
+    def _has_strange_subject(self, words: list[Word], found: list[Match]) -> bool:
+        """Return True if a noun that is in no list, and has no ending of a doer, does the first action: "a mermaid
+        swims", "the toaster walks"; not "a stumbling walk", whose action is a noun."""
+        acts = next((m.start for m in found if words[m.start].text != words[m.start].base), 0)
+        clause = [word for word in words[:acts] if not self._is_skipped(word) and not word.text.endswith("ly")]
+        if not clause or words[0].text not in self._lists.determiners or words[acts].text.endswith("ing"):
+            return False
+        if any(self._is_person(word) or word.text in self._lists.breaks | self._lists.prepositions for word in clause):
+            return False
+        noun = clause[-1].text
+        known = self._is_english(noun) or self._is_english(_single(noun)) or _DOERS.search(noun)
+        return len(noun) > 2 and noun.isalpha() and not known
 
     def _is_skipped(self, word: Word) -> bool:
         return word.text in self._lists.skipped

@@ -29,6 +29,7 @@ NOTES = {
     "counts": "may be done another number of times",
     "length": "a stated length is not used: it is that of a part, or out of the model's range",
     "several-people": "one person is shown",
+    "subject": "its subject is read as a person",
     "other-language": "words in another language are not read",
 }
 """Expectation for prompts of a verdict or with a flag; the flags that are not here come with `unknown`."""

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
 from marey.vocabulary.lengths import stated_length
-from marey.vocabulary.lexicon import Lexicon, Meaning
+from marey.vocabulary.lexicon import Lexicon, Meaning, words_of
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -141,7 +141,15 @@ class ScopeMatcher:
         travels = frozenset(
             action.id for action in vocabulary.actions.values() if action.in_place and not action.kind_of
         )
-        self._flagger = Flagger(lexicon, lists, travels)
+        handling = frozenset(
+            verb
+            for action in vocabulary.actions.values()
+            if action.support == "feet"  # what hands hold on to is a place
+            for phrase in (*action.verbs, *action.near)
+            for verb, *objects in [words_of(phrase)]
+            if objects and objects[0] in lists.objects
+        )
+        self._flagger = Flagger(lexicon, lists, travels, handling)
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""

@@ -22,6 +22,7 @@ class WordLists:
     breaks: frozenset[str]
     people: frozenset[str]
     body_parts: frozenset[str]
+    parts: frozenset[str]
     groups: frozenset[str]
     companions: frozenset[str]
     likened: frozenset[str]

@@ -35,6 +35,7 @@ def test_a_stream_begins_waiting_with_exact_bundle_drawn_seed_and_skeleton(http:
     assert (made["model"], made["licence"], made["fps"], made["frames"]) == (streaming_model(), "MIT", 20.0, 0)
     assert 0 <= made["seed"] < 2**31
     assert made["prompts"] == []
+    assert made["waits_for"] == "worker"
     assert made["skeleton"]["names"] == list(HUMANML3D.joint_names)
     assert made["skeleton"]["parents"] == list(HUMANML3D.parents)
     offsets = np.array(made["skeleton"]["offsets"], np.float32)

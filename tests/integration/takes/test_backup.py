@@ -425,6 +425,21 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
         InvalidFile,
         "edits that cannot be read",
     ),
+    "a problem of another form": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"problem":{', b'"problem":{"age":1,', 1)),
+        InvalidFile,
+        "problem",
+    ),
+    "a scope of another form": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"scope":null', b'"scope":{"verdict":"good"}', 1)),
+        InvalidFile,
+        "scope",
+    ),
+    "metadata of another form": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"metadata":{}', b'"metadata":{"prompts":5}', 1)),
+        InvalidFile,
+        "metadata.*prompts",
+    ),
     "what no text can hold": (
         lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),
         InvalidFile,

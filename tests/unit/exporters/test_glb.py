@@ -132,6 +132,7 @@ def broken() -> dict[str, bytes]:
         "numbers beyond the end": good.replace(b'"count":5', b'"count":6'),
         "no rate": good.replace(b'"fps":20.0', b'"fps":-2.0'),
         "NaN": good[:-4] + np.float32(np.nan).tobytes(),
+        "a place beyond float32": good.replace(b'"translation":[0.0,', b'"translation":[9e9,', 1),
     }
 
 

@@ -97,6 +97,34 @@ BAD = {
     "names twice": ({"names": np.array(["a"] * 22)}, "same name"),
     "manifest of words": ({"manifest": np.array("hello")}, "JSON|Expecting"),
     "manifest a list": ({"manifest": np.array("[1]")}, "not a JSON object"),
+    **{
+        f"{name} {given}": ({"manifest": np.array(f'{{"{name}": {given}}}')}, f"`{name}` of the manifest is not")
+        for name, all_given in {
+            "prompt": ("5", '["walk"]'),
+            "licence": ("[]",),
+            "prompts": (
+                "5",
+                '"walk"',
+                "[5]",
+                "[[0]]",
+                '[["0", "walk"]]',
+                "[[0, 5]]",
+                '[[-1, "walk"]]',
+                '[[9, "a"], [0, "b"]]',
+            ),
+            "timeline": (
+                "5",
+                "[]",
+                '{"rows": 5}',
+                '{"rows": [{"start": 0}]}',
+                '{"rows": [{"start": 0, "end": 1}]}',
+                '{"a": []}',
+            ),
+            "placement": ("null", '{"x": "1"}', '{"x": NaN}'),
+            "loop": ("null", '{"end": "open"}', '{"end": "shut", "cycle": {"x": 0}}'),
+        }.items()
+        for given in all_given
+    },
     "pickle": ({"names": np.array([{"a": 1}] * 22, object)}, "pickled objects, which are never loaded"),
 }
 

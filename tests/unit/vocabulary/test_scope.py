@@ -68,10 +68,40 @@ def test_the_action_of_an_in_scope_prompt_is_found() -> None:
         "the boxer throws a nifty jab",
         "she performs a series of jumps",
         "a person raises the roof",
+        "a person bows deeply",  # no bow
+        "crosses the bridge",  # "cross" takes no objects
+        "climbs the slope",
+        "raises her eyebrows",
     ],
 )
 def test_a_noun_in_no_list_is_an_object_only_behind_a_verb_of_the_hands(prompt: str) -> None:
     assert "objects" not in match_scope(prompt, ALL).flags
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        *("Walk_01", "Attack_2", "Idle_v2", "walk_fwd_45", "turn_90_L", "turns 90", "take 2: walking"),  # names, angles
+        *("one person walks", "one hand waves", "goes up one step after another", "3D walk"),
+    ],
+)
+def test_a_number_that_counts_no_repetitions_is_no_count(prompt: str) -> None:
+    assert "counts" not in match_scope(prompt, ALL).flags
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "a person walks",
+        "an angry knight runs",
+        "a sorceress waves",
+        "a staggering walk",
+        "the left arm waves",
+        "a jump kick",
+    ],
+)
+def test_a_subject_that_is_known_or_named_by_what_it_does_is_not_flagged(prompt: str) -> None:
+    assert "subject" not in match_scope(prompt, ALL).flags
 
 
 def test_a_prompt_out_of_scope_is_right_only_as_unknown() -> None:
@@ -112,7 +142,17 @@ def test_verdicts_of_a_bundle_with_few_actions(
         ("a warrior swings a halberd", "objects"),
         ("throws another boomerang at the wall", "objects"),
         ("she lifts a big kettlebell", "objects"),
+        ("carries the anvil to the forge", "objects"),
+        ("opens the hatch", "objects"),
+        ("picks up her gauntlet", "objects"),
         ("kicks three times", "counts"),
+        ("jump x3", "counts"),
+        ("squats 10", "counts"),
+        ("does one jump", "counts"),
+        ("a mermaid swims", "subject"),
+        ("the lampshade slowly turns left", "subject"),
+        ("walks w/o swinging the arms", "negation"),
+        ("refrains from waving", "negation"),
         ("two people dance", "several-people"),
         ("the dog barks", "other-subject"),
         ("ein Mann läuft", "other-language"),

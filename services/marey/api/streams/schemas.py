@@ -20,6 +20,7 @@ from marey.http.schemas import View
 from marey.items.values import MAX_SEED
 from marey.motion.skeleton import Skeleton
 from marey.streams import StreamPrompt, StreamRow, StreamState
+from marey.streams.states import WaitsFor
 from marey.vocabulary.report import warn_of
 from marey.vocabulary.scope import ActionLists
 
@@ -122,6 +123,9 @@ class StreamView(View):
     seed: int
     state: StreamState
     position: int | None = Field(description="Number of streams before it; null if it does not wait.")
+    waits_for: WaitsFor | None = Field(
+        description="What it waits for: a `slot` of a worker, or a `worker` that has loaded its bundle, as none has."
+    )
     reason: str | None = Field(description="Reason of its end.")
     error: ErrorView | None
     fps: float | None = Field(description=f"Frames a second; {GONE}")
@@ -152,7 +156,8 @@ class StreamDetailView(StreamView):
 
 
 class StreamMessage(View):
-    """Current state of the stream: sent first on every socket, and whenever state, position or prompts changed."""
+    """Current state of the stream: sent first on every socket, and whenever state, position, `waits_for` or prompts
+    changed."""
 
     type: Literal["stream"] = "stream"
     stream: StreamDetailView

@@ -243,7 +243,7 @@ class StreamSession:
 
     def _standing(self) -> tuple[object, ...]:
         """Return the state whose changes the client receives."""
-        return self._row.state, self._row.position, tuple(self._prompts)
+        return self._row.state, self._row.position, self._row.waits_for, tuple(self._prompts)
 
     def _detail(self) -> StreamDetailView:
         return StreamDetailView.detail(self._row, self._request.made, self._prompts)

@@ -51,7 +51,7 @@ class Follower:
         self._stopping = False
         self._stopped_on = 0  # the connection that took the stop
         self._broken_on: int | None = None  # number of connections when the last break was reported
-        self._reported: tuple[str | None, int | None] = (None, None)  # state and position
+        self._reported: tuple[str | None, int | None, str | None] = (None, None, None)  # state, position, waits_for
         self._prompts = 0  # how many were reported
         self._prompt = 0  # number of the current one
 
@@ -123,12 +123,16 @@ class Follower:
         state, position, reason = stream.state, stream.position, stream.reason
         if state != "live":
             self._pace.rest()
-        if (state, position) != self._reported:
-            known = self._screen.live and state == self._reported[0]  # the status line shows a position that changes
-            self._reported = (state, position)
+        if (state, position, stream.waits_for) != self._reported:
+            # The status line shows a position that changes.
+            known = self._screen.live and (state, stream.waits_for) == (self._reported[0], self._reported[2])
+            self._reported = (state, position, stream.waits_for)
             before = f", {position} before it" if state == "waiting" and position is not None else ""
             text = f"The stream {'' if stream.has_ended else 'is '}{state}{before}{f': {reason}' if reason else ''}."
-            self._event("state", None if known else text, state=state, position=position, reason=reason)
+            if stream.waits_for == "worker":
+                text += f"\nNo live worker has loaded {stream.bundle}, so it waits for one (`MAREY_LIVE_MODEL`)."
+            fields = {"state": state, "position": position, "waits_for": stream.waits_for, "reason": reason}
+            self._event("state", None if known else text, **fields)
         for prompt in stream.prompts[self._prompts :]:
             text = f"From frame {prompt.frame} on: {prompt.prompt}{_rewritten(prompt)}"
             text = "\n".join([text, *(f"Warning: {warning}" for warning in prompt.warnings)])

@@ -53,6 +53,8 @@ class Stream(Result):
     state: str = ""
     position: int | None = None
     """How many wait before it; None when it does not wait."""
+    waits_for: str | None = None
+    """`slot` of a worker, or `worker`: none has loaded the bundle; None when it does not wait."""
     reason: str | None = None
     """Why it is over."""
     error: ErrorDetail | None = None

@@ -21,7 +21,9 @@ from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.files import read_limited
 from marey.motion.io.glb_write import BIN, FEET, FLOAT, GENERATOR, JSON, MAGIC, VERSION
 from marey.motion.io.rigged_glb_read import hips_motion
+from marey.motion.provenance import check_manifest
 from marey.motion.rigs.landmarks import feet_and_facing
+from marey.motion.rigs.make_rig import FARTHEST
 from marey.motion.rotations import Array, conjugate, multiply, rotate
 from marey.motion.skeleton import skeleton_of
 
@@ -81,6 +83,7 @@ class _Document:
         self.rigged: Mapping[str, Any] | None = self.extras.get("rigged")
         joints = len(document["skins"][0]["joints"])
         self.nodes: list[Mapping[str, Any]] = document["nodes"][: joints if self.rigged is None else None]
+        self._check(np.array([number for node in self.nodes for number in node.get("translation", ())], np.float64))
 
     def values(self, accessor: int) -> NDArray[np.float32]:
         """Return the numbers (N, width) of an accessor."""
@@ -91,9 +94,13 @@ class _Document:
         if about["componentType"] != FLOAT or offset < 0 or count < 1:
             raise InvalidFile("its numbers are not float32", where=self.where)
         values = np.frombuffer(self.data, "<f4", count * width, offset).reshape(count, width)
-        if not np.isfinite(values).all():
-            raise InvalidFile("holds NaN or infinite numbers", where=self.where)
+        self._check(values)
         return values
+
+    def _check(self, values: Array) -> None:
+        """Raise InvalidFile unless all numbers are finite and within `FARTHEST`, so that their sums are, too."""
+        if not (np.abs(values) <= FARTHEST).all():
+            raise InvalidFile(f"holds NaN, or numbers over {FARTHEST:,.0f}", where=self.where)
 
     def tracks(self, path: str) -> dict[int, NDArray[np.float32]]:
         """Return the animated values (T, width) of nodes by their index."""
@@ -124,16 +131,15 @@ def _clip(file: _Document) -> MotionClip:
         rotations, root = _without_root_bone(rotations, root, places[1])
         names, offsets, parents = names[1:], offsets[1:], [parent - 1 for parent in parents[1:]]
         parents[0] = -1
-    manifest = file.extras["manifest"]
-    if not isinstance(manifest, dict) or not len(root) or np.abs(np.linalg.norm(rotations, axis=-1) - 1).max() > 1e-3:
-        raise InvalidFile("has no frames, no manifest or rotations that are none", where=file.where)
+    if not len(root) or np.abs(np.linalg.norm(rotations, axis=-1) - 1).max() > 1e-3:
+        raise InvalidFile("has no frames, or rotations that are none", where=file.where)
     clip = MotionClip.of(
         skeleton_of(tuple(names), tuple(parents), offsets),
         rotations,
         root,
         _contacts(file, len(root)),
         _rate(file),
-        manifest=cast("dict[str, Any]", manifest),
+        manifest=check_manifest(file.extras["manifest"], file.where),
     )
     return _back_at_origin(clip) if options.get("placement") == "keep" else clip
 
@@ -150,7 +156,7 @@ def _rigged_clip(file: _Document, rigged: Mapping[str, Any]) -> MotionClip:
         root,
         _contacts(file, len(root)),
         _rate(file),
-        manifest=cast("dict[str, Any]", file.extras["manifest"]),
+        manifest=check_manifest(file.extras["manifest"], file.where),
     )
 
 

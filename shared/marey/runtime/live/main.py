@@ -17,11 +17,12 @@ from marey.runtime.child import wait_for_database
 from marey.runtime.exposition import expose
 from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import LiveModelFactory
-from marey.runtime.live.supervisor import QUEUE, StreamSupervisor
+from marey.runtime.live.supervisor import StreamSupervisor
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import StatusReporter
+from marey.streams.states import LIVE_QUEUE
 
 log = logger(__name__)
 
@@ -61,7 +62,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     name = f"live-{socket.gethostname()}-{os.getpid()}"
     supervisor: StreamSupervisor
     loop = LiveLoop(lambda: model.open_pool(chosen.live_slots), lambda over: supervisor.over(over))
-    worker = WorkerHeartbeat(name, QUEUE, socket.gethostname(), os.getpid(), model.device, loop.pool.bundle)
+    worker = WorkerHeartbeat(name, LIVE_QUEUE, socket.gethostname(), os.getpid(), model.device, loop.pool.bundle)
     supervisor = StreamSupervisor(
         engine, client, worker, model.parse, stopping=stopping,
         idle_seconds=chosen.stream_idle_seconds, paused_seconds=chosen.stream_paused_seconds,

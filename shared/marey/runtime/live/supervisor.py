@@ -41,8 +41,6 @@ READ_SECONDS = 0.1
 `LISTEN_SECONDS`."""
 CLOSE_PATIENCE = 120.0
 STALL_SECONDS = 10.0
-QUEUE = "live"
-"""Queue name of live workers in their rows."""
 
 
 class StreamSupervisor(threading.Thread):

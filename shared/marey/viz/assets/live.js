@@ -54,8 +54,9 @@
 
   function tell() {
     const state = document.createElement("b");
-    const position = session?.stream.position;
-    state.textContent = shown.state === "waiting" && Number.isInteger(position) ? `waiting, ${position} before it` : shown.state;
+    const { position, waits_for: lacks, bundle } = session?.stream ?? {};
+    const waits = lacks === "worker" ? `waiting, no worker has loaded ${bundle}` : `waiting, ${position} before it`;
+    state.textContent = shown.state === "waiting" && Number.isInteger(position) ? waits : shown.state;
     const facts = [];
     if (session?.buffer.received) {
       const { buffer, latency } = session;

@@ -47,6 +47,14 @@ def test_a_stream_is_followed_to_its_end_and_told_line_by_line(serve: Any, tmp_p
     check_frames(path, server, list(range(30)))
 
 
+def test_a_stream_whose_bundle_no_worker_has_loaded_says_so(serve: Any) -> None:
+    ran = run(serve(waiting=1, waits_for="worker"), "--json").ok()
+    assert "No live worker has loaded stroller-x, so it waits for one (`MAREY_LIVE_MODEL`)." in ran.err
+    told = [(line["state"], line["waits_for"]) for line in ran.lines if line["type"] == "state"]
+    assert told[0] == ("waiting", "worker")
+    assert ("live", None) in told
+
+
 def test_only_what_is_asked_for_is_sent(serve: Any) -> None:
     server = serve(frames=2)
     run(server).ok()
