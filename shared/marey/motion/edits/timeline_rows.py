@@ -41,7 +41,7 @@ def cut_rows(manifest: Mapping[str, Any], first: int, last: int, fps: float) -> 
     cut = {name: _left(spans, first, last, fps) for name, spans in record.items()}
     if _times(cut) == _times(record):
         return told
-    return _told(told, {**cut, "rows": cut["rows"] or [_before(record["rows"], first / fps)]})
+    return _with_record(told, {**cut, "rows": cut["rows"] or [_before(record["rows"], first / fps)]})
 
 
 def reversed_rows(manifest: Mapping[str, Any], frames: int, fps: float) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def frames_at_speed(frames: int, factor: float, *, cycle: bool = False) -> int:
     return (max(round(intervals), 1) if cycle else int(intervals + ROUNDING)) + 1
 
 
-def _told(manifest: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
+def _with_record(manifest: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
     """Return a manifest with another record of its timeline, and the text of its rows; of one row the prompt alone."""
     rows: Sequence[Mapping[str, Any]] = record["rows"]
     told = {name: value for name, value in manifest.items() if name not in (*READ_PROMPT, TIMELINE)}
@@ -143,13 +143,14 @@ def _retimed(manifest: Mapping[str, Any], times: Callable[[float, float], tuple[
         name: sorted((_at(span, *times(span["start"], span["end"])) for span in spans), key=_start)
         for name, spans in record.items()
     }
-    return _told(manifest, moved)
+    return _with_record(manifest, moved)
 
 
 def _at(span: Mapping[str, Any], start: float, end: float) -> dict[str, Any]:
-    """Return a span of time at another place; a match was of its own frames."""
+    """Return a span of time at another place; a match and a choice were of its own frames."""
+    kept = {name: value for name, value in span.items() if name != "selection"}
     changed = {"match": None} if "match" in span else {}
-    return {**span, "start": round(start, 6), "end": round(end, 6), **changed}
+    return {**kept, "start": round(start, 6), "end": round(end, 6), **changed}
 
 
 def _start(span: Mapping[str, Any]) -> float:
