@@ -147,8 +147,8 @@ def _retimed(manifest: Mapping[str, Any], times: Callable[[float, float], tuple[
 
 
 def _at(span: Mapping[str, Any], start: float, end: float) -> dict[str, Any]:
-    """Return a span of time at another place; a match and a choice were of its own frames."""
-    kept = {name: value for name, value in span.items() if name != "selection"}
+    """Return a span of time at another place; a match, a choice and a rise were of its own frames."""
+    kept = {name: value for name, value in span.items() if name not in ("selection", "rise")}
     changed = {"match": None} if "match" in span else {}
     return {**kept, "start": round(start, 6), "end": round(end, 6), **changed}
 

@@ -11,6 +11,7 @@ from marey.generation.shots.timelines import gaps_of, plan_timeline
 from marey.generation.timed import TimedText
 from marey.items.timeline import TimelineRow, text_of
 from marey.motion.clip import SELECTION, MotionClip
+from marey.quality.postures import rises_of
 from marey.quality.record import PromptMatch
 from marey.quality.selection import Selection
 from marey.selector.records import match_of
@@ -62,7 +63,10 @@ def with_rows(clip: MotionClip, timeline: Sequence[TimedText]) -> MotionClip:
     record: Mapping[str, Any] = clip.manifest[KEY]
     prompts = [[round(row.start * clip.fps), row.text.prompt] for row in timeline]
     rows = [{**row, "match": _match(clip, timed).value} for row, timed in zip(record["rows"], timeline, strict=True)]
-    return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: {**record, "rows": rows}})
+    spans = record["transitions"]
+    transitions = [{**span, "rise": rise} for span, rise in zip(spans, rises_of(clip, spans), strict=True)]
+    told = {**record, "rows": rows, "transitions": transitions}
+    return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: told})
 
 
 def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> MotionClip:
