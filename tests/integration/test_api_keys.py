@@ -32,6 +32,7 @@ OTHERS = {
     "POST /v1/rigs": "submit",
     "POST /v1/streams": "submit",
     "DELETE /v1/streams/{stream}": "submit",
+    "POST /v1/streams/{stream}/end": "submit",
     "POST /v1/evaluations": "submit",
     "POST /v1/schedules": "submit",
     "POST /v1/schedules/{schedule}/run": "submit",

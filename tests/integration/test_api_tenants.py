@@ -57,6 +57,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /v1/motions/review": {"motions": ["<motion>"], "verdict": "kept"},
     "POST /v1/motions/reroll": {"motions": ["<motion>"]},
     "POST /v1/motions/{motion}/edits": {"ops": [{"op": "mirror"}]},
+    "POST /v1/streams/{stream}/end": {"pose": {"joint_rotations": [[1, 0, 0, 0]] * 22}},
 }
 """`<motion>` stands for the id of one."""
 NOBODYS = {

@@ -9,12 +9,15 @@ from typing import Any
 import httpx2
 import pytest
 
+from marey.api.text_client import TextService
 from marey.client import Client, OutOfScope
 from marey.db import transaction
 from marey.takes import erase
 from marey.tenants import DEFAULT_TENANT
-from marey.vocabulary.scope import ActionLists
+from marey.vocabulary.scope import ActionLists, NamedAction, Scope
+from tests.integration.takes.test_edits import post
 from tests.support.command import Command
+from tests.support.editing import stored
 from tests.support.live_api import BUNDLE, QUALITY, LiveApi, write_bundle
 
 UNLISTED = "hgm3-unlisted"
@@ -124,6 +127,41 @@ def test_an_erased_prompt_leaves_no_words_in_its_scope(api: LiveApi, http: httpx
     with transaction(api.engine) as conn:
         erase(conn, DEFAULT_TENANT, job["id"], by="test")
     assert items(http, job)[0]["scope"] is None
+
+
+def test_the_prompts_of_an_edit_have_their_scope(api: LiveApi, http: httpx2.Client) -> None:
+    motion = stored(api, "a person walks")["id"]
+    ops = [{"op": "extend", "seconds": 1, "prompt": "she sprints"}, {"op": "extend", "seconds": 1, "prompt": NONSENSE}]
+    made = post(http, motion, *ops)
+    assert made.status_code == 202, made.text
+    assert made.json()["warnings"][0].endswith(KNOWN)
+    (item,) = items(http, made.json())
+    assert (made.json()["scope"], item["scope"]["verdict"], item["scope"]["by"]) == ("warn", "unknown", "words")
+    assert [action["verdict"] for action in item["scope"]["actions"]] == ["close", "unknown"]
+    known = post(http, motion, ops[0], scope="refuse").json()
+    assert (known["scope"], items(http, known)[0]["scope"]["verdict"]) == ("refuse", "close")
+    refused = post(http, motion, *ops, scope="refuse").json()
+    assert (refused["type"], len(refused["problems"])) == ("urn:marey:problem:out-of-scope", 1)
+    assert items(http, post(http, motion, *ops, scope="ignore").json())[0]["scope"] is None
+    moved = post(http, motion, {"op": "mirror"}).json()
+    assert (moved["scope"], items(http, moved)[0]["scope"]) == ("ignore", None)
+
+
+def test_a_checked_edit_has_the_encoder_s_verdict_where_words_leave_it(
+    api: LiveApi, http: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+
+    async def scopes(_: TextService, prompts: dict[str, list[str]]) -> dict[tuple[str, str], Scope]:
+        asked.append(prompts)
+        return {(BUNDLE, "a run on a bank"): Scope((NamedAction("a run on a bank", "unknown"),), by="encoder")}
+
+    monkeypatch.setattr(TextService, "scopes", scopes)
+    motion = stored(api, "a person walks")["id"]
+    op = {"op": "extend", "seconds": 1, "prompt": "a run on a bank"}
+    answer = http.post(f"/v1/motions/{motion}/edits", params={"validate_only": True}, json={"ops": [op]}).json()
+    assert asked == [{BUNDLE: ["a run on a bank"]}]
+    assert (answer["scope_report"]["by"], answer["scope_report"]["unknown"]) == ("encoder", 1)
 
 
 def test_the_command_line_warns_on_stderr_and_dry_runs_by_words_only(marey: Command) -> None:

@@ -365,6 +365,7 @@ def test_messages_arrive_in_order_and_the_next_worker_reads_on(client: redis.Red
         StreamControl("resume"),
         StreamControl("steer", "a person jumps, später"),
         StreamControl("stop"),
+        StreamControl("stop", pose={"joint_rotations": [[1.0, 0.0, 0.0, 0.0]], "root_height": 0.9}),
     ]
     ids = [queue.send(control) for control in sent]
     assert queue.read() == list(zip(ids, sent, strict=True))
@@ -382,12 +383,14 @@ def test_a_message_of_another_release_is_told_and_stops_nothing(client: redis.Re
         b'{"kind": 3}',
         b'{"kind": "steer"}',
         b'{"kind":"stop","x":1}',
+        b'{"kind":"stop","pose":[]}',
+        b'{"kind":"pause","pose":{}}',
     ):
         client.xadd(queue.key, {"m": foreign})
     client.xadd(queue.key, {"other": b"x"})
     queue.send(StreamControl("stop"))
     found = [message for _, message in queue.read(START)]
-    assert len(found) == 8
+    assert len(found) == 10
     assert all(isinstance(message, InvalidInput) for message in found[:-1])
     assert found[-1] == StreamControl("stop")
 

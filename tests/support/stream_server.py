@@ -337,7 +337,10 @@ def _handler(server: StreamServer) -> type[BaseHTTPRequestHandler]:
 
         def do_POST(self) -> None:
             body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-            if self.path != "/v1/streams":
+            if self.path == f"/v1/streams/{STREAM}/end" and self.headers["Authorization"] == f"Bearer {KEY}":
+                server.apply({"kind": "stop", **body})
+                self._send(202, server.view())
+            elif self.path != "/v1/streams":
                 self._send(404, {"type": "urn:marey:problem:not-found", "detail": "nothing here"})
             elif self.headers["Authorization"] != f"Bearer {KEY}":
                 self._send(401, {"type": "urn:marey:problem:unauthenticated", "detail": "no such key"})

@@ -29,6 +29,9 @@ EXAMPLES: dict[tuple[str, str], Any] = {
     ("NewRerollBody", "application/json"): {"motions": [_MOTION], "comment": "slides at the end"},
     ("NewEditBody", "application/json"): {"ops": [{"op": "trim", "from": 0.5, "to": 3.2}, {"op": "loop"}]},
     ("NewStreamBody", "application/json"): {"prompt": "a person walks forward", "seconds": 60.0, "seed": 7},
+    ("EndStreamBody", "application/json"): {
+        "pose": {"motion": {"id": "01a2185a-bb8d-7f1c-a04c-452b827cd415", "frame": 40}}
+    },
     ("ParseBody", "application/json"): {"prompts": ["a person walks forward and waves"], "model": "hgm3"},
     ("NewEvaluationBody", "application/json"): {**_MEASURED, "name": "nightly"},
     ("NewScheduleBody", "application/json"): {**_MEASURED, "cron": "0 3 * * 1", "time_zone": "Europe/Berlin"},

@@ -18,8 +18,10 @@ from marey.client.results import HINT
 from marey.client.transport import NOT_OURS, Transport, error_of_problem
 from marey.client.types.streams import Stream, StreamDetail
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, Unreachable
+from marey.items.constraints import read_pose
 from marey.items.item import read_items
 from marey.items.prompts import check_prompt
+from marey.motion.keyframes import PoseFiles
 
 WAIT = 0.2
 """Seconds of one wait for messages."""
@@ -203,13 +205,20 @@ class LiveStream:
         """
         self._send("resume")
 
-    def stop(self) -> None:
+    def stop(self, pose: Mapping[str, Any] | None = None) -> None:
         """Ask the stream to end; iterating gives the frames up to its end.
+
+        Args:
+            pose: of the last frame; see `Streams.end`.
 
         Raises:
             Unreachable: as `steer`.
+            InvalidInput, NotFound, Conflict: as `Streams.end` with a pose.
         """
-        self._send("stop")
+        if pose is None:
+            self._send("stop")
+        else:
+            _end_on(self._transport, self.stream, pose)
 
     def failure(self) -> ItemsFailed | None:
         """Return the error of a stream that failed; None for any other state."""
@@ -353,10 +362,29 @@ class Streams(Resource):
         """Return the current state of a stream, with its prompts and skeleton."""
         return StreamDetail.of(self._transport.get(_path(stream)))
 
-    def end(self, stream: Stream | str) -> StreamDetail:
-        """End a stream."""
+    def end(self, stream: Stream | str, *, pose: Mapping[str, Any] | None = None) -> StreamDetail:
+        """End a stream.
+
+        Args:
+            pose: into which its last second passes, as of a pose keyframe without its frame: `{"motion": {"id": …,
+                "frame": 12}}` of a stored motion, `{"motion": {"file": "bow.npz", "frame": 12}}`, which is read here,
+                or `joint_rotations` and `root_height`. None = it ends with the next frame.
+
+        Raises:
+            InvalidInput: a pose that cannot be read, or of another skeleton.
+            Conflict: with a pose, and the stream has ended.
+        """
+        if pose is not None:
+            return _end_on(self._transport, stream, pose)
         self._transport.delete(_path(stream))
         return self.get(stream)
+
+
+def _end_on(transport: Transport, stream: Stream | str, pose: Mapping[str, Any]) -> StreamDetail:
+    read = read_pose(pose, "pose")
+    if "file" in read.get("motion", {}):
+        (read,) = PoseFiles(Path()).fill([read])
+    return StreamDetail.of(transport.post(f"{_path(stream)}/end", {"pose": read}))
 
 
 def _path(stream: Stream | str) -> str:

@@ -13,14 +13,14 @@ from marey.items.problems import UnknownAction
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import TEXT_QUEUE, ClaimedItem
 from marey.jobs.leases import PromptScope
-from marey.jobs.types import prompts_of_ops
+from marey.jobs.types import named_prompts, prompts_of_ops
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served, scope_key
 from marey.text.meaning import MeaningJudge
 from marey.text.pipeline import TextPipeline
 from marey.text.several import SeveralTexts, several_key
 from marey.vocabulary.report import refusal, says_known, with_length
-from marey.vocabulary.scope import ScopePolicy, match_scope, scope_of_rows
+from marey.vocabulary.scope import ScopePolicy, match_scope, scope_of_prompts, scope_of_rows
 
 BATCH = 64
 """Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""
@@ -91,7 +91,7 @@ class ScopeStage:
             return None
         bundle = self._bundle(item.bundle)
         lists = bundle.manifest.actions
-        prompts = _prompts_of(item)
+        prompts = _examined(item)
         if lists is None or all(match_scope(prompt, lists).left is None for _, prompt in prompts):
             return None
         scopes = [self.judge.judge(prompt, lists) for _, prompt in prompts]
@@ -99,6 +99,10 @@ class ScopeStage:
             if policy == "refuse" and (message := refusal(scope)) is not None:
                 hint = says_known(bundle.manifest.name, lists.known)
                 raise UnknownAction(f"{row or 'the prompt'} {message}", hint=hint)
+        if item.edits is not None:
+            texts = "\n".join(prompt for _, prompt in prompts)
+            key = scope_key(texts, item.bundle, lists, of_edit=True)
+            return PromptScope(key, scope_of_prompts(scopes).as_json())
         key = scope_key(item.prompt, item.bundle, lists, in_rows=item.timeline is not None)
         if item.timeline is not None:
             return PromptScope(key, scope_of_rows(scopes).as_json())
@@ -137,6 +141,11 @@ def _prompts_of(item: ClaimedItem) -> list[tuple[str | None, str]]:
     if item.edits is not None:
         return [(None, prompt) for prompt in prompts_of_ops(item.edits.ops)]
     return prompts_with_rows(item.prompt, item.timeline)
+
+
+def _examined(item: ClaimedItem) -> list[tuple[str | None, str]]:
+    """Return the prompts whose scope counts: of an edit those that it names."""
+    return _prompts_of(item) if item.edits is None else [(None, prompt) for prompt in named_prompts(item.edits.ops)]
 
 
 def create_handler() -> TextHandler:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from marey.bundles.bundle import Bundle
 from marey.bundles.manifest import TextSpec
@@ -65,8 +65,19 @@ def refuse_unknown(
         raise OutOfScope(problems, where=where, total=total, hint=f"{knows} The scope `warn` accepts such prompts.")
 
 
-def examine_prompts(prompts: Iterable[str], bundle: Bundle, policy: ScopePolicy) -> ScopeReport | None:
-    """Return the report on the scopes of prompts by their words, each counted once; None with the policy `ignore`.
+def examine_prompts(
+    prompts: Iterable[str],
+    bundle: Bundle,
+    policy: ScopePolicy,
+    *,
+    match: Callable[[str, ActionLists], Scope] | None = None,
+    decided: Mapping[tuple[str, str], Scope] | None = None,
+) -> ScopeReport | None:
+    """Return the report on the scopes of prompts, each counted once; None with the policy `ignore`.
+
+    Args:
+        match: by words and meaning; None = by words.
+        decided: the encoder's verdicts, by bundle and prompt.
 
     Raises:
         OutOfScope: policy `refuse`, and prompts name actions that the bundle does not know.
@@ -76,8 +87,11 @@ def examine_prompts(prompts: Iterable[str], bundle: Bundle, policy: ScopePolicy)
         return None
     distinct = dict.fromkeys(prompts)
     if policy == "refuse":
-        refuse_unknown((None, None, prompt, bundle) for prompt in distinct)
-    report = ScopeReport()
+        refuse_unknown(((None, None, prompt, bundle) for prompt in distinct), match=match or match_scope)
+    name, lists = bundle.manifest.name, bundle.manifest.actions
+    report = ScopeReport(decided=decided or {})
+    if match is not None and lists is not None:
+        report.decided = {(name, prompt): match(prompt, lists) for prompt in distinct}
     for prompt in distinct:
-        report.judge(prompt, bundle.manifest.name, bundle.manifest.actions)
+        report.judge(prompt, name, lists)
     return report

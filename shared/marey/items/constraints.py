@@ -37,6 +37,8 @@ ROOT_PATH, POSE_KEYFRAME, EFFECTOR_TARGET = "root_path", "pose_keyframe", "effec
 SIDED = ("wrist", "ankle", "foot")
 EFFECTORS = (*(f"{side}_{joint}" for joint in SIDED for side in ("left", "right")), "head", "pelvis")
 """Joints that can have a target; `foot` is the joint at the toes."""
+POSE_FIELDS = ("motion", "joint_rotations", "root_height", "licence")
+"""Of a pose keyframe, those that say nothing of its time and place."""
 MAX_CONSTRAINTS = 64
 FASTEST = 8.0
 """Metres a second between two points of a path."""
@@ -61,6 +63,23 @@ def read_constraints(value: object) -> list[Constraint]:
         raise InvalidInput(f"{points:,} points in all; at most {MAX_POINTS:,}", where="constraints")
     _check_targets(read)
     return read
+
+
+def read_pose(value: object, where: str) -> Constraint:
+    """Return a checked pose: the fields of a pose keyframe without its frame and place.
+
+    Raises:
+        InvalidInput: with the field in `where`.
+    """
+    given = read_object(value, where)
+    for name in given:
+        if name not in POSE_FIELDS:
+            raise InvalidInput(
+                f"unknown field of a pose; known: {', '.join(POSE_FIELDS)}", where=f"{where}.{ascii(name)[1:-1][:40]}"
+            )
+    pose = _pose_keyframe({**{name: each for name, each in given.items() if each is not None}, "frame": 0}, where)
+    del pose["frame"]
+    return pose
 
 
 def parse_constraints(text: str | bytes) -> list[Constraint]:

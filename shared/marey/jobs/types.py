@@ -76,9 +76,13 @@ UNREAD = "a person moves"
 
 
 def prompts_of_ops(ops: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return the prompts that the text stage reads for operations, each once, in their order; `UNREAD` without any."""
+    return named_prompts(ops) or (UNREAD,)
+
+
+def named_prompts(ops: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     """Return the prompts of operations, each once, in their order."""
-    found = tuple(dict.fromkeys(str(op["prompt"]) for op in ops if op.get("prompt")))
-    return found or (UNREAD,)
+    return tuple(dict.fromkeys(str(op["prompt"]) for op in ops if op.get("prompt")))
 
 
 # --- submit ---

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from marey.core.errors import InvalidInput, MareyError
 from marey.core.extras import needs_extra
@@ -14,6 +14,7 @@ from marey.motion.files import read_limited
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.skeleton import Skeleton
 
 MAX_FILE = 4 * 2**20
 """Bytes of a file of constraints."""
@@ -98,6 +99,39 @@ def with_pose(constraint: Mapping[str, Any], pose: Mapping[str, Any]) -> dict[st
     rest = {name: value for name, value in constraint.items() if name != "motion"}
     placed = "root_position" in rest or "root_height" in rest
     return {**rest, **{name: value for name, value in pose.items() if not (placed and name == "root_height")}}
+
+
+def ordered_rotations(given: Any, skeleton: Skeleton, where: str) -> list[Sequence[float]]:
+    """Return checked `joint_rotations`, by joint or in order, in the order of a skeleton.
+
+    Raises:
+        InvalidInput: they are of another skeleton.
+    """
+    if isinstance(given, Mapping):
+        by_name = cast("Mapping[str, Sequence[float]]", given)
+        named = {plain_name(name): (name, turn) for name, turn in by_name.items()}
+        unknown = [name for plain, (name, _) in named.items() if plain not in skeleton.joint_names]
+        missing = [name for name in skeleton.joint_names if name not in named]
+        if unknown or missing:
+            said = f"unknown joint {unknown[0][:40]!r}" if unknown else f"the rotation of {missing[0]!r} is missing"
+            raise InvalidInput(
+                f"{said}: the pose is of another skeleton than the model's",
+                where=where,
+                hint=f"Its joints: {', '.join(skeleton.joint_names)}.",
+            )
+        return [named[name][1] for name in skeleton.joint_names]
+    turns: list[Sequence[float]] = list(given)
+    if len(turns) != len(skeleton):
+        raise InvalidInput(f"{len(turns)} rotations; the model's skeleton has {len(skeleton)} joints", where=where)
+    return turns
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a joint as skeletons write it: `left_wrist` is `L_wrist`."""
+    for long, short in (("left_", "L_"), ("right_", "R_")):
+        if name.startswith(long):
+            return short + name.removeprefix(long)
+    return name
 
 
 def beyond(frame: int, frames: int) -> str:

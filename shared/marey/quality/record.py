@@ -28,6 +28,7 @@ class Flag(StrEnum):
     SELF_CONTACT = "self-contact"
     OFF_PROMPT = "off-prompt"
     CONSTRAINT_MISSED = "constraint-missed"
+    POSTURE_JUMP = "posture-jump"
 
 
 class PromptMatch(BaseModel):
@@ -64,7 +65,7 @@ class MotionQuality(BaseModel):
     self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
     flags: list[Flag] = Field(
         description="Measures beyond their limits; `off-prompt`: a match under 0.5; `constraint-missed`: a constraint "
-        "beyond its bar."
+        "beyond its bar; `posture-jump`: a row of a timeline begins in a posture that the row before does not end in."
     )
     ok: bool = Field(description="True without flags.")
     match: PromptMatch | None = Field(default=None, description="Null for motions of earlier releases.")
@@ -78,6 +79,11 @@ class MotionQuality(BaseModel):
         if match.value is not None and match.value < SHOWN:
             flags.append(Flag.OFF_PROMPT)
         return self.model_copy(update={"match": match, "flags": flags, "ok": not flags})
+
+    def with_posture_jump(self) -> MotionQuality:
+        """Return the record with the flag of a timeline whose rows do not fit together."""
+        flags = [*(flag for flag in self.flags if flag is not Flag.POSTURE_JUMP), Flag.POSTURE_JUMP]
+        return self.model_copy(update={"flags": flags, "ok": False})
 
     def with_constraints(self, errors: Sequence[ConstraintError]) -> MotionQuality:
         """Return the record with the errors of constraints, and the flag of one that is missed."""

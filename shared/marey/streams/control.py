@@ -8,7 +8,8 @@ that the stream's row names.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast, get_args
 
 import redis
@@ -25,10 +26,17 @@ FIELD = b"m"
 
 @dataclass(frozen=True)
 class StreamControl:
-    """One control message; only a steer has a `prompt`, the new text."""
+    """One control message.
+
+    Attributes:
+        prompt: the new text of a steer; others have none.
+        pose: that a stop ends on: fields of a pose keyframe, without its frame, and with `joint_rotations` in the order
+            of the skeleton; None = it ends at once.
+    """
 
     kind: Kind
     prompt: str | None = None
+    pose: Mapping[str, Any] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -36,11 +44,13 @@ class StreamControl:
             raise InvalidInput(message, where="stream control")
         if (self.kind == "steer") != bool(self.prompt):
             raise InvalidInput("a steer needs a prompt, and other messages have none", where="stream control")
+        if self.pose is not None and self.kind != "stop":
+            raise InvalidInput("only a stop has a pose", where="stream control")
 
     def to_bytes(self) -> bytes:
         """Encode as JSON."""
-        message = {"kind": self.kind} if self.prompt is None else {"kind": self.kind, "prompt": self.prompt}
-        return json.dumps(message, ensure_ascii=False).encode()
+        given = {"kind": self.kind, "prompt": self.prompt, "pose": self.pose and dict(self.pose)}
+        return json.dumps({name: each for name, each in given.items() if each is not None}, ensure_ascii=False).encode()
 
     @classmethod
     def from_bytes(cls, data: bytes) -> StreamControl:
@@ -53,13 +63,15 @@ class StreamControl:
             message = json.loads(data)
         except (ValueError, RecursionError) as error:
             raise InvalidInput("not JSON", where="stream control") from error
-        if not isinstance(message, dict) or not set(cast("dict[str, Any]", message)) <= {"kind", "prompt"}:
+        if not isinstance(message, dict) or not set(cast("dict[str, Any]", message)) <= {"kind", "prompt", "pose"}:
             raise InvalidInput("not an object with `kind` and, for a steer, `prompt`", where="stream control")
         found = cast("dict[str, Any]", message)
-        kind, prompt = found.get("kind"), found.get("prompt")
+        kind, prompt, pose = found.get("kind"), found.get("prompt"), found.get("pose")
         if not isinstance(kind, str) or not isinstance(prompt, str | None):
             raise InvalidInput("`kind` and `prompt` are texts", where="stream control")
-        return cls(cast("Kind", kind), prompt)
+        if not isinstance(pose, dict | None):
+            raise InvalidInput("`pose` is not an object", where="stream control")
+        return cls(cast("Kind", kind), prompt, cast("dict[str, Any] | None", pose))
 
 
 class ControlQueue:

@@ -35,6 +35,7 @@ from marey.motion.edits.timeline_rows import prompt_after_cuts
 from marey.takes.model_edits import EditGenerator, check_generator, with_prompts
 from marey.takes.reviews import review
 from marey.tenants import DEFAULT_TENANT
+from marey.vocabulary.scope import ScopePolicy
 
 MOST_CHARACTERS = 20_000
 """Characters of the prompt of joined motions."""
@@ -77,12 +78,14 @@ class NewEdit:
         motion: to edit.
         ops: operations as in JSON; `with` is the id of another motion.
         generator: generates frames, for operations that need a model.
+        scope: treatment of its prompts with actions that the model does not know.
         name, comment, priority, keep_days, idempotency_key, body_sha256, traceparent: of the job; see `NewJob`.
     """
 
     motion: UUID
     ops: Sequence[Mapping[str, Any]]
     generator: EditGenerator | None = None
+    scope: ScopePolicy = "ignore"
     tenant: str = DEFAULT_TENANT
     name: str | None = None
     comment: str | None = None
@@ -125,6 +128,7 @@ def submit_edit(conn: sa.Connection, edit: NewEdit) -> SubmittedJob:
             body_sha256=edit.body_sha256,
             traceparent=edit.traceparent,
             kind=JobKind.EDIT,
+            scope="ignore" if edit.generator is None else edit.scope,
         ),
     )
     if not submitted.replayed:
@@ -265,7 +269,7 @@ def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], ed
         index=number,
         seed=source.seed,
         edits=Edits(tuple(step.as_json() for step in steps), tuple(_sources(edit.motion, steps))),
-        **(KINEMATIC if edit.generator is None else edit.generator.columns(steps)),
+        **(KINEMATIC if edit.generator is None else edit.generator.columns(steps, edit.scope)),
     )
 
 

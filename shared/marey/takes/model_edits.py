@@ -9,14 +9,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from marey.bundles.limits import edit_settings
+from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidInput
 from marey.core.sides import swap_sides
 from marey.items.prompts import check_prompt
 from marey.jobs import MotionRow
 from marey.jobs.generators import GeneratorCapabilities
-from marey.jobs.types import prompts_of_ops
+from marey.jobs.types import named_prompts, prompts_of_ops
 from marey.motion.edits.steps import Step
 from marey.registry import find_model
+from marey.text.keys import scope_key
+from marey.vocabulary.scope import ScopePolicy, match_scope, scope_of_prompts
 
 CUTS = frozenset({"trim", "split", "loop", "reverse"})
 """Operations after which another prompt of several may be the last."""
@@ -39,8 +42,11 @@ class EditGenerator:
         """Terms of the weights."""
         return self.capabilities.bundle.manifest.licence
 
-    def columns(self, steps: Sequence[Step]) -> dict[str, Any]:
+    def columns(self, steps: Sequence[Step], policy: ScopePolicy) -> dict[str, Any]:
         """Return the fields of an item with these steps that say where and how it runs.
+
+        Args:
+            policy: of prompts with unknown actions.
 
         Raises:
             InvalidInput: an unknown setting, or a value out of range.
@@ -55,7 +61,20 @@ class EditGenerator:
             "text_key": self.capabilities.several_key(prompts_of_ops(ops)),
             "text_batch_key": self.capabilities.text_batch_key,
             "settings": settings,
+            **({} if policy == "ignore" else self._scope(named_prompts(ops))),
         }
+
+    def _scope(self, prompts: Sequence[str]) -> dict[str, Any]:
+        """Return the scope of the prompts of an item by their words, and the key of the encoder's verdict if that
+        decides."""
+        bundle, lists = self.capabilities.bundle, self.capabilities.bundle.manifest.actions
+        if lists is None or not prompts:
+            return {}
+        scope = scope_of_prompts([match_scope(prompt, lists) for prompt in prompts])
+        if scope.left is None or not judges_meaning(self.capabilities.text):
+            return {"scope": scope.as_json()}
+        key = scope_key("\n".join(prompts), bundle.reference, lists, of_edit=True)
+        return {"scope": scope.as_json(), "scope_key": key}
 
 
 def needs_model(steps: Sequence[Step]) -> bool:

@@ -60,7 +60,7 @@ def _rewriter_parts(spec: TextSpec) -> list[str | int]:
     return parts
 
 
-def scope_key(prompt: str, bundle: str, lists: ActionLists, *, in_rows: bool = False) -> str:
+def scope_key(prompt: str, bundle: str, lists: ActionLists, *, in_rows: bool = False, of_edit: bool = False) -> str:
     """Return the key under which the encoder's verdict of a prompt is stored.
 
     Args:
@@ -68,10 +68,11 @@ def scope_key(prompt: str, bundle: str, lists: ActionLists, *, in_rows: bool = F
         bundle: the exact bundle, which names the encoder.
         lists: its actions.
         in_rows: the prompt is the text form of a timeline, whose rows are judged one by one.
+        of_edit: the prompt is the lines of the prompts of an edit, which are judged one by one.
     """
     actions = [lists.supported, lists.single_take, lists.tried]
     parts = [VERSION, MEANING_VERSION, load_vocabulary().sha256, bundle, actions, prompt]
-    parts += ["rows"] if in_rows else []
+    parts += ["rows"] if in_rows else ["edit"] if of_edit else []
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 

@@ -88,7 +88,7 @@ class Scope:
     Attributes:
         by: `words`, or `encoder` where the words left it undecided.
         left: what the words leave undecided; None = nothing, or the encoder has decided it.
-        rows: of the prompts of a timeline, of which this is the scope together.
+        rows: of the prompts of a timeline or an edit, of which this is the scope together.
     """
 
     actions: tuple[NamedAction, ...]
@@ -122,11 +122,16 @@ def read_scope(record: Mapping[str, Any]) -> Scope:
 
 
 def scope_of_rows(rows: Sequence[Scope]) -> Scope:
-    """Return the scope of the prompts of a timeline together."""
+    """Return the scope of several prompts together."""
     actions = tuple(dict.fromkeys(action for row in rows for action in row.actions))
     flags: tuple[Flag, ...] = tuple(dict.fromkeys(flag for row in rows for flag in row.flags))
     by = "encoder" if any(row.by == "encoder" for row in rows) else "words"
     return Scope(actions, flags, by=by, left=next((row.left for row in rows if row.left), None), rows=tuple(rows))
+
+
+def scope_of_prompts(prompts: Sequence[Scope]) -> Scope:
+    """Return the scope of the prompts of an edit together: of one prompt it is its own."""
+    return prompts[0] if len(prompts) == 1 else scope_of_rows(prompts)
 
 
 class ScopeMatcher:

@@ -22,7 +22,7 @@ from marey.api.evaluations.schemas import NewEvaluationBody
 from marey.api.jobs.schemas import JobPatch, NewJobBody
 from marey.api.reference import EXAMPLES
 from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
-from marey.api.streams.schemas import NewStreamBody
+from marey.api.streams.schemas import EndStreamBody, NewStreamBody
 from marey.api.takes.schemas import NewRerollBody, NewReviewBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.settings import Settings
@@ -36,7 +36,7 @@ from marey.text_service.routes import ParseBody
 BODIES = {
     model.__name__: model
     for model in (
-        *(NewJobBody, JobPatch, NewReviewBody, NewRerollBody, NewEditBody, NewStreamBody, ParseBody),
+        *(NewJobBody, JobPatch, NewReviewBody, NewRerollBody, NewEditBody, NewStreamBody, EndStreamBody, ParseBody),
         *(NewEvaluationBody, NewScheduleBody, SchedulePatch, NewWebhookBody, WebhookPatch),
     )
 }

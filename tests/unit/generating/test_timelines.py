@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
-from marey.generation.candidates import DrawPlan, draw_clips
+from marey.generation.candidates import DrawPlan, best_clips, draw_clips
 from marey.generation.export import finish
 from marey.generation.port import Limits, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
-from marey.generation.shots.timelines import even_parts, gaps_of, generate_timelines, plan_timeline
+from marey.generation.shots.timelines import even_parts, gaps_of, generate_timelines, plan_timeline, row_requests
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.items.values import MAX_SEED
 from marey.registry import get_model, model_names, resolve
@@ -221,13 +221,49 @@ def test_the_manifest_names_rows_transitions_and_gaps(generator: Any) -> None:
     assert clip.frames == 359  # as long as 180 frames at 20 a second
 
 
-def test_candidates_are_of_the_whole(generator: Any) -> None:
-    request = asked_of(generator, WALK, 7)
+def test_candidates_are_of_each_row(generator: Any) -> None:
+    request = asked_of(generator, "0-3 a person walks; 3-5 a person waves; 5-16 a person bows", 7)
+    assert request.timeline is not None
     settings = generator.settings({})
-    (best,) = draw_clips(generator, [request], settings, DrawPlan(best_of=2))
-    chosen = best.manifest["selection"]["candidates"][best.manifest["selection"]["chosen"]]
-    (alone,) = draw_clips(generator, [replace(request, seed=chosen["seed"])], settings, DrawPlan())
-    np.testing.assert_array_equal(best.joints, alone.joints)
+    (best,) = draw_clips(generator, [request], settings, DrawPlan(best_of=3))
+    assert "selection" not in best.manifest
+    record = best.manifest["timeline"]["rows"]
+    seeds: list[int] = []
+    for row, alone in zip(record, row_requests(request, generator.limits), strict=True):
+        choice = row["selection"]
+        assert (choice["best_of"], len(choice["candidates"])) == (3, 3)
+        made = draw_clips(generator, [alone], settings, DrawPlan(best_of=3))
+        assert next(made).manifest["selection"] == choice  # as a motion of its own
+        seeds.append(choice["candidates"][choice["chosen"]]["seed"])
+    assert [row["seed"] for row in record] == seeds
+    rows = tuple(replace(row, seed=seed) for row, seed in zip(request.timeline, seeds, strict=True))
+    (same,) = draw_clips(generator, [replace(request, timeline=rows)], settings, DrawPlan())
+    np.testing.assert_array_equal(best.joints, same.joints)
+
+
+def test_the_best_rows_of_a_timeline_do_not_depend_on_the_batch(generator: Any) -> None:
+    first = asked_of(generator, WALK, 7)
+    ask = [first, Request(first.text, 3, 60), asked_of(generator, "0-2 run; 2-4 kick", 1)]
+    settings, plan = generator.settings({}), DrawPlan(best_of=2, redraws=1)
+    together = list(draw_clips(generator, ask, settings, plan))
+    for clip, request in zip(together, ask, strict=True):
+        (alone,) = draw_clips(generator, [request], settings, plan)
+        np.testing.assert_array_equal(clip.joints, alone.joints)
+        assert clip.manifest == alone.manifest
+    assert "selection" in together[1].manifest
+
+
+def test_a_dropped_timeline_has_no_best_rows_and_others_stay(generator: Any) -> None:
+    ask = [asked_of(generator, WALK, seed) for seed in (1, 2)]
+    settings, plan = generator.settings({}), DrawPlan(best_of=2)
+    control = FakeControl(0, after=0.0)
+    gone, other = best_clips(generator, ask, settings, plan, control=control)
+    assert gone is None
+    assert other is not None
+    (alone,) = draw_clips(generator, ask[1:], settings, plan)
+    np.testing.assert_array_equal(other.joints, alone.joints)
+    assert control.shares == sorted(control.shares)
+    assert control.shares[-1] == 1.0
 
 
 def test_a_model_that_keeps_no_frames_refuses(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import closed
 from marey.motion.edits.loop_feet import onsets, standing_spans, stands, supports
 from marey.motion.edits.loop_search import cycles
+from marey.motion.edits.steps import read_steps
+from marey.motion.edits.timeline_rows import cut_rows, prompt_after_cuts
 from marey.motion.feet import find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import solve_pose
@@ -224,3 +227,20 @@ def test_slower_blends_are_tried_before_a_motion_is_refused(monkeypatch):
         edit(walked(), [LOOP])
     assert asked == sorted(asked)
     assert set(asked) == {0.0, 0.04 * 6}
+
+
+def test_a_loop_of_a_timeline_has_the_rows_of_its_cycle():
+    clip, rows = walked(), [(0.0, 2.0, "a person walks"), (2.0, 6.0, "a person walks on")]
+    told = [{"start": start, "end": end, "prompt": text} for start, end, text in rows]
+    manifest: dict[str, Any] = {
+        "prompt": "0-2 a person walks; 2-6 a person walks on",
+        "prompts": [[0, "a person walks"], [40, "a person walks on"]],
+        "timeline": {"rows": told, "transitions": [], "gaps": []},
+    }
+    (loop,) = edit(replace(clip, manifest=manifest), [LOOP])
+    first, last = loop.manifest["loop"]["source_frames"]
+    expected = cut_rows(manifest, first, last, clip.fps)
+    assert loop.manifest["prompt"] == expected["prompt"] != manifest["prompt"]
+    assert loop.manifest.get("timeline") == expected.get("timeline")
+    steps = read_steps([LOOP])
+    assert prompt_after_cuts(manifest, manifest["prompt"], steps, clip.frames, clip.fps) == (manifest["prompt"], steps)

@@ -239,7 +239,15 @@ def with_rows() -> MotionClip:
         ([{"op": "mirror"}, {"op": "trim", "from": 1}], "0-1 a person bows; 1.5-2 a person waves right"),
         ([{"op": "trim", "from": 1}, {"op": "mirror"}], "0-1 a person bows; 1.5-2 a person waves right"),
         ([{"op": "smooth", "hz": 6}], "0-1 a person walks; 1-2 a person bows; 2.5-3 a person waves left"),
-        ([{"op": "trim", "to": "f39"}, {"op": "reverse"}], "0-1 a person walks; 1-2 a person bows"),
+        ([{"op": "trim", "to": "f39"}, {"op": "reverse"}], "0-1 a person bows; 1-2 a person walks"),
+        ([{"op": "reverse"}], "0-0.5 a person waves left; 1-2 a person bows; 2-3 a person walks"),
+        ([{"op": "reverse"}, {"op": "trim", "to": 1.4}], "0-0.5 a person waves left; 1-1.45 a person bows"),
+        ([{"op": "speed", "factor": 2}], "0-0.5 a person walks; 0.5-1 a person bows; 1.25-1.5 a person waves left"),
+        ([{"op": "speed", "factor": 0.5}], "0-2 a person walks; 2-4 a person bows; 5-5.95 a person waves left"),
+        (
+            [{"op": "speed", "factor": 2}, {"op": "trim", "from": "f10"}],
+            "0-0.5 a person bows; 0.75-1 a person waves left",
+        ),
     ],
 )
 def test_a_cut_timeline_says_what_is_left(ops: list[dict[str, Any]], prompt: str):
@@ -249,11 +257,9 @@ def test_a_cut_timeline_says_what_is_left(ops: list[dict[str, Any]], prompt: str
     if ";" not in prompt:
         assert (about["rewritten"], about["graph"]) == (prompt, {"of": prompt})
         assert not {"timeline", "prompts"} & set(about)
-    elif ops[-1]["op"] != "reverse":
+    else:
         assert timeline_text(read_timeline_rows(about["timeline"]["rows"])) == prompt
         assert [text for _, text in about["prompts"]] == [row["prompt"] for row in about["timeline"]["rows"]]
-    else:
-        assert "timeline" not in about
     told, rest = prompt_after_cuts(source.manifest, source.manifest["prompt"], read_steps(ops), 60, 20.0)
     assert prompt_of(told, rest, lambda step: "") == prompt
 
@@ -263,6 +269,16 @@ def test_spans_of_a_cut_timeline_are_moved_and_matches_of_whole_rows_dropped():
     assert [(row["start"], row["end"], row["match"]) for row in record["rows"]] == [(0.0, 0.9, None), (1.4, 1.9, None)]
     assert record["transitions"] == [{"start": 0.0, "end": 0.1, "seed": 4}]
     assert record["gaps"] == [{"start": 0.9, "end": 1.4}]
+
+
+def test_spans_of_a_timeline_that_is_played_backwards_or_faster_follow_their_frames():
+    record = one(with_rows(), {"op": "reverse"}).manifest["timeline"]
+    assert record["transitions"] == [{"start": 1.8, "end": 2.0, "seed": 4}]
+    assert record["gaps"] == [{"start": 0.5, "end": 1.0}]
+    assert [row["match"] for row in record["rows"]] == [None] * 3
+    faster = one(with_rows(), {"op": "speed", "factor": 2}).manifest["timeline"]
+    assert faster["transitions"] == [{"start": 0.5, "end": 0.6, "seed": 4}]
+    assert one(with_rows(), {"op": "reverse"}, {"op": "reverse"}).manifest["prompt"] == with_rows().manifest["prompt"]
 
 
 def test_a_moment_beyond_the_motion_leaves_the_prompt_to_the_worker():

@@ -13,7 +13,8 @@ import pytest
 from marey.bundles import BundleWriter, TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.timeline import read_timeline, timeline_text
-from marey.jobs import Claim, ClaimedItem, ItemStage
+from marey.jobs import Claim, ClaimedItem, Edits, ItemStage
+from marey.jobs.types import UNREAD
 from marey.runtime.handler import Batch, Failed, Outcome, TextDone
 from marey.text.features import TextFeatures
 from marey.text.keys import feature_key, resolve, scope_key
@@ -226,6 +227,39 @@ def test_the_rows_of_a_timeline_are_judged_one_by_one(listed: str) -> None:
     (clear,) = judge_items(listed, "warn", timeline("a person walks", "a person walks"))
     assert isinstance(clear, TextDone)
     assert clear.scope is None
+
+
+def edit(*prompts: str) -> tuple[ClaimedItem, ...]:
+    """An item that edits a motion: an extension by each prompt, and a repaint without one."""
+    ops = [{"op": "extend", "seconds": 1, "prompt": prompt} for prompt in prompts]
+    key = several_key(feature_key(text, resolve(TextSpec())) for text in prompts or (UNREAD,))
+    (item,) = items("a person stumbles, then " + ", then ".join(prompts), key=key)
+    return (replace(item, edits=Edits((*ops, {"op": "repaint", "from": 1}), (uuid4(),))),)
+
+
+def test_the_prompts_of_an_edit_are_judged_one_by_one(listed: str) -> None:
+    (done,) = judge_items(listed, "warn", edit("a person walks", "a wave of nausea"))
+    assert isinstance(done, TextDone)
+    assert done.scope is not None
+    assert (done.scope.scope["verdict"], done.scope.scope["by"]) == ("unknown", "encoder")
+    assert [row["verdict"] for row in done.scope.scope["rows"]] == ["known", "unknown"]
+    assert done.scope.key == scope_key("a person walks\na wave of nausea", listed, LISTS, of_edit=True)
+    (one,) = judge_items(listed, "warn", edit("a low bow"))
+    assert isinstance(one, TextDone)
+    assert one.scope is not None
+    assert (one.scope.scope["verdict"], "rows" in one.scope.scope) == ("known", False)
+    assert one.scope.key == scope_key("a low bow", listed, LISTS, of_edit=True) != scope_key("a low bow", listed, LISTS)
+    (failed,) = judge_items(listed, "refuse", edit("a wave of nausea"))
+    assert isinstance(failed, Failed)
+    named = "names an action that the model does not know: 'a wave of nausea' (no-action)"
+    assert failed.problem.message == f"the prompt {named}"
+
+
+def test_an_edit_without_a_prompt_or_with_clear_words_gets_no_verdict(listed: str) -> None:
+    for asked in (edit(), edit("a person walks")):
+        (done,) = judge_items(listed, "refuse", asked)
+        assert isinstance(done, TextDone)
+        assert done.scope is None
 
 
 def test_prompts_that_are_not_examined_and_bundles_without_lists_get_no_verdict(listed: str, bundle: str) -> None:

@@ -13,6 +13,7 @@ from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.prompt_frames import prompts_of
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
+from marey.quality.postures import posture_jumps
 from marey.quality.record import Flag, PromptMatch
 from marey.selector.records import match_of
 from marey.text.actions import split_actions
@@ -33,8 +34,10 @@ def judged(clip: MotionClip) -> MotionClip:
         return clip
     if "travel" in about and np.ptp(clip.root[:, [0, 2]], axis=0).max() < STAYS:
         quality = quality.model_copy(update={"flags": [flag for flag in quality.flags if flag is not Flag.SKATING]})
-    record = quality.with_match(_match(clip)).model_dump(mode="json")
-    return replace(clip, manifest={**about, QUALITY: record})
+    quality = quality.with_match(_match(clip))
+    if posture_jumps(clip):
+        quality = quality.with_posture_jump()
+    return replace(clip, manifest={**about, QUALITY: quality.model_dump(mode="json")})
 
 
 def _match(clip: MotionClip) -> PromptMatch:

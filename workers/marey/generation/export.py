@@ -13,6 +13,7 @@ from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.finish import CLEANED, finish_motion
 from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
+from marey.quality.postures import posture_jumps
 from marey.quality.record import PromptMatch
 from marey.selector.records import match_of
 from marey.vocabulary.scope import match_scope
@@ -81,6 +82,8 @@ def judged(clip: MotionClip, request: Request) -> MotionClip:
     if quality is None:
         return clip
     quality = quality.with_match(_match(clip, request))
+    if posture_jumps(clip):
+        quality = quality.with_posture_jump()
     return replace(clip, manifest={**clip.manifest, QUALITY: quality.model_dump(mode="json")})
 
 

@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from marey.items.values import MAX_SEED
 from marey.text.features import TextFeatures
 
@@ -20,12 +23,16 @@ class TimedText:
         end: in seconds.
         text: of the prompt.
         scope: of the prompt; None = by its words.
+        seed: of the row; None = derived from the seed of the whole.
+        made: (t, D) features of the first window of the row, made before; None = they are generated.
     """
 
     start: float
     end: float
     text: TextFeatures = field(repr=False)
     scope: Mapping[str, Any] | None = None
+    seed: int | None = None
+    made: NDArray[np.float32] | None = field(default=None, repr=False, compare=False)
 
 
 def part_seed(seed: int, part: str, number: int) -> int:

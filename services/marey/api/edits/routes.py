@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Mapping
 from typing import Annotated
 from uuid import UUID
 
+from anyio import from_thread
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import JSONResponse
 
@@ -28,6 +30,7 @@ from marey.http.schemas import IdempotencyKey
 from marey.motion.edits.steps import prompts_of_steps, read_steps
 from marey.runtime.logs import logger
 from marey.vocabulary.report import ScopeReport
+from marey.vocabulary.scope import Scope
 
 log = logger(__name__)
 
@@ -64,10 +67,12 @@ def edit_motion(
         idempotency_key=idempotency_key,
         body_sha256=_sha256(motion, body) if idempotency_key else None,
         traceparent=tracing.current(),
-        **body.model_dump(exclude={"ops", "model", "settings", "scope"}),
+        **body.model_dump(exclude={"ops", "model", "settings"}),
     )
     report = _examine(body, new)
     if validate_only:
+        if report is not None and report.left and (decided := from_thread.run(shared.texts.scopes, report.left)):
+            report = _examine(body, new, decided)
         return JSONResponse(_check(conn, new, report).model_dump(mode="json"))
     submitted = takes.submit_edit(conn, new)
     row = jobs.get_job(conn, key.tenant, submitted.id)
@@ -91,8 +96,13 @@ def revert_motion(motion: UUID, conn: Connection, key: Submitter) -> MotionView:
     return MotionView.of(source)
 
 
-def _examine(body: NewEditBody, new: takes.NewEdit) -> ScopeReport | None:
+def _examine(
+    body: NewEditBody, new: takes.NewEdit, decided: Mapping[tuple[str, str], Scope] | None = None
+) -> ScopeReport | None:
     """Return the report on the scopes of the prompts that the model reads; None if there are none to examine.
+
+    Args:
+        decided: the encoder's verdicts, by bundle and prompt; None = judged by words alone.
 
     Raises:
         OutOfScope: scope `refuse`, and prompts name actions that the model does not know.
@@ -100,7 +110,7 @@ def _examine(body: NewEditBody, new: takes.NewEdit) -> ScopeReport | None:
     prompts = prompts_of_steps(read_steps(body.ops))
     if new.generator is None or not prompts:
         return None
-    return examine_prompts(prompts, new.generator.capabilities.bundle, body.scope)
+    return examine_prompts(prompts, new.generator.capabilities.bundle, body.scope, decided=decided)
 
 
 def _check(conn: Connection, new: takes.NewEdit, report: ScopeReport | None) -> CheckedEditView:

@@ -11,7 +11,7 @@ from marey.api.context import Context
 from marey.api.stream_hub import Hub
 from marey.api.streams import service
 from marey.api.streams.socket_writer import SocketWriter
-from marey.core.errors import Busy, MareyError, TooLarge
+from marey.core.errors import Busy, InvalidInput, MareyError, TooLarge
 from marey.items.prompts import check_prompt
 from marey.streams.control import StreamControl
 from marey.tenants import ApiKey
@@ -69,6 +69,10 @@ class ControlMessages:
         if len(message) > MAX_BYTES:
             raise TooLarge(f"the message is over {MAX_BYTES // 1024} KiB", where="message")
         control = StreamControl.from_bytes(message)
+        if control.pose is not None:
+            raise InvalidInput(
+                "a message has no pose", where="pose", hint="`POST /v1/streams/{id}/end` ends a stream on a pose."
+            )
         if control.prompt is not None:
             control = StreamControl("steer", check_prompt(control.prompt, where="prompt"))
         return control

@@ -6,13 +6,15 @@ from typing import Annotated
 from uuid import UUID
 
 from fastapi import APIRouter, Query, Response, WebSocket
+from fastapi.concurrency import run_in_threadpool
 
-from marey import db, streams
+from marey import streams
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared
 from marey.api.streams import service
 from marey.api.streams.accept import accept_connection
-from marey.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
+from marey.api.streams.end_pose import read_end_pose
+from marey.api.streams.schemas import EndStreamBody, NewStreamBody, StreamDetailView, StreamView
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, Limit, PageView
 
@@ -52,13 +54,23 @@ def get_stream(stream: UUID, shared: Shared, conn: Connection, key: Reader) -> S
     return service.detail(conn, shared, streams.get_stream(conn, key.tenant, stream))
 
 
+@router.post("/{stream}/end", status_code=202)
+async def end_stream(stream: UUID, body: EndStreamBody, shared: Shared, key: Submitter) -> StreamDetailView:
+    """End a live stream on a pose, into which its last second passes; its clip ends in the pose, too.
+
+    A waiting stream ends at once; 409 if it has ended.
+    """
+    service.hub_of(shared)
+    pose = await read_end_pose(shared, key, stream, body.pose)
+    row = await run_in_threadpool(service.stop_on, shared, key, stream, pose)
+    return await run_in_threadpool(service.current, shared, row)
+
+
 @router.delete("/{stream}", status_code=202)
 def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailView:
     """Ask a live stream to end; a waiting one ends at once, and one that has ended stays as it is."""
     service.hub_of(shared)
-    row = service.stop(shared, key, stream)
-    with db.transaction(shared.engine) as conn:
-        return service.detail(conn, shared, row)
+    return service.current(shared, service.stop(shared, key, stream))
 
 
 @router.websocket("/{stream}")

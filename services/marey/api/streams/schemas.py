@@ -52,6 +52,18 @@ class NewStreamBody(BaseModel):
     seconds: float = Field(MAX_SECONDS, ge=MIN_SECONDS, le=MAX_SECONDS, description="Seconds after which it ends.")
 
 
+class EndStreamBody(BaseModel):
+    """The end of a live stream."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    pose: dict[str, Any] = Field(
+        description="Pose of the last frame, as the fields of a pose keyframe: `motion` with the `id` of a stored "
+        "motion and a `frame` of it, or `joint_rotations` and `root_height`. The stream shows it a second later, where "
+        "the body is and faces then.",
+    )
+
+
 class SkeletonView(View):
     """The joints that frames rotate."""
 

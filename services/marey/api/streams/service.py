@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -104,9 +105,7 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: StreamControl) 
         Unreachable: Redis or the database does not answer.
     """
     with transaction(shared.engine) as conn:
-        row = get_stream(conn, key.tenant, stream)
-        if is_over(row):
-            raise Conflict(f"the stream has ended: {row.reason}", where=f"stream {stream}")
+        _need_open(get_stream(conn, key.tenant, stream))
         if control.kind in ("pause", "resume"):
             note(conn, key, f"stream.{control.kind}", stream)
     if control.kind == "stop":
@@ -115,7 +114,36 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: StreamControl) 
         ControlQueue(hub_of(shared).redis, str(stream)).send(control)
 
 
-def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
+def stop_on(shared: Context, key: ApiKey, stream: UUID, pose: Mapping[str, Any]) -> StreamRow:
+    """Ask a stream to end on a pose, and return its new state; as `stop`.
+
+    Raises:
+        NotFound: the tenant has no such stream.
+        Conflict: it has ended.
+        Unreachable: Redis or the database does not answer.
+    """
+    with transaction(shared.engine) as conn:
+        _need_open(get_stream(conn, key.tenant, stream))
+    return stop(shared, key, stream, StreamControl("stop", pose=pose))
+
+
+def current(shared: Context, row: StreamRow) -> StreamDetailView:
+    """Return `detail` in a transaction of its own."""
+    with transaction(shared.engine) as conn:
+        return detail(conn, shared, row)
+
+
+def _need_open(row: StreamRow) -> None:
+    if is_over(row):
+        raise Conflict(f"the stream has ended: {row.reason}", where=f"stream {row.id}")
+
+
+def stop(
+    shared: Context,
+    key: ApiKey,
+    stream: UUID,
+    control: StreamControl = StreamControl("stop"),
+) -> StreamRow:
     """Ask a stream to end, and return its new state. A waiting one ends at once; one that has ended stays so.
 
     A worker may take the stream at the same moment. Both lock its row, and check again under the lock: if this
@@ -132,7 +160,7 @@ def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
         end_stream(conn, stream, NEVER_TAKEN, STOPPED)
         row = get_stream(conn, key.tenant, stream)
     if not is_over(row):
-        ControlQueue(hub_of(shared).redis, str(stream)).send(StreamControl("stop"))
+        ControlQueue(hub_of(shared).redis, str(stream)).send(control)
     return row
 
 

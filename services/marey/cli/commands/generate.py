@@ -26,7 +26,9 @@ OFF_PROMPT = "off-prompt"
 """The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
 SHOWN = 0.5
 """The match from which on a row of a timeline shows its prompt."""
-CONSTRAINT_MISSED = "constraint-missed"
+CONSTRAINT_MISSED, POSTURE_JUMP = "constraint-missed", "posture-jump"
+SAID_APART = (OFF_PROMPT, CONSTRAINT_MISSED, POSTURE_JUMP)
+"""Flags that have sentences of their own."""
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -147,8 +149,17 @@ def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
     if quality is None:
         return
     about = f"{line['prompt']!r}, seed {line['seed']}"
-    if faults := [flag for flag in quality["flags"] if flag not in (OFF_PROMPT, CONSTRAINT_MISSED)]:
+    if faults := [flag for flag in quality["flags"] if flag not in SAID_APART]:
         console.say(f"{about}: the motion is {', '.join(faults)}.")
+    if POSTURE_JUMP in quality["flags"]:
+        from marey.quality.postures import posture_jumps
+
+        for jump in posture_jumps(clip):
+            way = "stand up" if jump["rise"] > 0 else "go down"
+            console.say(
+                f"{about}: at {jump['start']:g} s the person would have to {way} within "
+                f"{jump['end'] - jump['start']:.1f} s. Give that a row of its own, or leave a gap of a second or two."
+            )
     if OFF_PROMPT in quality["flags"]:
         rows: list[dict[str, Any]] = clip.manifest.get("timeline", {}).get("rows", [])
         missed = [row for row in rows if row["match"] is not None and row["match"] < SHOWN]

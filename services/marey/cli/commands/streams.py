@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,6 +46,14 @@ def stream(
         Path | None,
         typer.Option("--fetch", help="Wait for the clip after the end, and fetch its files into this folder."),
     ] = None,
+    end_pose: Annotated[
+        str | None,
+        typer.Option(
+            "--end-pose",
+            metavar="MOTION:FRAME",
+            help="When you stop the stream, let it end on this frame of an npz file or of a motion of the server.",
+        ),
+    ] = None,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
@@ -70,15 +79,17 @@ def stream(
         from marey.client.recording import check_recording
 
         check_recording(output, overwrite=overwrite)
+    from marey.cli.live.end_pose import read_end_pose
     from marey.client import Client
 
     with Client() as client:
+        pose = None if end_pose is None else read_end_pose(client, end_pose)
         with Interrupts() as interrupts:
             live = client.streams.open(
                 prompt, model=model, seed=seed, seconds=seconds, name=name, slow=slow.value, record=output,
                 overwrite=overwrite,
             )  # fmt: skip
-            result, error = _follow(live, interrupts, as_json=as_json)
+            result, error = _follow(live, interrupts, pose, as_json=as_json)
         _write_result(result, as_json=as_json)
         if error is not None:
             raise error
@@ -90,11 +101,13 @@ def stream(
             _fetch(client, result, fetch, overwrite=overwrite, as_json=as_json)
 
 
-def _follow(live: LiveStream, interrupts: Interrupts, *, as_json: bool) -> tuple[dict[str, Any], MareyError | None]:
+def _follow(
+    live: LiveStream, interrupts: Interrupts, pose: Mapping[str, Any] | None, *, as_json: bool
+) -> tuple[dict[str, Any], MareyError | None]:
     """Follow a stream to its end; return its output line, and its error, which does not undo what arrived before."""
     from marey.cli.live.follow import Follower
 
-    follower = Follower(live, interrupts, as_json=as_json)
+    follower = Follower(live, interrupts, pose=pose, as_json=as_json)
     try:
         follower.run()
     except MareyError as error:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console
@@ -11,7 +13,7 @@ from marey.cli.live.pace import Pace
 from marey.cli.live.screen import Screen
 from marey.cli.live.steering import HELP, Command, Interrupts, StdinLines, command_of
 from marey.client import Frame, FramesMissing, StreamChanged, StreamProblem
-from marey.core.errors import InvalidInput, MareyError
+from marey.core.errors import Conflict, InvalidInput, MareyError
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -32,16 +34,20 @@ class Follower:
 
     Args:
         live: the stream.
+        pose: that the stream ends on when it is stopped; see `LiveStream.stop`.
         as_json: also print each event as a line of JSON on stdout.
 
     Attributes:
         frames: number of frames up to the last one that arrived, missing ones included.
     """
 
-    def __init__(self, live: LiveStream, interrupts: Interrupts, *, as_json: bool) -> None:
+    def __init__(
+        self, live: LiveStream, interrupts: Interrupts, *, pose: Mapping[str, Any] | None = None, as_json: bool
+    ) -> None:
         self.frames = 0
         self._live = live
         self._interrupts = interrupts
+        self._pose = pose
         self._as_json = as_json
         self._screen = Screen()
         self._lines = StdinLines()
@@ -50,6 +56,7 @@ class Follower:
         self._sent = 0.0
         self._stopping = False
         self._stopped_on = 0  # the connection that took the stop
+        self._accepted = False  # the server has answered a stop on a pose
         self._broken_on: int | None = None  # number of connections when the last break was reported
         self._reported: tuple[str | None, int | None, str | None] = (None, None, None)  # state, position, waits_for
         self._prompts = 0  # how many were reported
@@ -147,10 +154,14 @@ class Follower:
             self._stopping = True
             self._outbox.clear()
             self._screen.say("Stopping; Ctrl-C again leaves at once.")
-        now, stop = time.monotonic(), self._stopping and self._stopped_on != self._live.connections
+        now, stopped = time.monotonic(), self._accepted or self._stopped_on == self._live.connections
+        stop = self._stopping and not stopped
         if now - self._sent < MESSAGE_SECONDS or not (self._outbox or stop):
             return
         self._sent = now
+        if not self._outbox and self._pose is not None:
+            self._stop_on(self._pose)
+            return
         command = self._outbox[0] if self._outbox else Command("stop")
         if not self._live.try_send(command.kind, command.prompt):
             return
@@ -158,6 +169,12 @@ class Follower:
             self._outbox.popleft()
         else:
             self._stopped_on = self._live.connections
+
+    def _stop_on(self, pose: Mapping[str, Any]) -> None:
+        """Send the stop with the pose, once for all connections: the answer says that the server has it."""
+        self._pose, self._accepted = None, True
+        with suppress(Conflict):  # it has ended by itself
+            self._live.stop(pose)
 
     def _handle_line(self, line: str) -> None:
         shown = f"› {line.strip()}"

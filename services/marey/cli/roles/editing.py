@@ -104,9 +104,12 @@ def model_for(
         raise needs_extra("worker", error) from error
     config = settings_of_process()
     chosen = choose_bundle(bundle or config.default_model, config=config)
-    report = examine_prompts(prompts_of_steps(steps), chosen, scope) if prompts_of_steps(steps) else None
-    editor = OneShot(chosen, config).editor(edit_settings(chosen, settings))
-    return editor, () if report is None else report.warnings()
+    given, prompts = edit_settings(chosen, settings), prompts_of_steps(steps)
+    if prompts and scope == "refuse":
+        examine_prompts(prompts, chosen, scope)  # by words, before the model is loaded
+    studio = OneShot(chosen, config)
+    report = examine_prompts(prompts, chosen, scope, match=studio.match_scope) if prompts else None
+    return studio.editor(given), () if report is None else report.warnings()
 
 
 def loop(clip: MotionClip, where: str) -> MotionClip:

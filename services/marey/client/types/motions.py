@@ -71,7 +71,8 @@ class MotionQuality(Result):
     """Deepest that limbs, trunk and head pass into each other, millimetres."""
     flags: tuple[str, ...] = ()
     """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact; off-prompt: a
-    match under 0.5; constraint-missed: a constraint beyond its bar."""
+    match under 0.5; constraint-missed: a constraint beyond its bar; posture-jump: a row of a timeline begins in a
+    posture that the row before does not end in."""
     ok: bool = False
     """True without flags."""
     match: PromptMatch | None = None

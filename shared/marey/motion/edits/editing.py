@@ -15,11 +15,9 @@ from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import at_origin
 from marey.motion.edits.steps import Step, pieces_of, read_steps
-from marey.motion.edits.timeline_rows import TIMELINE, has_rows
+from marey.motion.edits.timeline_rows import CYCLE, TIMELINE, has_rows
 
 EDITED_FROM = "edited_from"
-CYCLE = "loop"
-"""Key of the record of a loop in a motion's manifest."""
 OUTDATED = (QUALITY, SELECTION, "travel", "travel_per_second", "constraints")
 """Keys of a manifest that describe the frames of the source."""
 

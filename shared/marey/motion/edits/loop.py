@@ -18,6 +18,7 @@ from marey.motion.edits.loop_blend import Closed, closed
 from marey.motion.edits.loop_search import SHORTEST_STILL, Cycle, cycles, has_steps
 from marey.motion.edits.place import heading_of, posed
 from marey.motion.edits.prompt_frames import with_prompts_at
+from marey.motion.edits.timeline_rows import cut_rows
 from marey.motion.feet import need_feet
 from marey.motion.rotations import about, rotate
 
@@ -92,7 +93,8 @@ def _result(clip: MotionClip, done: Closed, cycle: Cycle, values: Mapping[str, A
         },
     }
     kept = slice(None) if values["end"] == "closed" else slice(-1)
-    manifest = with_prompts_at(clip.manifest, range(cycle.first - done.earlier, cycle.last - done.earlier + 1)[kept])
+    shown = range(cycle.first - done.earlier, cycle.last - done.earlier + 1)[kept]
+    manifest = with_prompts_at(cut_rows(clip.manifest, shown[0], shown[-1], clip.fps), shown)
     return posed(
         whole,
         done.rotations[kept],

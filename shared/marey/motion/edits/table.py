@@ -184,6 +184,7 @@ _ALL = (
                 metavar="SECONDS",
             ),
         ),
+        keeps_rows=True,
     ),
     Operation("mirror", "Exchange left and right.", f"{_HERE}.mirror:mirror", keeps_cycle=True, keeps_rows=True),
     Operation(
@@ -193,6 +194,7 @@ _ALL = (
         (Parameter("factor", "2 halves the length.", number(0.1, 10.0)),),
         metavar="F",
         keeps_cycle=True,
+        keeps_rows=True,
     ),
     Operation(
         "in-place",
@@ -210,7 +212,7 @@ _ALL = (
         keeps_cycle=True,
         keeps_rows=True,
     ),
-    Operation("reverse", "Play backwards.", f"{_HERE}.timing:reverse"),
+    Operation("reverse", "Play backwards.", f"{_HERE}.timing:reverse", keeps_rows=True),
     Operation(
         "smooth",
         "Remove movement that is faster than HZ oscillations a second.",

@@ -12,6 +12,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.operation import MOST_FRAMES
 from marey.motion.edits.place import posed
 from marey.motion.edits.prompt_frames import with_prompts_at
+from marey.motion.edits.timeline_rows import ROUNDING, faster_rows, frames_at_speed, reversed_rows
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array
 
@@ -25,20 +26,22 @@ def change_speed(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     factor = values["factor"]
     if abs(factor - 1.0) < 1e-12:
         return clip
-    count = _limited((clip.frames - 1) / factor) + 1
-    times = np.minimum(np.arange(count) * factor, clip.frames - 1)
+    _limited((clip.frames - 1) / factor)
+    times = np.minimum(np.arange(frames_at_speed(clip.frames, factor)) * factor, clip.frames - 1)
     manifest = dict(clip.manifest)
     if "loop" in manifest:
         times = _whole(clip, (clip.frames - 1) / factor)
         record = cast("dict[str, Any]", manifest["loop"])
         seconds = (len(times) - 1) / clip.fps
         manifest["loop"] = {**record, "cycle": {**record["cycle"], "seconds": round(seconds, 6)}}
+    manifest = faster_rows(manifest, factor, clip.frames, len(times), clip.fps)
     return _at(clip, times, clip.fps, manifest)
 
 
 def reverse(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     """Play backwards."""
-    manifest = with_prompts_at(clip.manifest, reversed(range(clip.frames)))
+    told = reversed_rows(clip.manifest, clip.frames, clip.fps)
+    manifest = with_prompts_at(told, reversed(range(clip.frames)))
     return posed(clip, clip.rotations[::-1], clip.root[::-1], contacts=clip.contacts[::-1], manifest=manifest)
 
 
@@ -59,12 +62,11 @@ def change_rate(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     return _at(clip, times, rate, clip.manifest)
 
 
-def _limited(intervals: float) -> int:
-    """Return the number of whole intervals between frames; nothing was computed yet for too many of them."""
-    count = int(intervals + 1e-6)
+def _limited(intervals: float) -> None:
+    """Raise InvalidInput for too many intervals between frames; nothing was computed yet."""
+    count = int(intervals + ROUNDING)
     if count >= MOST_FRAMES:
         raise InvalidInput(f"the result would have {count + 1:.4g} frames; the most is {MOST_FRAMES}")
-    return count
 
 
 def _whole(clip: MotionClip, intervals: float) -> Array:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from marey.motion.live_ending import LiveEnding
 from marey.runtime.live.parsing import PromptParsing
 from marey.runtime.live.port import LiveFrame, Tokens
 from marey.streams import StreamChunk, StreamRow, StreamState
@@ -38,6 +40,8 @@ class LeasedStream:
         shown: number of frames in Redis, including earlier ones: no token beyond them is recorded.
         recorded: number of recorded frames; `recorded_prompts`: of recorded prompts.
         ending: reason of its end; None while it continues.
+        pose: that it ends on, as `StreamControl.pose`; None = it ends at once.
+        passing: how its last frames pass into that pose; None = they do not, or it continues.
         seen: time of the last viewer, by the monotonic clock; `moved`: time when it was last not paused.
         lost: True if another worker has it.
     """
@@ -70,6 +74,8 @@ class LeasedStream:
     recorded_control: str = ""
     recorded_actions: int = 0
     ending: str | None = None
+    pose: Mapping[str, Any] | None = field(default=None, repr=False)
+    passing: LiveEnding | None = None
     lost: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -77,6 +83,11 @@ class LeasedStream:
         self.state = self.recorded_state = self.row.state
         self.recorded_control = self.row.control
         self.recorded_actions = len(self.actions)
+
+    @property
+    def is_over(self) -> bool:
+        """True once all frames are made that it is to have."""
+        return self.ending is not None and (self.passing is None or len(self.tokens) > self.passing.last)
 
     @property
     def past(self) -> Tokens | None:

@@ -5,17 +5,21 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from marey.core import metrics
 from marey.core.errors import MareyError, Unreachable
+from marey.motion.live_ending import LiveEnding
 from marey.runtime.faults import as_problem
 from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.port import LiveFrame, SessionPool
 from marey.runtime.logs import logger
 from marey.streams import StreamState
-from marey.streams.frames import encode_frame
+from marey.streams.frames import Frame, encode_frame
 from marey.streams.redis import LeaseLost
 from marey.text.features import TextFeatures
 
@@ -25,6 +29,8 @@ CATCH_UP = 4
 """Extra frames per tick for a session that replays frames of another worker."""
 BEHIND_SECONDS = 0.5
 """Beyond this delay missed frames are not caught up: the clock is reset."""
+ENDING_SECONDS = 1.0
+"""Seconds in which a stream passes into the pose that it ends on."""
 MOST_UNWRITTEN = 1200
 """Frames buffered while Redis does not answer: as many as Redis keeps."""
 
@@ -120,9 +126,14 @@ class LiveLoop:
             lambda: self._guarded(leased, lambda: self._in_turn(leased, lambda: self._switch(leased, state, control)))
         )
 
-    def end(self, leased: LeasedStream, reason: str) -> None:
-        """Show one more frame, the last, and end."""
-        self._calls.put(lambda: self._guarded(leased, lambda: self._end(leased, reason)))
+    def end(self, leased: LeasedStream, reason: str, pose: Mapping[str, Any] | None = None) -> None:
+        """Show one more frame, the last, and end; with a pose, show the frames on the way to it first."""
+        if pose is None:
+            self._calls.put(lambda: self._guarded(leased, lambda: self._end(leased, reason)))
+        else:
+            self._calls.put(
+                lambda: self._guarded(leased, lambda: self._in_turn(leased, lambda: self._pass(leased, reason, pose)))
+            )
 
     def drop(self, leased: LeasedStream) -> None:
         """Drop a stream whose lease is lost."""
@@ -177,9 +188,21 @@ class LiveLoop:
             leased.state, leased.applied = state, control
 
     def _end(self, leased: LeasedStream, reason: str) -> None:
-        leased.ending = reason
+        leased.ending, leased.passing = reason, None
         if leased.state is StreamState.PAUSED:  # it shows no more frames
             self._close(leased, reason)
+
+    def _pass(self, leased: LeasedStream, reason: str, pose: Mapping[str, Any]) -> None:
+        """Begin to pass into a pose; a second pose has no effect."""
+        if leased.ending is not None:
+            return
+        if leased.state is StreamState.PAUSED:
+            self.pool.resume(_session(leased))
+            leased.state = StreamState.LIVE
+        turns = np.asarray(pose["joint_rotations"], np.float64)
+        frames = max(round(ENDING_SECONDS * self.pool.fps), 1)
+        leased.passing = LiveEnding(self.pool.skeleton, turns, pose.get("root_height"), len(leased.tokens), frames)
+        leased.ending, leased.pose = reason, pose
 
     def _step(self) -> dict[int, list[LiveFrame]]:
         made = {session: [frame] for session, frame in self.pool.step().items()}
@@ -195,14 +218,14 @@ class LiveLoop:
             for frame in frames:
                 leased.add(frame)
                 if frame.frame.number >= leased.lease.next_frame:
-                    leased.unwritten.append(frame.frame)
+                    leased.unwritten.append(_passed(leased, frame.frame))
             if leased.ending is None and len(leased.tokens) >= leased.row.max_frames:
                 leased.ending = "its maximum length is reached"
-            if leased.ending is not None and leased.unwritten:
+            if leased.is_over and leased.unwritten:
                 leased.unwritten[-1] = replace(leased.unwritten[-1], last=True)
             self._write(leased)
-            if leased.session is not None and leased.ending is not None and (leased.shown == len(leased.tokens)):
-                self._close(leased, leased.ending)
+            if leased.session is not None and leased.is_over and (leased.shown == len(leased.tokens)):
+                self._close(leased, str(leased.ending))
 
     def _write(self, leased: LeasedStream) -> None:
         try:
@@ -272,6 +295,14 @@ def _entered(pool: SessionPool, leased: LeasedStream) -> int:
     """Start or resume the stream's session in a pool; return it."""
     prompt = len(leased.prompts) - 1
     return pool.start(leased.text, leased.row.seed, past=leased.past, prompt=prompt, began=leased.playing)
+
+
+def _passed(leased: LeasedStream, frame: Frame) -> Frame:
+    """Return a frame on its way to the pose that the stream ends on; the frame itself if it ends on none."""
+    if leased.passing is None:
+        return frame
+    rotations, root = leased.passing.passed(frame.number, frame.rotations, frame.root)
+    return replace(frame, rotations=rotations.astype(np.float32), root=root.astype(np.float32))
 
 
 def _session(leased: LeasedStream) -> int:

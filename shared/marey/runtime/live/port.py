@@ -9,6 +9,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.motion.skeleton import Skeleton
 from marey.streams.actions import ActionStart
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
@@ -51,6 +52,11 @@ class SessionPool(Protocol):
     @property
     def model(self) -> str:
         """Its model, which is the queue that makes clips of recordings."""
+        ...
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton of its frames."""
         ...
 
     @property

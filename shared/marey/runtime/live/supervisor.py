@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from marey.core import metrics
 from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.db import transaction
+from marey.items.constraints import POSE_KEYFRAME
 from marey.jobs import FailureReason, NewItem, WorkerHeartbeat, beat, retire
 from marey.runtime.exposition import measure_gpu
 from marey.runtime.faults import as_problem, retry_unreachable
@@ -230,7 +231,7 @@ class StreamSupervisor(threading.Thread):
                 if isinstance(message, InvalidInput):
                     log.warning("message_refused", stream=str(leased.row.id), error=message.message)
                 elif message.kind == "stop":
-                    self._loop.end(leased, "stopped")
+                    self._loop.end(leased, "stopped" if message.pose is None else "stopped on a pose", message.pose)
                 else:
                     leased.received.append((identity, message))
             while leased.received and self._apply(leased, *leased.received[0]):
@@ -367,10 +368,14 @@ def clip_of(leased: LeasedStream, pool: SessionPool) -> tuple[NewItem, bytes] | 
     prompts = [(frame, text) for frame, text in leased.prompts if frame < leased.recorded]
     blob = StreamRecording(str(row.id), tokens, prompts, leased.first_text).to_blob()
     key = f"stream-{row.id}"
+    reached = leased.passing is not None and leased.recorded == leased.passing.last + 1
     item = NewItem(
         index=0,
         prompt=row.prompt,
         name=row.name,
+        constraints=[{"type": POSE_KEYFRAME, "frame": leased.recorded - 1, **leased.pose}]
+        if reached and leased.pose is not None
+        else None,
         model=row.model,
         bundle=row.bundle,
         batch_key=hashlib.sha256(f"{row.bundle}\nrecording".encode()).hexdigest(),

@@ -11,7 +11,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from marey.motion.keyframes import pose_of
 from tests.support.streaming import PROMPT, SLOW, check_frames, environ, frames_of, is_live
+from tests.support.walker import walker
 
 # --- what is typed and piped in ---
 
@@ -44,6 +46,28 @@ def test_a_stop_ends_a_stream_well(serve: Any, start: Any) -> None:
     running.type("/stop")
     assert running.wait() == 0
     assert (running.end()["state"], running.end()["reason"]) == ("ended", "stopped by the client")
+
+
+def test_a_stop_ends_a_stream_on_the_pose_of_a_file(serve: Any, start: Any, tmp_path: Path) -> None:
+    clip = walker()
+    clip.save_npz(tmp_path / "walk.npz")
+    server = serve(**SLOW)
+    running = start(server, "--end-pose", f"{tmp_path / 'walk.npz'}:5")
+    running.until(is_live)
+    running.type("/stop")
+    assert running.wait() == 0
+    (stop,) = server.messages
+    assert (stop["kind"], stop["pose"]) == ("stop", pose_of(clip, 5))
+    assert running.end()["state"] == "ended"
+
+
+def test_a_pose_that_is_not_there_begins_no_stream(serve: Any, start: Any, tmp_path: Path) -> None:
+    walker().save_npz(tmp_path / "walk.npz")
+    server = serve(**SLOW)
+    running = start(server, "--end-pose", f"{tmp_path / 'walk.npz'}:500")
+    assert running.wait() == 2
+    running.until_said("frame 500 is beyond the motion")
+    assert server.begun == []
 
 
 def test_a_stop_that_was_lost_with_its_connection_is_sent_again(serve: Any, start: Any) -> None:

@@ -12,6 +12,7 @@ from marey.core.errors import InvalidInput
 from marey.items.constraint_frames import frames_of
 from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH
 from marey.motion.hands import arms
+from marey.motion.keyframes import ordered_rotations
 from marey.motion.rotations import Array, normalize
 from marey.motion.skeleton import Skeleton
 
@@ -125,14 +126,6 @@ def effector(skeleton: Skeleton, name: str) -> int:
     return found[0]
 
 
-def plain_name(name: str) -> str:
-    """Return the name of a joint as skeletons write it: `left_wrist` is `L_wrist`."""
-    for long, short in (("left_", "L_"), ("right_", "R_")):
-        if name.startswith(long):
-            return short + name.removeprefix(long)
-    return name
-
-
 def _path(number: int, each: Mapping[str, Any], fps: float) -> Path:
     headings = each.get("heading_radians")
     return Path(
@@ -147,21 +140,7 @@ def _keyframe(number: int, each: Mapping[str, Any], skeleton: Skeleton) -> Keyfr
     where = f"constraints.{number}.joint_rotations"
     if "joint_rotations" not in each:
         raise InvalidInput("the motion was not read", where=f"constraints.{number}.motion")
-    given = each["joint_rotations"]
-    if isinstance(given, Mapping):
-        named = {plain_name(name): (name, turn) for name, turn in given.items()}
-        unknown = [name for plain, (name, _) in named.items() if plain not in skeleton.joint_names]
-        missing = [name for name in skeleton.joint_names if name not in named]
-        if unknown or missing:
-            said = f"unknown joint {unknown[0][:40]!r}" if unknown else f"the rotation of {missing[0]!r} is missing"
-            raise InvalidInput(
-                f"{said}: the pose is of another skeleton than the model's",
-                where=where,
-                hint=f"Its joints: {', '.join(skeleton.joint_names)}.",
-            )
-        given = [named[name][1] for name in skeleton.joint_names]
-    if len(given) != len(skeleton):
-        raise InvalidInput(f"{len(given)} rotations; the model's skeleton has {len(skeleton)} joints", where=where)
+    given = ordered_rotations(each["joint_rotations"], skeleton, where)
     root = each.get("root_position")
     place = None if root is None else np.array(root, np.float64)
     return Keyframe(number, each["frame"], normalize(np.array(given, np.float64)), place, each.get("root_height"))

@@ -1,5 +1,6 @@
 """Draw motions for constraints: candidates of several lengths are ranked by how little they have to be changed, the
-best few are fitted, and one is chosen. It depends on its own request and seed alone."""
+best few are fitted, and one is chosen. It depends on its own request and seed alone. The recording of a live stream is
+the only candidate of its request."""
 
 from __future__ import annotations
 
@@ -71,7 +72,7 @@ def constrained_request(
     terms_with(generator.bundle.manifest.licence, constraints)
     rate, limits = fps or generator.layout.fps, generator.limits
     known = resolve_request(generator, request)
-    if seconds is None and request.timeline is None:
+    if seconds is None and request.timeline is None and request.recording is None:
         known = replace(known, frames=_reaching(known, constraints, limits, rate))
     _asked(constraints, known, limits, generator.layout.skeleton, rate)
     return known
@@ -98,11 +99,13 @@ def _asked(
     """
     if request.timeline is not None:
         frames = plan_timeline(request.timeline, request.seed, limits).frames
+    elif request.recording is not None:
+        frames = len(request.recording.tokens)
     else:
         frames = request.frames or limits.max_frames
     own, count = for_clip(constraints, frames, limits.fps, rate)
     asked = asked_of(own, skeleton, count, rate)
-    return asked if request.timeline is None else replace(asked, retimed=False)
+    return asked if request.timeline is None and request.recording is None else replace(asked, retimed=False)
 
 
 def constrained_clips(
@@ -147,9 +150,9 @@ def _draw(
     control: GenerationControl,
 ) -> None:
     """Draw one candidate of each row, and keep it if it is among the best."""
-    open_rows = [row for row in rows if not row.dropped]
+    open_rows = [row for row in rows if not row.dropped and (number == 0 or row.request.recording is None)]
     part = [_candidate(row, number, generator.limits) for row in open_rows]
-    owners = [number_of for number_of, row in enumerate(rows) if not row.dropped]
+    owners = [number_of for number_of, row in enumerate(rows) if row in open_rows]
     watched = PassControl(control, owners, number * len(rows), candidates * len(rows))
     made = generate_any(generator, part, settings, control=watched) if part else []
     for row, request, generated in zip(open_rows, part, made, strict=True):
@@ -161,6 +164,8 @@ def _draw(
 
 
 def _candidate(row: _Drawn, number: int, limits: Limits) -> Request:
+    if row.request.recording is not None:
+        return row.request
     if row.request.timeline is not None:
         return replace(row.request, seed=candidate_seed(row.request.seed, number))
     frames = row.request.frames or limits.max_frames
@@ -200,7 +205,7 @@ def _best(generator: Generator[S], row: _Drawn, settings: S, plan: DrawPlan, bod
         "seed": row.request.seed,
         LICENCE: terms_with(generator.bundle.manifest.licence, row.constraints),
         CONSTRAINTS: [dict(each) for each in row.constraints],
-        SELECTION: selection.model_dump(mode="json"),
+        **({} if row.request.recording is not None else {SELECTION: selection.model_dump(mode="json")}),
     }
     clip = fitted[chosen].clip
     return replace(clip, manifest={**clip.manifest, **about})

@@ -17,12 +17,13 @@ from marey.generation.constraints.paths import (
     natural_course,
 )
 from marey.generation.constraints.playing import played
-from marey.generation.constraints.poses import BodyMotion, heading, with_poses
+from marey.generation.constraints.poses import BodyMotion, with_poses
 from marey.generation.constraints.timing import NO_JUMPS, Timing, find_jumps, play_times
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import posed as clip_of
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton
+from marey.motion.stance import heading
 
 ARM = 0.35
 """Metres from a target, on the floor, within which the root of a motion without a path need not come nearer."""

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from marey.generation.constraints.constraint_set import ConstraintSet, Keyframe, Path, Target
-from marey.generation.constraints.poses import heading
 from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH
 from marey.motion.clip import MotionClip
 from marey.motion.filters import smooth
@@ -15,6 +14,7 @@ from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.resample import interpolate
 from marey.motion.rotations import Array, about, angle_between, multiply, rotate
 from marey.motion.skeleton import Skeleton
+from marey.motion.stance import heading
 from marey.quality.constraints import ConstraintError
 
 

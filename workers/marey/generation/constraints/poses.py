@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from marey.generation.constraints.constraint_set import Keyframe
 from marey.generation.constraints.curves import fades
 from marey.motion.filters import smooth_above
-from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.kinematics import forward_kinematics
 from marey.motion.legs import MAX_DROP, follow_feet, foot_chain
 from marey.motion.pose import aim_bones
 from marey.motion.rotations import Array, about, conjugate, from_rotvec, multiply, to_rotvec
-from marey.motion.skeleton import HUMANML3D, Skeleton
-from marey.motion.support import clearance
+from marey.motion.skeleton import Skeleton
+from marey.motion.stance import heading, standing_height
 
 SHORTEST_S, LONGEST_S, PER_METRE_S = 0.4, 1.0, 2.25
 """Seconds of a fade, and seconds for each metre that a joint is away."""
@@ -26,8 +26,6 @@ STANDS = 0.06
 LIFT, FULL_STEP, NO_STEP = 0.06, 0.15, 0.03
 """Metres that a step lifts a foot, metres from which on it is lifted so high, and metres without a step."""
 LIFT_PER_FRAME, DROP_PER_FRAME = 0.02, 0.01
-FLOOR = 0.015
-"""Height in metres of the lowest joint of a pose on another skeleton than that of 22 joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,20 +39,6 @@ class BodyMotion:
     def joints(self, skeleton: Skeleton) -> Array:
         """Return (T, J, 3) metres."""
         return forward_kinematics(skeleton, self.rotations, self.root)
-
-
-def heading(rotations: Array, skeleton: Skeleton) -> float:
-    """Return the heading of one pose (J, 4), radians from +Z."""
-    x, _, z = facing(forward_kinematics(skeleton, rotations[None], np.zeros((1, 3))), skeleton)[0]
-    return float(np.arctan2(x, z))
-
-
-def standing_height(rotations: Array, skeleton: Skeleton) -> float:
-    """Return the height of the root over the floor at which a pose (J, 4) lies or stands on it, metres."""
-    joints = forward_kinematics(skeleton, rotations[None], np.zeros((1, 3)))
-    if skeleton.name == HUMANML3D.name:
-        return -float(clearance(joints)[0])
-    return FLOOR - float(joints[0, :, 1].min())
 
 
 def placed(key: Keyframe, posed: BodyMotion, skeleton: Skeleton) -> tuple[Array, Array]:

@@ -10,8 +10,10 @@ from marey.generation.port import Limits, Request
 from marey.generation.shots.timelines import gaps_of, plan_timeline
 from marey.generation.timed import TimedText
 from marey.items.timeline import TimelineRow, text_of
-from marey.motion.clip import MotionClip
+from marey.motion.clip import SELECTION, MotionClip
+from marey.quality.postures import rises_of
 from marey.quality.record import PromptMatch
+from marey.quality.selection import Selection
 from marey.selector.records import match_of
 from marey.vocabulary.scope import ActionLists, match_scope, scope_of_rows
 
@@ -61,7 +63,18 @@ def with_rows(clip: MotionClip, timeline: Sequence[TimedText]) -> MotionClip:
     record: Mapping[str, Any] = clip.manifest[KEY]
     prompts = [[round(row.start * clip.fps), row.text.prompt] for row in timeline]
     rows = [{**row, "match": _match(clip, timed).value} for row, timed in zip(record["rows"], timeline, strict=True)]
-    return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: {**record, "rows": rows}})
+    spans = record["transitions"]
+    transitions = [{**span, "rise": rise} for span, rise in zip(spans, rises_of(clip, spans), strict=True)]
+    told = {**record, "rows": rows, "transitions": transitions}
+    return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: told})
+
+
+def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> MotionClip:
+    """Return the clip of a timeline with the choice among the candidates of each row in its manifest."""
+    record: Mapping[str, Any] = clip.manifest[KEY]
+    pairs = zip(record["rows"], selections, strict=True)
+    rows = [{**row, SELECTION: selection.model_dump(mode="json")} for row, selection in pairs]
+    return replace(clip, manifest={**clip.manifest, KEY: {**record, "rows": rows}})
 
 
 def _match(clip: MotionClip, row: TimedText) -> PromptMatch:

@@ -9,7 +9,7 @@ all timelines of a batch are generated together, and each depends on its own row
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -73,7 +73,8 @@ class TimelinePlan:
 def plan_timeline(timeline: Sequence[TimedText], seed: int, limits: Limits) -> TimelinePlan:
     """Return the frames of the rows and transitions of a timeline."""
     times = [(round(row.start * limits.fps), round(row.end * limits.fps)) for row in timeline]
-    rows = tuple(TimelinePart(*time, part_seed(seed, "row", number)) for number, time in enumerate(times))
+    seeds = [part_seed(seed, "row", n) if row.seed is None else row.seed for n, row in enumerate(timeline)]
+    rows = tuple(TimelinePart(*time, own) for time, own in zip(times, seeds, strict=True))
     transitions = tuple(
         _transition(before, after, part_seed(seed, "transition", number), limits.keeps)
         for number, (before, after) in enumerate(pairwise(rows))
@@ -120,6 +121,15 @@ def generate_timelines(
     windows.make([strand for timeline in timelines for strand in timeline.rows])
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions()])
     return [timeline.motion() for timeline in timelines]
+
+
+def row_requests(request: Request, limits: Limits) -> list[Request]:
+    """Return the request of each row of a timeline as a motion of its own: that of its first window."""
+    timeline = _Timeline(request, limits)
+    assert request.timeline is not None
+    return [
+        replace(strand.request(), scope=row.scope) for strand, row in zip(timeline.rows, request.timeline, strict=True)
+    ]
 
 
 class _Strand:
@@ -225,6 +235,9 @@ class _Timeline:
         self.rows = [
             _Row(self, part, row.text, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)
         ]
+        for strand, row in zip(self.rows, request.timeline, strict=True):
+            if row.made is not None:
+                strand.add(Window(row.made, 0, len(row.made)))
         self.transitions: list[_Transition] = []
 
     @property
@@ -232,7 +245,7 @@ class _Timeline:
         """Return the number of windows of the whole."""
         most = (most_frames(self.limits, 2), self.limits.max_frames - CONTEXT)
         between = sum(len(even_parts(part.frames, *most)) for part in self.plan.transitions)
-        return sum(len(row.lengths) for row in self.rows) + between
+        return sum(len(row.lengths) - len(row.windows) for row in self.rows) + between
 
     def open_transitions(self) -> list[_Transition]:
         """Return the transitions, once the rows are made; none of a dropped timeline."""
@@ -284,7 +297,9 @@ class _Windows:
         """Generate all windows of parts that do not depend on each other."""
         while left := [each for each in strands if not each.timeline.dropped and len(each.windows) < len(each.lengths)]:
             watched = PassControl(self._control, self._owners(left), self._done, self._total)
-            new = [each for each in left if isinstance(each, _Row) and not each.windows]  # all rows, or none
+            new = [each for each in left if isinstance(each, _Row) and not each.windows]
+            if new:
+                left, watched = new, PassControl(self._control, self._owners(new), self._done, self._total)
             made = self._first(new, watched) if new else self._following(left, watched)
             for strand, window in zip(left, made, strict=True):
                 if window is None:
