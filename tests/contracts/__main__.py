@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import tempfile
 from pathlib import Path
@@ -31,6 +32,7 @@ def pg_dump_program() -> Path:
 
 def main() -> None:
     """Write the files of `recorded/`, and of each model."""
+    argparse.ArgumentParser(prog="python -m tests.contracts", description=__doc__).parse_args()
     found: dict[str, Any] = {name: read() for name, read in SURFACES.items()}
     with tempfile.TemporaryDirectory(prefix="marey-") as home, start_postgres(Path(home), durable=False) as server:
         engine = create_engine(server.url)
