@@ -7,12 +7,12 @@ for the way up.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from marey.motion.clip import MotionClip
 
-TRANSITIONS = ("timeline", "transitions")
-"""Keys of a manifest: the times of transitions, in seconds."""
+TIMELINE, TRANSITIONS = "timeline", "transitions"
+"""Key of a manifest, and its key with the times of transitions, in seconds."""
 RISE, RISE_SPEED = 0.3, 0.8
 """Metres, and metres a second: 1 % of all spans of 0.4 s of captured clips rise or sink by as much."""
 
@@ -26,8 +26,8 @@ def rises_of(clip: MotionClip, transitions: Sequence[Mapping[str, Any]]) -> list
 def posture_jumps(clip: MotionClip) -> list[Mapping[str, Any]]:
     """Return the transitions of a timeline, with their `rise` in metres, in which the body would have to stand up or go
     down faster than bodies do."""
-    timeline, name = TRANSITIONS
-    transitions: Sequence[Mapping[str, Any]] = (clip.manifest.get(timeline) or {}).get(name) or ()
+    record = cast("Mapping[str, Any]", clip.manifest.get(TIMELINE) or {})
+    transitions = cast("Sequence[Mapping[str, Any]]", record.get(TRANSITIONS) or ())
     found: list[Mapping[str, Any]] = []
     for each, (before, after), rise in zip(
         transitions, _edges(clip, transitions), rises_of(clip, transitions), strict=True

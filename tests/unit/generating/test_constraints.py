@@ -13,7 +13,7 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.generate.poses import with_poses
 from marey.generation.candidates import DrawPlan
-from marey.generation.constraints import choose
+from marey.generation.constraints import choose, draw
 from marey.generation.constraints.constraint_set import asked_of
 from marey.generation.constraints.curves import fades, smooth_open, through
 from marey.generation.constraints.draw import constrained_clips, constrained_request
@@ -21,6 +21,7 @@ from marey.generation.constraints.paths import stand_clock
 from marey.generation.constraints.playing import played
 from marey.generation.constraints.timing import NO_JUMPS, Timing, play_times
 from marey.generation.port import Request
+from marey.generation.shots.dispatch import generate_any
 from marey.items.constraints import read_constraints
 from marey.motion.arrange import placement_of
 from marey.motion.clip import MotionClip
@@ -301,3 +302,31 @@ def test_a_candidate_whose_toes_stand_stiller_is_better(generator: Any, monkeypa
         assert sliding is not None
         ranks.append(fitted.rank[3] + choose.SLIDING * sliding.skate)
     assert ranks[0] - ranks[1] == pytest.approx(choose.TOES * 0.04, abs=0.05)
+
+
+def test_candidates_for_a_path_keep_from_the_longest_motion_of_the_model(
+    generator: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int | None] = []
+
+    def noted(model: Any, requests: list[Request], *given: Any, **more: Any) -> Any:
+        asked.extend(each.frames for each in requests)
+        return generate_any(model, requests, *given, **more)
+
+    monkeypatch.setattr(draw, "generate_any", noted)
+    most = generator.limits.max_frames
+    for frames in (most - 8, most):
+        asked.clear()
+        path = {"type": "root_path", "frames": [0, frames - 1], "positions_xz": [[0, 0], [0, 4]]}
+        made = make_frames(generator, [path], frames)
+        assert made.frames == frames
+        assert asked[0] == frames  # as long as the clip
+        assert max(each or 0 for each in asked) == max(round(draw.LONGEST_SHARE * most), frames)
+
+
+def make_frames(generator: Any, constraints: list[dict[str, Any]], frames: int) -> MotionClip:
+    """The motion of so many frames that meets constraints."""
+    own = constrained_request(generator, replace(request(generator), frames=frames), constraints, frames / 20, None)
+    (clip,) = constrained_clips(generator, [own], [constraints], generator.settings({}), DrawPlan())
+    assert clip is not None
+    return clip

@@ -36,6 +36,9 @@ FITTED = 4
 LENGTHS = (1.0, 1.25, 1.5, 1.0, 2.0, 0.9, 1.25, 1.5)
 """Lengths of candidates for a path, as shares of the clip's: of a longer one the part with the best speeds is shown, or
 it is played faster."""
+LONGEST_SHARE = 0.92
+"""Most frames of a candidate that is longer than the clip, as a share of the model's longest motion. At its very end a
+model has learned from few clips: walks of 9.8 s of `hgm3-open` 0.5 climb 0.7 m, those of 9 s stay on the floor."""
 CONSTRAINTS = "constraints"
 """Key of the constraints in a motion's manifest."""
 Constraints = Sequence[Mapping[str, Any]]
@@ -171,7 +174,8 @@ def _candidate(row: _Drawn, number: int, limits: Limits) -> Request:
     frames = row.request.frames or limits.max_frames
     if row.asked.paths:
         length = round(frames * LENGTHS[number % len(LENGTHS)])
-        frames = min(max(length, limits.min_frames, shortest(frames)), limits.max_frames)
+        longest = max(round(LONGEST_SHARE * limits.max_frames), frames)
+        frames = min(max(length, limits.min_frames, shortest(frames)), longest)
     return replace(row.request, seed=candidate_seed(row.request.seed, number), frames=frames)
 
 
