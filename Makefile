@@ -52,9 +52,9 @@ clients: $(STAMP) ## Install Blender, ufbx, usd-core and three.js into out/clien
 	$(CLIENTS)/usd/bin/pip install -q usd-core==26.11 'numpy>=2.2,<3'
 	npm install --silent --no-audit --no-fund --prefix $(CLIENTS)/three \
 	  three@0.187.0 gltf-validator@2.0.0-dev.3.10 @pixiv/three-vrm@3.5.5 @pixiv/three-vrm-animation@3.5.5
-	MAREY_REQUIRE_CLIENTS=1 MAREY_BPY_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python \
-	  MAREY_UFBX_PYTHON=$(CURDIR)/$(CLIENTS)/blender/bin/python MAREY_USD_PYTHON=$(CURDIR)/$(CLIENTS)/usd/bin/python \
-	  MAREY_THREE=$(CURDIR)/$(CLIENTS)/three $(BIN)/pytest -q -n 2 --dist loadfile -m '' tests/clients
+	MAREY_REQUIRE_CLIENTS=1 MAREY_BPY_PYTHON=$(abspath $(CLIENTS))/blender/bin/python \
+	  MAREY_UFBX_PYTHON=$(abspath $(CLIENTS))/blender/bin/python MAREY_USD_PYTHON=$(abspath $(CLIENTS))/usd/bin/python \
+	  MAREY_THREE=$(abspath $(CLIENTS))/three $(BIN)/pytest -q -n 2 --dist loadfile -m '' tests/clients
 
 mutants: $(STAMP) ## 150 mutants each of models, jobs and motion; SEED=1 draws those of a seed, or goes on with them
 	$(BIN)/python -m tests.mutants $(if $(SEED),--seed $(SEED))

@@ -12,6 +12,7 @@ import pytest
 
 from marey.evaluator.port import Evaluator
 from marey.evaluator.report import Change, HeatCell, Report, Value, to_html
+from marey.evaluator.report.tables import tables_of
 from marey.evaluator.scoring import metrics_of
 from marey.measures.comparing import OBEYED, RETRIEVED
 from tests.support import chromium
@@ -130,10 +131,11 @@ def with_all_columns(report: Report) -> Report:
 def test_tables_of_every_metric_need_no_sideways_scrolling(
     tab: Tab, report: Report, tmp_path: Path, width: int
 ) -> None:
-    opened(tab, with_all_columns(report), tmp_path)
+    full = with_all_columns(report)
+    opened(tab, full, tmp_path)
     tab.size(width, 900)
     assert tab.ask(WIDER) == []
-    assert tab.ask("document.querySelectorAll('#numbers table').length") == 4
+    assert tab.ask("document.querySelectorAll('#numbers table').length") == len(tables_of(full)) > 4
 
 
 def test_in_a_narrow_window_the_name_of_a_row_stays_beside_its_numbers(

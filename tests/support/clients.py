@@ -26,18 +26,20 @@ import pytest
 SCRIPTS = Path(__file__).resolve().parents[1] / "clients"
 
 
+def blender_command(script: Path) -> list[str]:
+    """The command that runs a script in Blender; its arguments follow. Skips the test where there is none."""
+    if python := os.environ.get("MAREY_BPY_PYTHON"):
+        return [python, str(script)]
+    if importlib.util.find_spec("bpy"):
+        return [sys.executable, str(script)]
+    if program := shutil.which("blender"):
+        return [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python", str(script), "--"]
+    return pytest.skip("there is no Blender here (name a Python that has `bpy` in MAREY_BPY_PYTHON)")
+
+
 def blender(script: str, *arguments: object) -> None:
     """Run a script of tests/clients in Blender."""
-    path = str(SCRIPTS / script)
-    if python := os.environ.get("MAREY_BPY_PYTHON"):
-        command = [python, path]
-    elif importlib.util.find_spec("bpy"):
-        command = [sys.executable, path]
-    elif program := shutil.which("blender"):
-        command = [program, "--background", "--factory-startup", "--python", path, "--"]
-    else:
-        pytest.skip("there is no Blender here (name a Python that has `bpy` in MAREY_BPY_PYTHON)")
-    _run([*command, *map(str, arguments)], 600)
+    _run([*blender_command(SCRIPTS / script), *map(str, arguments)], 600)
 
 
 def python(variable: str, script: str, *arguments: object) -> str:

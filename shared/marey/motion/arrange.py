@@ -84,7 +84,7 @@ def moved(clip: Posed, options: ExportOptions) -> tuple[Array, Array, Array, dic
         Rotations (T, J, 4), root (T, 3) in metres, heading (T, 4) or (1, 4), and what `in_place` took out.
 
     Raises:
-        InvalidInput: bones of the clip change their length, or its placement cannot be read.
+        InvalidInput: bones of the clip change their length, or its placement or the record of a loop cannot be read.
     """
     if getattr(clip, "positions", None) is not None:
         raise InvalidInput("bones of this clip change their length, and files have one offset per joint")
@@ -94,6 +94,9 @@ def moved(clip: Posed, options: ExportOptions) -> tuple[Array, Array, Array, dic
     if options.in_place:
         removed = travel_of(root, heading, clip.fps)
         root[:, [0, 2]] = root[:1, [0, 2]]
+        if (turn := cycle_turn(clip, len(root))).any():
+            back = about("Y", -turn)
+            rotations[:, 0], heading = multiply(back, rotations[:, 0]), multiply(back, heading)
     if options.in_place == "heading":
         rotations[:, 0] = multiply(conjugate(heading), rotations[:, 0])
         heading = np.tile(IDENTITY, (len(heading), 1))
@@ -124,6 +127,28 @@ def headings(rotations: Array) -> Array:
 def yaws(heading: Array) -> Array:
     """Return the angles (T,) of turns about the vertical, in radians, without jumps; positive is to the left."""
     return np.unwrap(2 * np.arctan2(heading[:, 2], heading[:, 0]), period=2 * np.pi)
+
+
+def cycle_turn(clip: Posed, frames: int) -> Array:
+    """Return how far a loop has turned by each frame, if its cycle turned evenly: angles (T,) in radians, by the record
+    in its manifest; zero for a motion that is no loop.
+
+    A loop in place has to end as it began, or the body would turn at a stroke wherever a cycle begins anew.
+
+    Raises:
+        InvalidInput: the record holds something else than numbers.
+    """
+    manifest = cast("Mapping[str, Any]", getattr(clip, "manifest", {}))
+    try:
+        cycle = cast(
+            "Mapping[str, Any]", (manifest.get("loop") or {"cycle": {"heading": 0.0, "seconds": 1.0}})["cycle"]
+        )
+        speed = float(cycle["heading"]) / float(cycle["seconds"])
+    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError):
+        speed = np.nan
+    if not np.isfinite(speed):
+        raise InvalidInput("is not an object with the numbers heading and seconds", where="manifest: loop.cycle")
+    return speed / clip.fps * np.arange(frames)
 
 
 def placement_of(clip: object) -> tuple[Array, Array]:

@@ -10,16 +10,19 @@ import pytest
 
 from marey.core.errors import InvalidInput
 from marey.motion import MotionClip, edit
-from marey.motion.arrange import placement_of
+from marey.motion.arrange import moved, placement_of
 from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import closed
 from marey.motion.edits.loop_feet import onsets, standing_spans, stands, supports
 from marey.motion.edits.loop_search import cycles
 from marey.motion.edits.steps import read_steps
 from marey.motion.edits.timeline_rows import cut_rows, prompt_after_cuts
+from marey.motion.export_options import ExportOptions
 from marey.motion.feet import find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import solve_pose
+from marey.motion.retarget.apply import on_body
+from marey.motion.retarget.load import load_body
 from marey.motion.rotations import about, from_rotvec, multiply, rotate
 from marey.motion.skeleton import HUMANML3D
 from tests.support import bodies
@@ -174,6 +177,89 @@ def test_a_loop_in_place_stays_there(walk):
     assert loop.manifest["travel"]["z"] > 0.5
     steps = np.linalg.norm(np.diff(np.concatenate([loop.joints, loop.joints[1:3]]), axis=0), axis=-1)
     assert steps[loop.frames - 1].max() <= steps[: loop.frames - 1].max() + 2e-3
+
+
+def bent(clip: MotionClip, speed: float) -> MotionClip:
+    """A clip that turns to the left besides, at so many radians a second."""
+    turn = about("Y", speed * np.arange(clip.frames) / clip.fps)
+    steps = np.diff(clip.root.astype(np.float64), axis=0, prepend=0.0)
+    rotations = clip.rotations.astype(np.float64)
+    rotations[:, 0] = multiply(turn, rotations[:, 0])
+    return MotionClip.of(clip.skeleton, rotations, np.cumsum(rotate(turn, steps), axis=0), clip.contacts, clip.fps)
+
+
+@pytest.mark.parametrize("way", ["edit", "export", "edit, then export", "rig"])
+def test_a_loop_in_place_ends_as_it_began_although_its_cycle_turns(walk, way):
+    (loop,) = edit(bent(walk, 0.2), [LOOP])
+    turn = loop.manifest["loop"]["cycle"]["heading"]
+    assert turn == pytest.approx(0.2 * loop.manifest["loop"]["cycle"]["seconds"], abs=0.05)
+    if way.startswith("edit"):
+        (loop,) = edit(loop, [{"op": "in-place"}])
+        assert loop.manifest["loop"]["cycle"] | {"seconds": 0} == {"x": 0, "z": 0, "heading": 0, "seconds": 0}
+        assert loop.manifest["travel"]["heading"] == pytest.approx(turn, abs=1e-4)
+    options = ExportOptions(in_place="travel") if "export" in way or way == "rig" else ExportOptions()
+    if way == "rig":
+        places = on_body(loop, load_body("mixamo"), options).world()[1]
+    else:
+        rotations, root, heading, removed = moved(loop, options)
+        places = forward_kinematics(loop.skeleton, rotations, root)
+        np.testing.assert_allclose(np.abs(heading[-1]), np.abs(heading[0]), atol=1e-4)
+        if way == "export":
+            assert removed["travel"]["heading"] == pytest.approx(turn, abs=1e-4)
+    np.testing.assert_allclose(places[-1], places[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("remove", ["travel", "heading"])
+@pytest.mark.parametrize("end", ["closed", "open"])
+def test_a_loop_in_place_is_on_a_rig_as_one_of_many_cycles(walk, end, remove):
+    """Legs of other proportions move the hips; where a cycle begins anew, they have to be where it ended."""
+    body, options = load_body("mixamo"), ExportOptions(in_place=remove)
+    (loop,) = edit(bent(walk, 0.2), [{"op": "loop", "end": end}])
+    cycle = loop.frames - (end == "closed")
+    rotations, root, *_ = moved(loop, options)
+    parts = rotations[:cycle], root[:cycle], loop.contacts[:cycle]
+    many = MotionClip.of(loop.skeleton, *(np.concatenate([part] * 5) for part in parts), loop.fps)
+    wanted = on_body(many, body).world()[1][2 * cycle : 3 * cycle]
+    np.testing.assert_allclose(on_body(loop, body, options).world()[1][:cycle], wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("placement", ["origin", "keep"])
+def test_a_loop_that_travels_ends_on_a_rig_as_it_began(walk, placement):
+    body = load_body("mixamo")
+    (loop,) = edit(bent(walk, 0.2), [LOOP])
+    motion = on_body(loop, body, ExportOptions(placement=placement))
+    places = motion.world()[1]
+    first, last = (places[k] - places[k, motion.hips] for k in (0, -1))
+    turn = about("Y", loop.manifest["loop"]["cycle"]["heading"])
+    np.testing.assert_allclose(rotate(turn, first), last, atol=1e-4)
+    assert places[-1, motion.hips, 1] == pytest.approx(places[0, motion.hips, 1], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "record",
+    [{"end": "soon", "cycle": {"x": 0, "z": 1, "heading": 0}}, {"end": "open", "cycle": {}}, {"end": "open"}, "x"],
+)
+def test_a_loop_on_a_rig_whose_record_cannot_be_read_is_refused(walk, record):
+    with pytest.raises(InvalidInput, match="loop"):
+        on_body(replace(walk, manifest={**walk.manifest, "loop": record}), load_body("mixamo"))
+
+
+def test_a_turn_in_place_stays_a_turn(walk):
+    clip = bent(walk, 0.2)
+    rotations, *_ = moved(clip, ExportOptions(in_place="travel"))
+    np.testing.assert_array_equal(rotations, clip.rotations)
+
+
+def test_a_loop_whose_record_has_no_numbers_is_refused_in_place(walk):
+    for cycle in (
+        {"heading": "left", "seconds": 1},
+        {"heading": 0.1, "seconds": 0},
+        [],
+        {"heading": float("nan"), "seconds": 1},
+    ):
+        broken = replace(walk, manifest={**walk.manifest, "loop": {"cycle": cycle}})
+        with pytest.raises(InvalidInput, match=r"loop\.cycle"):
+            moved(broken, ExportOptions(in_place="travel"))
 
 
 def test_a_run_has_steps_where_its_contacts_are_not_found():

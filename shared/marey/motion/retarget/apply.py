@@ -10,6 +10,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.arrange import moved
 from marey.motion.clip import MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions
+from marey.motion.retarget.cycles import played_around
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.posed import local_poses
 from marey.motion.retarget.retarget import retarget
@@ -40,11 +41,22 @@ def on_body(clip: MotionClip, body: RigBody, options: ExportOptions = PLAIN, *, 
     Args:
         options: `root_bone`, `in_place`, `tpose_frame` and `placement` act on the motion.
         hands: bring the hands where the clip's hands are, see `retarget`.
+
+    Raises:
+        InvalidInput: the rig has no bone for `root_bone`, the clip has bones that change their length, or the record of
+            a loop in its manifest cannot be read.
     """
     rotations, root, heading, removed = moved(clip, options)
     clip = MotionClip.of(clip.skeleton, rotations, root, clip.contacts, clip.fps, manifest=clip.manifest)
-    motion = retarget(source_of(clip), body, hands=hands)
-    motion = replace(motion, removed=removed)
+    longer, own = played_around(clip, options)
+    motion = retarget(source_of(longer), body, hands=hands)
+    motion = replace(
+        motion,
+        rotations=motion.rotations[own],
+        translations=motion.translations[own],
+        contacts=motion.contacts[own],
+        removed=removed,
+    )
     if options.root_bone:
         motion = _on_root(motion, body, heading)
     return _with_rest_frame(motion) if options.tpose_frame else motion
