@@ -61,8 +61,8 @@ def test_hips_come_down_until_leg_and_foot_reach_the_toe(aside: tuple[float, flo
     reach = 0.99 * (THIGH + SHANK + span)
     down = np.sqrt(reach**2 - aside[0] ** 2 - aside[1] ** 2)
     toe = leg[:, 0] + [aside[0], -down - missing, aside[1]]
-    ankle = toe + [0.0, span, 0.0]
-    foot = np.stack([toe, toe + [9.0, 9.0, 9.0], ankle], axis=1)  # joints between the two do not count
+    ankle = toe + np.array([0.0, span, 0.0])
+    foot = np.stack([toe, 9 + toe, ankle], axis=1)  # joints between the two do not count
     drop = needed_drop(leg, leg[:, 0], foot)
     assert drop[0] == pytest.approx(missing, abs=1e-9)
     assert length(leg[:, 0] - [0, drop[0], 0] - toe)[0] == pytest.approx(reach, abs=1e-9)
@@ -73,7 +73,7 @@ def test_hips_stay_where_the_toe_is_in_reach_or_above_and_come_down_by_six_centi
 
     def drop(height: float, beside: float = 0.0) -> float:
         toe = leg[:, 0] + [beside, height, 0.0]
-        return float(needed_drop(leg, leg[:, 0], np.stack([toe, toe + [0, 0.1, 0]], axis=1))[0])
+        return float(needed_drop(leg, leg[:, 0], np.stack([toe, toe + np.array([0, 0.1, 0])], axis=1))[0])
 
     assert drop(-0.6) == 0.0
     assert drop(0.95) == 0.0  # a foot over the head
