@@ -47,7 +47,7 @@ def drawn(model: RQHCTransformer, tokenizer: Tokenizer, captions: SentenceData) 
 
 
 def alone(packed: PackedModel, sentence: torch.Tensor, seed: int, frames: int) -> torch.Tensor:
-    """What a stream draws under one prompt."""
+    """Frames that a stream draws under one prompt."""
     streams = StreamBatch(packed, 1)
     session = streams.start(sentence, seed, lasts=packed.network.natural_frames(sentence[None]))
     return torch.stack([streams.step()[session] for _ in range(frames)])
