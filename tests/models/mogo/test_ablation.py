@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from marey.bundles import find_bundle
+from marey.bundles import Bundle, find_bundle
 from marey.data.prepared import PreparedData
 from marey.models.mogo import ablation
 from marey.models.mogo.ablation import (
@@ -21,11 +21,13 @@ from marey.models.mogo.ablation import (
     LevelToken,
     ablate_levels,
     ablate_tokenizer,
+    ablate_transformer,
     train_tokenizer,
     train_transformer,
 )
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.config import PAPER, TINY, MOGOConfig
+from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage
 from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
@@ -157,10 +159,59 @@ def test_behind_a_level_token_frames_still_read_the_past_alone_and_the_prompt_in
 
 
 def test_variants_are_named_by_their_lanes_and_their_depth() -> None:
-    named = {name: (variant.joint, variant.depth) for name, variant in VARIANTS.items()}
+    named = {name: (variant.joint, variant.depth, variant.network) for name, variant in VARIANTS.items()}
     assert named == {
-        "a lane a level, PnQ, independent levels": (False, 0),
-        "a lane a level, level token, independent levels": (False, 0),
-        "a lane a level, PnQ, depth head": (False, 2),
-        "one lane, depth head": (True, 2),
+        "a lane a level, PnQ, independent levels": (False, 0, RQHCTransformer),
+        "a lane a level, level token, independent levels": (False, 0, LevelToken),
+        "a lane a level, PnQ, depth head": (False, 2, RQHCTransformer),
+        "one lane, depth head": (True, 2, RQHCTransformer),
     }
+
+
+def test_a_level_token_is_in_place_of_the_embedding_beside_the_prompt() -> None:
+    level = LevelToken(FLAT).prompt.level.weight
+    assert not level.any()
+    assert not level.requires_grad  # it stays so in training
+
+
+def test_a_variant_that_the_product_can_generate_with_is_bundled_and_judged(
+    options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[tuple[MOGOConfig, int]] = []
+
+    def judge(bundle: Bundle, threads: int) -> dict[str, float]:
+        judged.append((MOGOConfig.from_dict(bundle.manifest.parameters), threads))
+        assert (tmp_path / "run" / "bundle").samefile(bundle.path)
+        return {"all": 0.5}
+
+    monkeypatch.setattr(ablation, "judged", judge)
+    variant = VARIANTS["one lane, depth head"]
+    mine = replace(options, run=tmp_path / "run", threads=1)
+    mine.run.mkdir()
+    found = train_transformer(str(options.run / "bundle"), variant, mine)
+    assert judged == [(variant.of(TINY), 1)]
+    assert set(found) == {"all", "accuracy/0", *(f"loss/{level}" for level in range(TINY.tokenizer.levels))}
+
+
+def test_each_variant_is_trained_with_each_seed_in_an_empty_folder(
+    prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[object, int]] = []
+    bundle = str(options.run / "bundle")
+
+    def train(given: str, variant: object, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+        asked.append((variant, options.seed))
+        assert given == bundle
+        assert not any(options.run.iterdir())
+        (options.run / "left").touch()
+        config = options.config
+        assert (config.train_tokenizer.batch, config.train_transformer.batch) == (3, 3)
+        return {"loss/0": 1.0}
+
+    monkeypatch.setattr(ablation, "train_transformer", train)
+    (tmp_path / "transformer-0-0").mkdir()
+    (tmp_path / "transformer-0-0" / "half-trained").touch()
+    request = AblationRequest(prepared.path, bundle, tmp_path, steps=1, batch=3, seeds=2, threads=1)
+    shown = ablate_transformer(request)
+    assert asked == [(variant, seed) for seed in range(2) for variant in VARIANTS.values()]
+    assert [row.split(" | ")[0].removeprefix("| ") for row in shown.splitlines()[2:]] == list(VARIANTS)

@@ -8,6 +8,7 @@ import pytest
 from marey.motion.legs import (
     MAX_DROP,
     STRETCH,
+    _without_backward_bend,
     draw_foot,
     follow_feet,
     foot_chain,
@@ -22,6 +23,8 @@ from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
 
 THIGH, SHANK = 0.42, 0.40
 AHEAD = np.array([0.0, 0.0, 1.0])
+AWAY = np.array([0.3, -0.2, 0.5])
+"""From the origin, so that a sum of places is no difference of them."""
 
 
 def leg_of(distance: float | Array, way: tuple[float, float, float] = (0.0, -1.0, 0.0), bend: float = 1.0) -> Array:
@@ -61,8 +64,8 @@ def test_hips_come_down_until_leg_and_foot_reach_the_toe(aside: tuple[float, flo
     reach = 0.99 * (THIGH + SHANK + span)
     down = np.sqrt(reach**2 - aside[0] ** 2 - aside[1] ** 2)
     toe = leg[:, 0] + [aside[0], -down - missing, aside[1]]
-    ankle = [*toe, 0.0, span, 0.0]
-    foot = np.stack([toe, [*toe, 9.0, 9.0, 9.0], ankle], axis=1)  # joints between the two do not count
+    ankle = toe + np.array([0.0, span, 0.0])
+    foot = np.stack([toe, 9 + toe, ankle], axis=1)  # joints between the two do not count
     drop = needed_drop(leg, leg[:, 0], foot)
     assert drop[0] == pytest.approx(missing, abs=1e-9)
     assert length(leg[:, 0] - [0, drop[0], 0] - toe)[0] == pytest.approx(reach, abs=1e-9)
@@ -73,7 +76,7 @@ def test_hips_stay_where_the_toe_is_in_reach_or_above_and_come_down_by_six_centi
 
     def drop(height: float, beside: float = 0.0) -> float:
         toe = leg[:, 0] + [beside, height, 0.0]
-        return float(needed_drop(leg, leg[:, 0], np.stack([toe, [*toe, 0, 0.1, 0]], axis=1))[0])
+        return float(needed_drop(leg, leg[:, 0], np.stack([toe, toe + np.array([0, 0.1, 0])], axis=1))[0])
 
     assert drop(-0.6) == 0.0
     assert drop(0.95) == 0.0  # a foot over the head
@@ -82,18 +85,19 @@ def test_hips_stay_where_the_toe_is_in_reach_or_above_and_come_down_by_six_centi
 
 
 def test_a_leg_stretches_the_less_the_nearer_it_is_to_straight() -> None:
-    reach, was = np.array(1.0), np.array(0.8)
+    reach, was = np.array(0.9), np.array(0.8) * 0.9
     asked = np.linspace(0.5, 3.0, 200)
     found = soft_stretch(was, asked, reach)
-    nearer = asked <= 0.8
+    nearer = asked <= was
     assert np.array_equal(found[nearer], asked[nearer])
     assert (found[~nearer] < asked[~nearer]).all()
     assert (np.diff(found) >= 0).all()
-    assert found.max() <= STRETCH
-    assert found[-1] == pytest.approx(STRETCH, abs=1e-4)
-    assert soft_stretch(was, np.array(0.801), reach) == pytest.approx(0.801, abs=1e-5)  # at first all of it
+    assert found.max() <= STRETCH * reach
+    assert found[-1] == pytest.approx(STRETCH * reach, abs=1e-4)
+    assert soft_stretch(was, was + 0.001, reach) == pytest.approx(was + 0.001, abs=1e-5)  # at first all of it
     # half the room is asked for: 1 - exp(-1/2) of it is given
-    assert soft_stretch(was, was + 0.095, reach) == pytest.approx(0.8 + 0.19 * (1 - np.exp(-0.5)))
+    room = STRETCH * reach - was
+    assert soft_stretch(was, was + room / 2, reach) == pytest.approx(was + room * (1 - np.exp(-0.5)))
 
 
 def test_a_leg_that_was_straighter_may_hardly_be_stretched() -> None:
@@ -106,6 +110,9 @@ def test_a_bent_leg_gets_the_distance_that_is_asked() -> None:
     leg = leg_of(np.full(40, 0.6))
     asked = np.linspace(0.4, 0.6, 40)
     np.testing.assert_allclose(soft_distance(leg, asked, 20.0), asked, atol=1e-12)
+    farther = np.full(40, 0.9)
+    reached = soft_stretch(np.array(0.6), np.array(0.9), np.array(THIGH + SHANK))
+    np.testing.assert_allclose(soft_distance(leg, farther, 20.0), reached, atol=1e-12)
 
 
 @pytest.mark.parametrize("fps", [20.0, 60.0])
@@ -132,6 +139,7 @@ def test_a_held_foot_turns_around_its_toe_and_another_moves_as_a_whole() -> None
         wanted = before + change
         held = draw_foot(foot, hip, wanted, np.ones(1))
         np.testing.assert_allclose(held[:, 0], foot[:, 0], atol=1e-9)
+        assert length(held - foot).max() < 4 * abs(change)  # it turns the short way
         free = draw_foot(foot, hip, wanted, np.zeros(1))
         np.testing.assert_allclose(free - foot, np.broadcast_to((free - foot)[:, :1], foot.shape), atol=1e-12)
         way = normalize(foot[:, -1] - hip)
@@ -163,19 +171,19 @@ def test_a_toe_out_of_reach_is_left() -> None:
 
 @pytest.mark.parametrize("bend", [1.0, -1.0])
 def test_a_knee_stays_in_the_plane_of_its_leg(bend: float) -> None:
-    leg = leg_of(0.65, bend=bend)
+    leg = leg_of(0.65, bend=bend) + AWAY
     for distance in (0.5, 0.65, 0.78):
         ankle = leg[:, 0] + distance * np.array([0.0, -1.0, 0.0])
         knee = two_bone_knee(leg, leg[:, 0], ankle, AHEAD[None])
-        np.testing.assert_allclose(knee, leg_of(distance, bend=bend)[:, 1], atol=1e-9)
+        np.testing.assert_allclose(knee, leg_of(distance, bend=bend)[:, 1] + AWAY, atol=1e-9)
 
 
 def test_a_leg_turns_as_a_whole_to_where_its_ankle_goes() -> None:
-    leg = leg_of(0.65)
+    leg = leg_of(0.65) + AWAY
     way = (0.6, -0.8, 0.0)
     hip = np.array([[0.2, 1.3, -0.4]])
     knee = two_bone_knee(leg, hip, hip + 0.65 * np.array([way]), AHEAD[None])
-    np.testing.assert_allclose(knee - hip, leg_of(0.65, way)[:, 1] - leg[:, 0], atol=1e-9)
+    np.testing.assert_allclose(knee - hip, leg_of(0.65, way)[:, 1] - leg_of(0.65)[:, 0], atol=1e-9)
 
 
 def test_a_leg_points_to_an_ankle_out_of_its_reach() -> None:
@@ -259,3 +267,32 @@ def test_knees_that_a_decoder_bent_backwards_come_to_straight() -> None:
     for knee in (4, 5):
         leg = moved[:, [knee - 3, knee, knee + 3]]
         assert knee_forward(leg).min() > -1e-3
+
+
+def bent_back(metres: float, frames: int = 80) -> Array:
+    """Legs (T, 3, 3) whose knees are 9 cm before their line, and in frames 35 to 44 so far behind it."""
+    off = np.where((np.arange(frames) >= 35) & (np.arange(frames) < 45), -metres, 0.09)
+    along, below = np.sqrt(THIGH**2 - off**2), np.sqrt(SHANK**2 - off**2)
+    hip = np.tile(AWAY, (frames, 1))
+    knee = hip + np.stack([0 * off, -along, off], axis=1)
+    return np.stack([hip, knee, hip + np.stack([0 * off, -along - below, 0 * off], axis=1)], axis=1)
+
+
+@pytest.mark.parametrize("fps", [20.0, 60.0])
+def test_a_slight_backward_bend_becomes_straight_and_keeps_the_lengths_of_bones(fps: float) -> None:
+    leg = bent_back(0.01)
+    fixed = _without_backward_bend(leg, np.tile(AHEAD, (80, 1)), fps)
+    assert knee_forward(leg).min() < -0.009
+    assert -1e-9 < knee_forward(fixed)[35:45].min() < 0.005
+    np.testing.assert_allclose(leg_lengths(fixed), leg_lengths(leg), atol=1e-9)
+    np.testing.assert_array_equal(fixed[:, 0], leg[:, 0])
+    np.testing.assert_allclose(fixed[35:45, 2], leg[35:45, 2], atol=1e-3)
+    far = round(0.3 * fps)
+    np.testing.assert_array_equal(fixed[: 35 - far], leg[: 35 - far])
+    np.testing.assert_array_equal(fixed[45 + far :], leg[45 + far :])
+
+
+def test_knees_that_bend_forward_or_far_backward_are_left() -> None:
+    ahead = np.tile(AHEAD, (80, 1))
+    for leg in (bent_back(-0.02), bent_back(0.08)):
+        np.testing.assert_array_equal(_without_backward_bend(leg, ahead, 20.0), leg)
