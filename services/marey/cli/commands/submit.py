@@ -167,7 +167,8 @@ def _show_check(checked: CheckedJob) -> None:
 
 def show_capacity(checked: CheckedJob | CheckedEdit) -> None:
     """Say what a check found: the number of motions, quotas, and the time that it takes."""
-    console.say(f"{checked.items} motions would be made, with {', '.join(checked.bundles)}; nothing was submitted.")
+    many = "motion" if checked.items == 1 else "motions"
+    console.say(f"{checked.items} {many} would be made, with {', '.join(checked.bundles)}; nothing was submitted.")
     for quota in checked.quotas:
         size = console.size if quota.name == "bytes" else str
         of_what = "queued items" if quota.name == "queued" else "stored bytes"
