@@ -52,7 +52,7 @@ def _half_swings(m: Motion, k: int) -> int:
         if len(way) < SHORTEST:
             continue
         axis = np.linalg.svd(way - way.mean(axis=0), full_matrices=False)[2][0]
-        quick = np.diff(swings(way @ axis, 0.055)) < 0.8 * m.fps
+        quick = np.diff(swings(way @ axis, 0.045)) < m.fps
         most_swings = max(most_swings, *(end - begin for begin, end in runs(quick)), 0)
     return most_swings
 
@@ -84,7 +84,7 @@ def reach_up(m: Motion, side: str) -> float:
     """Reach over the head."""
     over = m.joints[:, list(WRISTS), 1] - m.joints[:, [HEAD], 1]
     high = of_side(over.max(axis=0).tolist(), side)
-    down = float((over.max(axis=0) - np.minimum(over[0], over[-1])).max())
+    down = float((np.ptp(over, axis=0)).max())
     return min(least(high, 0.15, 0.06), least(down, 0.2, 0.08), least(float(np.median(m.hips)), 0.7, 0.08))
 
 
@@ -100,7 +100,7 @@ def cheer(m: Motion, side: str) -> float:
         pump = (m.ahead[:, k, 0] > 0.08) & (m.hands[:, k, 1] > -0.4) & (m.elbows[:, k] > 55)
         for a, b in runs(pump):
             both = min(float(rising[a:b, k].max()), -float(rising[a:b, k].min()))
-            grades.append(least(both, 1.1, 0.3))
+            grades.append(least(both, 1.5, 0.3))
     return min(best(grades), _stays(m))
 
 
@@ -180,7 +180,7 @@ def slash(m: Motion, side: str) -> float:
 
 def throw(m: Motion, side: str) -> float:
     """Swing a hand back and forward, and let go."""
-    hands = smooth(m.joints[:, list(WRISTS)], 0.02, m.fps)
+    hands = smooth(m.joints[:, list(WRISTS)] - m.joints[:, [PELVIS]], 0.02, m.fps)
     forward, _ = body_frame(velocity(hands, m.fps), m.heading[:, None])
     after = round(0.5 * m.fps)
     grades = np.zeros(2)
@@ -190,7 +190,7 @@ def throw(m: Motion, side: str) -> float:
             back = float(m.ahead[first : a + 1, k, 0].min())
             wound = max(most(back, 0.06, 0.1), least(float(m.hands[first : a + 1, k, 1].max()), 0.05, 0.1))
             ahead = least(float(m.ahead[a : b + 2, k, 0].max()), 0.3, 0.1)
-            fast = least(float(forward[a:b, k].max()), 2.7, 0.5)
+            fast = least(float(forward[a:b, k].max()), 2.6, 0.5)
             stops = most(float(forward[b : b + after, k].min(initial=9)), 0.8, 0.5)
             grades[k] = max(grades[k], min(fast, wound, ahead, stops))
     return of_side(grades.tolist(), side)
@@ -200,13 +200,14 @@ def arm_circles(m: Motion, side: str) -> float:
     """Swing a straight arm in a full circle."""
     grades = [0.0, 0.0]
     for k in (0, 1):
-        for flat in (0, 2):
-            plane = m.reach[:, k, [flat, 1]]
-            for a, b in runs((np.linalg.norm(plane, axis=-1) > 0.22) & (m.elbows[:, k] < 75)):
+        for flat in np.radians((0, 45, 90, 135)):  # the upright planes in which an arm may circle
+            across = m.reach[:, k, 0] * np.cos(flat) + m.reach[:, k, 2] * np.sin(flat)
+            plane = np.stack([across, m.reach[:, k, 1]], axis=-1)
+            for a, b in runs((np.linalg.norm(plane, axis=-1) > 0.12) & (m.elbows[:, k] < 95)):
                 angle = np.degrees(np.unwrap(np.arctan2(plane[a:b, 1], plane[a:b, 0])))
                 high, low = float(plane[a:b, 1].max()), float(plane[a:b, 1].min())
                 grades[k] = max(
-                    grades[k], min(least(float(np.ptp(angle)), 310, 40), least(high, 0.3, 0.1), most(low, -0.3, 0.1))
+                    grades[k], min(least(float(np.ptp(angle)), 300, 40), least(high, 0.25, 0.1), most(low, -0.2, 0.1))
                 )
     return min(of_side(grades, side), _stays(m))
 

@@ -66,13 +66,10 @@ def twist(m: Motion, side: str) -> float:
 
     against = smooth(yaw(SHOULDERS) - yaw(HIPS), 0.05, m.fps)
     against -= 360 * np.round(float(np.median(against)) / 360)
-    turns = swings(against, 30)
-    sides = [
-        against[a] * against[b] < 0 and min(abs(against[a]), abs(against[b])) > 14
-        for a, b in pairwise(turns)
-    ]
+    turns = swings(against, 25)
+    sides = [against[a] * against[b] < 0 and min(abs(against[a]), abs(against[b])) > 8 for a, b in pairwise(turns)]
     return min(
-        least(sum(sides), 2.5, 1), most(m.path, 0.2 * m.seconds + 0.4, 0.3), least(float(np.median(m.hips)), 0.8, 0.06)
+        least(sum(sides), 1.5, 1), most(m.path, 0.2 * m.seconds + 0.4, 0.3), least(float(np.median(m.hips)), 0.8, 0.06)
     )
 
 

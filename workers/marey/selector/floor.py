@@ -87,7 +87,7 @@ def seated(m: Motion) -> Bool:
     """(T,) True where the body sits on a seat."""
     level = np.abs(m.thighs).min(axis=1) < 38
     height = (m.hips > 0.33) & (m.hips < 0.8)
-    return level & height & (m.tilt < 58) & (_behind(m) > 0.1) & (_knee_height(m) > 0.22)
+    return level & height & (m.tilt < 58) & (_behind(m) > 0.22) & (_knee_height(m) > 0.22)
 
 
 def _on_seat(m: Motion) -> Bool:

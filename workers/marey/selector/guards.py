@@ -173,10 +173,10 @@ def flinch(m: Motion, side: str) -> float:
 def karate(m: Motion, side: str) -> float:
     """Do three techniques or more in a low, wide stance."""
     kicks = (m.feet > 0.3) & (m.foot_speed > 1.5)
-    count = sum(len(_bursts(m.hand_speed[:, k] > 2.2, m.fps)) for k in (0, 1))
+    count = sum(len(_bursts(m.hand_speed[:, k] > 2.0, m.fps)) for k in (0, 1))
     count += sum(len(_bursts(kicks[:, k], m.fps)) for k in (0, 1))
     apart = np.linalg.norm(m.joints[:, ANKLES[0]] - m.joints[:, ANKLES[1]], axis=-1)
-    low = max(least(float(np.percentile(apart, 70)), 0.5, 0.1), most(float(np.percentile(m.hips, 30)), 0.9, 0.04))
+    low = max(least(float(np.percentile(apart, 70)), 0.45, 0.1), most(float(np.percentile(m.hips, 30)), 0.9, 0.04))
     return min(least(count, 2.5, 1), low, least(float(np.median(m.joints[:, PELVIS, 1])), 0.6, 0.1))
 
 
