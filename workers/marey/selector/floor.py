@@ -87,7 +87,7 @@ def seated(m: Motion) -> Bool:
     """(T,) True where the body sits on a seat."""
     level = np.abs(m.thighs).min(axis=1) < 38
     height = (m.hips > 0.33) & (m.hips < 0.8)
-    return level & height & (m.tilt < 58) & (_behind(m) > 0.22) & (_knee_height(m) > 0.22)
+    return level & height & (m.tilt < 58) & (_behind(m) > 0.17) & (_knee_height(m) > 0.22)
 
 
 def _on_seat(m: Motion) -> Bool:
@@ -157,7 +157,7 @@ def lie_down(m: Motion, side: str) -> float:
 def die(m: Motion, side: str) -> float:
     """Fall and lie there."""
     there, seconds = _falls(m)
-    return min(there, _begins_standing(m), most(seconds, 1.8, 0.6))
+    return min(there, _begins_standing(m), most(seconds, 2.4, 0.7))
 
 
 def get_up(m: Motion, side: str) -> float:

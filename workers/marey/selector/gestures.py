@@ -6,7 +6,7 @@ import numpy as np
 
 from marey.checks.kinematics import HEAD, KNEES, NECK, PELVIS, SHOULDERS, WRISTS, body_frame, smooth
 from marey.motion.feet import runs
-from marey.selector.grades import every, least, most, of_side, share, swings
+from marey.selector.grades import every, least, most, of_side, share, some, swings
 from marey.selector.motion import Array, Bool, Motion
 
 
@@ -90,9 +90,9 @@ def talk(m: Motion, side: str) -> float:
     """Talk with the hands."""
     low = (m.joints[:, list(WRISTS), 1] > m.joints[:, [PELVIS], 1]) & (m.hands[..., 1] < 0.1) & (m.ahead[..., 0] > 0.08)
     speed = smooth(m.hand_speed, 0.2, m.fps)
-    moves = (low & (speed > 0.2) & (speed < 1.6)).any(axis=1)
+    moves = some(low & (speed > 0.2) & (speed < 1.6))
     calm = most(float(np.percentile(m.hand_speed, 95)), 2.0, 0.5)
-    small = most(share((m.hands[..., 1] > 0.15).any(axis=1)), 0.15, 0.1)
+    small = most(share(some(m.hands[..., 1] > 0.15)), 0.15, 0.1)
     planted = least(share(every(m.foot_speed < 0.4)), 0.8, 0.15)
     count = max(max(len(swings(m.hands[:, k, c], 0.05)) for c in range(3)) for k in (0, 1))
     return min(least(share(moves), 0.33, 0.12), calm, small, planted, least(count, 3.5, 1.5), most(m.extent, 0.3, 0.1))
