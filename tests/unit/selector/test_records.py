@@ -50,7 +50,7 @@ def test_the_action_that_the_encoder_reads_is_matched_where_words_name_none() ->
         replace(scope, by="words"),
         replace(scope, flags=("negation",)),
         replace(scope, actions=(NamedAction("moseys along", "unknown"),)),
-        replace(scope, actions=(NamedAction("does laundry", "tried", "wash"),)),
+        replace(scope, actions=(NamedAction("does laundry", "tried", "launder"),)),
         replace(scope, actions=scope.actions * 2),
     ):
         assert match_of(clip, prompt, unread.as_json()) == PromptMatch()

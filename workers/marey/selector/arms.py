@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, PELVIS, WRISTS, body_frame, smooth, turning_points, velocity
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, velocity
 from marey.checks.stretch import Arm, arm
 from marey.motion.feet import runs
-from marey.selector.grades import best, least, most, share, some
-from marey.selector.motion import Array, Motion
-
-SIDES = ("left", "right")
+from marey.selector.grades import SIDES, best, least, most, of_side, share, some, swings
+from marey.selector.motion import SHORTEST, Array, Motion
 
 
 def _arms(m: Motion) -> tuple[Arm, Arm]:
@@ -20,14 +18,6 @@ def _arms(m: Motion) -> tuple[Arm, Arm]:
 def _up(hand: Arm) -> float:
     """Grade that a hand is lifted on purpose."""
     return min(least(hand.peak, -0.12, 0.06), max(least(hand.rise, 0.25, 0.08), least(hand.lifted, 1.0, 0.3)))
-
-
-def _waves(hand: Arm) -> float:
-    small = max(
-        min(least(hand.lifted, 1.5, 0.4), least(hand.flutter, 3.5, 1)),
-        min(least(hand.lifted, 4.5, 0.5), least(hand.flutter, 2.5, 1)),
-    )
-    return max(least(hand.swings, 4.5, 1.5), small)
 
 
 def _of_side(grades: tuple[float, float], others: tuple[float, float], side: str) -> float:
@@ -48,19 +38,42 @@ def _of_side(grades: tuple[float, float], others: tuple[float, float], side: str
 
 def wave(m: Motion, side: str) -> float:
     """Swing a lifted hand to and fro."""
+    grades = _half_swings(m, 0), _half_swings(m, 1)
     hands = _arms(m)
     ups = _up(hands[0]), _up(hands[1])
-    grades = min(ups[0], _waves(hands[0])), min(ups[1], _waves(hands[1]))
-    return min(_of_side(grades, ups, side), _stays(m))
+    return min(_of_side((least(grades[0], 2.6, 1), least(grades[1], 2.6, 1)), ups, side), _stays(m))
+
+
+def _half_swings(m: Motion, k: int) -> int:
+    """Return how often in a row a hand at the chest or over it swings by 7 cm or more, to and fro."""
+    most_swings = 0
+    for a, b in runs(m.hands[:, k, 1] > -0.28):
+        way = m.hands[a:b, k] - smooth(m.hands[a:b, k], 0.5, m.fps)
+        if len(way) < SHORTEST:
+            continue
+        axis = np.linalg.svd(way - way.mean(axis=0), full_matrices=False)[2][0]
+        quick = np.diff(swings(way @ axis, 0.045)) < m.fps
+        most_swings = max(most_swings, *(end - begin for begin, end in runs(quick)), 0)
+    return most_swings
 
 
 def raise_arm(m: Motion, side: str) -> float:
     """Lift a hand and hold it."""
     hands = _arms(m)
     ups = _up(hands[0]), _up(hands[1])
-    over = [min(up, least(hand.peak, 0.0, 0.12)) for up, hand in zip(ups, hands, strict=True)]
-    grades = min(over[0], most(hands[0].swings, 5, 1.5)), min(over[1], most(hands[1].swings, 5, 1.5))
-    return min(_of_side(grades, ups, side), _stays(m))
+    before = round(1.5 * m.fps)
+
+    def of(k: int) -> float:
+        found = [0.0]
+        for a, b in runs(m.hands[:, k, 1] > 0.0):
+            low = float(m.hands[max(a - before, 0) : a + 1, k, 1].min())
+            rise = max(most(low, -0.15, 0.1), least(float(a == 0), 0.9, 0.2))
+            found.append(
+                min(rise, least((b - a) / m.fps, 0.3, 0.12), least(float(m.hands[a:b, k, 1].max()), 0.05, 0.06))
+            )
+        return min(best(found), most(_half_swings(m, k), 4, 2))
+
+    return min(_of_side((of(0), of(1)), ups, side), _stays(m))
 
 
 def _stays(m: Motion) -> float:
@@ -70,33 +83,33 @@ def _stays(m: Motion) -> float:
 def reach_up(m: Motion, side: str) -> float:
     """Reach over the head."""
     over = m.joints[:, list(WRISTS), 1] - m.joints[:, [HEAD], 1]
-    return least(_either(over.max(axis=0), side), 0.15, 0.06)
-
-
-def _either(values: Array, side: str) -> float:
-    """Return the value of the hand or foot asked for; the larger one of either, the smaller one of both."""
-    if side == "both":
-        return float(values.min())
-    return float(values[SIDES.index(side)] if side in SIDES else values.max())
+    high = of_side(over.max(axis=0).tolist(), side)
+    down = float((np.ptp(over, axis=0)).max())
+    return min(least(high, 0.15, 0.06), least(down, 0.2, 0.08), least(float(np.median(m.hips)), 0.7, 0.08))
 
 
 def cheer(m: Motion, side: str) -> float:
-    """Throw up hands over the head."""
+    """Throw hands up over the head, or pump fists."""
     rising = velocity(m.hands[..., 1], m.fps)
-    up = np.where(m.hands[..., 1] > 0.05, 1.0, 0.0)
-    tops = [
-        best([float(rising[max(a - round(0.5 * m.fps), 0) : b, k].max()) for a, b in runs(up[:, k] > 0)])
-        for k in (0, 1)
-    ]
-    return min(least(max(tops), 1.0, 0.3), _stays(m))
+    head = m.joints[:, HEAD, 1] - m.joints[:, list(SHOULDERS), 1].mean(axis=1)
+    before = round(0.5 * m.fps)
+    grades = [0.0]
+    for k in (0, 1):
+        for a, b in runs(m.hands[:, k, 1] > head - 0.08):
+            grades.append(least(float(rising[max(a - before, 0) : b, k].max()), 1.0, 0.3))
+        pump = (m.ahead[:, k, 0] > 0.08) & (m.hands[:, k, 1] > -0.4) & (m.elbows[:, k] > 55)
+        for a, b in runs(pump):
+            both = min(float(rising[a:b, k].max()), -float(rising[a:b, k].min()))
+            grades.append(least(both, 1.5, 0.3))
+    return min(best(grades), _stays(m))
 
 
 def clap(m: Motion, side: str) -> float:
     """Bring the hands together and apart, three times."""
     gap = np.linalg.norm(m.joints[:, WRISTS[0]] - m.joints[:, WRISTS[1]], axis=-1)
-    meets = [a for a, _ in runs(smooth(gap, 0.02, m.fps) < 0.22)]
-    strokes = turning_points(gap, 0.05) / 2
-    return min(least(strokes, 2.5, 1), least(len(meets), 0.5, 0.5), most(float(gap.min()), 0.2, 0.05), _stays(m))
+    turns = swings(gap, 0.05)
+    meets = sum(gap[a] < 0.23 for a in turns)
+    return min(least(meets, 2.5, 1), least(len(turns) / 2, 2.5, 1), most(float(gap.min()), 0.2, 0.05), _stays(m))
 
 
 def kick(m: Motion, side: str) -> float:
@@ -120,7 +133,7 @@ def kick_ball(m: Motion, side: str) -> float:
     low = (m.feet < 0.3) & (np.abs(m.foot_local[..., 0]) < 0.4)
     through = np.where(low, forward, 0).max(axis=0)
     after = (m.foot_local[..., 0] * (m.feet > 0.1)).max(axis=0)
-    return min(least(_either(through, side), 2.8, 0.6), least(_either(after, side), 0.35, 0.1))
+    return min(least(of_side(through.tolist(), side), 2.8, 0.6), least(of_side(after.tolist(), side), 0.35, 0.1))
 
 
 def _thrusts(m: Motion, fastest: float) -> Array:
@@ -147,43 +160,56 @@ def _thrusts(m: Motion, fastest: float) -> Array:
 
 def punch(m: Motion, side: str) -> float:
     """Shoot a fist forward."""
-    return min(_either(_thrusts(m, 1.9), side), most(m.path, 0.5 * m.seconds + 0.8, 0.4))
+    return min(of_side(_thrusts(m, 1.9).tolist(), side), most(m.path, 0.5 * m.seconds + 0.8, 0.4))
 
 
 def slash(m: Motion, side: str) -> float:
     """Sweep a blade through an arc."""
     arcs = [0.0]
     for k in (0, 1):
-        for a, b in runs(m.hand_speed[:, k] > 1.2):
+        for a, b in runs(m.hand_speed[:, k] > 1.3):
             way = m.hands[max(a - 1, 0) : b + 1, k]
             length = float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum())
-            across = float(np.ptp(way[:, 1:], axis=0).max())
-            fast = least(float(m.hand_speed[a:b, k].max()), 2.2, 0.5)
-            arcs.append(min(fast, least(length, 0.65, 0.15), least(across, 0.45, 0.12)))
-    return best(arcs)
+            moved = way[-1] - way[0]
+            across = max(float(np.ptp(way[:, 2])), float(way[:, 1].max() - way[-1, 1]))
+            fast = least(float(m.hand_speed[a:b, k].max()), 2.3, 0.5)
+            upward = most(float(moved[1]), 0.35, 0.15)
+            arcs.append(min(fast, upward, least(length, 0.6, 0.15), least(across, 0.42, 0.12)))
+    return min(best(arcs), most(m.path, 0.8 * m.seconds + 1, 0.5))
 
 
 def throw(m: Motion, side: str) -> float:
     """Swing a hand back and forward, and let go."""
-    forward = velocity(m.reach[..., 0], m.fps)
+    hands = smooth(m.joints[:, list(WRISTS)] - m.joints[:, [PELVIS]], 0.02, m.fps)
+    forward, _ = body_frame(velocity(hands, m.fps), m.heading[:, None])
+    after = round(0.5 * m.fps)
     grades = np.zeros(2)
     for k in (0, 1):
         for a, b in runs(forward[:, k] > 1.2):
-            back = float(m.reach[max(a - round(0.4 * m.fps), 0) : a + 1, k, 0].min())
-            ahead = float(m.reach[a:b, k, 0].max())
-            fast = least(float(m.hand_speed[a:b, k].max()), 2.8, 0.7)
-            grades[k] = max(grades[k], min(fast, most(back, 0.08, 0.12), least(ahead, 0.2, 0.1)))
-    return _either(grades, side)
+            first = max(a - round(0.6 * m.fps), 0)
+            back = float(m.ahead[first : a + 1, k, 0].min())
+            wound = max(most(back, 0.06, 0.1), least(float(m.hands[first : a + 1, k, 1].max()), 0.05, 0.1))
+            ahead = least(float(m.ahead[a : b + 2, k, 0].max()), 0.3, 0.1)
+            fast = least(float(forward[a:b, k].max()), 2.6, 0.5)
+            stops = most(float(forward[b : b + after, k].min(initial=9)), 0.8, 0.5)
+            grades[k] = max(grades[k], min(fast, wound, ahead, stops))
+    return of_side(grades.tolist(), side)
 
 
 def arm_circles(m: Motion, side: str) -> float:
     """Swing a straight arm in a full circle."""
-    turned = np.zeros(2)
+    grades = [0.0, 0.0]
     for k in (0, 1):
-        angle = np.unwrap(np.arctan2(m.reach[:, k, 1], m.reach[:, k, 0]))
-        across = np.unwrap(np.arctan2(m.reach[:, k, 1], m.reach[:, k, 2]))
-        turned[k] = np.degrees(max(np.ptp(angle), np.ptp(across)))
-    return min(least(_either(turned, side), 320, 40), _stays(m))
+        for flat in np.radians((0, 45, 90, 135)):  # the upright planes in which an arm may circle
+            across = m.reach[:, k, 0] * np.cos(flat) + m.reach[:, k, 2] * np.sin(flat)
+            plane = np.stack([across, m.reach[:, k, 1]], axis=-1)
+            for a, b in runs((np.linalg.norm(plane, axis=-1) > 0.12) & (m.elbows[:, k] < 95)):
+                angle = np.degrees(np.unwrap(np.arctan2(plane[a:b, 1], plane[a:b, 0])))
+                high, low = float(plane[a:b, 1].max()), float(plane[a:b, 1].min())
+                grades[k] = max(
+                    grades[k], min(least(float(np.ptp(angle)), 300, 40), least(high, 0.25, 0.1), most(low, -0.2, 0.1))
+                )
+    return min(of_side(grades, side), _stays(m))
 
 
 def arabesque(m: Motion, side: str) -> float:
@@ -195,10 +221,10 @@ def arabesque(m: Motion, side: str) -> float:
 
 def dance(m: Motion, side: str) -> float:
     """Move arms and legs all the time."""
-    lively = least(share(m.lively > 0.2), 0.5, 0.2)
+    lively = least(share(m.lively > 0.17), 0.6, 0.2)
     direct = float(np.linalg.norm(m.place[-1] - m.place[0])) / m.seconds
     legs, arms = _variety(m, ANKLES), _variety(m, WRISTS)
-    return min(lively, most(direct, 0.7, 0.2), least(legs, 0.08, 0.04), least(arms, 0.15, 0.05))
+    return min(lively, most(direct, 0.7, 0.2), least(legs, 0.07, 0.03), least(arms, 0.15, 0.05))
 
 
 def _variety(m: Motion, joints: tuple[int, int]) -> float:

@@ -70,7 +70,7 @@ def crouch(m: Motion, side: str) -> float:
     """Stay low on both feet."""
     low = (m.hips < 0.77) & (m.feet.max(axis=1) < 0.15) & (_hands_off(m) > 0.08) & (_knee_height(m) > 0.17)
     low &= (_behind(m) < 0.32) & (m.tilt < 75)
-    return max(least(share(low), 0.45, 0.15), least(m.longest(low), 1.0, 0.3))
+    return max(least(m.most(low), 0.5, 0.1), least(m.longest(low), 1.0, 0.3))
 
 
 def squat(m: Motion, side: str) -> float:
@@ -83,30 +83,37 @@ def squat(m: Motion, side: str) -> float:
     return min(least(depth, 0.25, 0.06), least(up, 0.2, 0.06), on_feet, trunk, most(m.path, 0.5, 0.3))
 
 
-def _seated(m: Motion) -> Bool:
+def seated(m: Motion) -> Bool:
     """(T,) True where the body sits on a seat."""
     level = np.abs(m.thighs).min(axis=1) < 38
     height = (m.hips > 0.33) & (m.hips < 0.8)
-    return level & height & (m.tilt < 58) & (_behind(m) > 0.1) & (_knee_height(m) > 0.22)
+    return level & height & (m.tilt < 58) & (_behind(m) > 0.17) & (_knee_height(m) > 0.22)
+
+
+def _on_seat(m: Motion) -> Bool:
+    """(T,) True where the body sits on a seat of any height, as high stools are."""
+    high = (m.hips > 0.6) & (m.hips < 0.87) & (m.thighs.max(axis=1) > -45) & (m.tilt < 50) & (_behind(m) > 0.0)
+    return seated(m) | (high & (m.foot_speed.max(axis=1) < 0.5))
 
 
 def sit(m: Motion, side: str) -> float:
     """Sit on a seat."""
-    return least(share(_seated(m)), 0.55, 0.15)
+    return least(m.most(seated(m)), 0.55, 0.15)
 
 
 def sit_down(m: Motion, side: str) -> float:
     """Go down onto a seat and stay."""
     _, end = _hips(m)
-    seated = least(share(_seated(m)[-_ends(m) :]), 0.5, 0.3)
-    return min(_begins_standing(m), seated, least(best(m.hips[: m.frames // 2].tolist()) - end, 0.22, 0.06))
+    ends = least(share(_on_seat(m)[-_ends(m) :]), 0.5, 0.3)
+    return min(_begins_standing(m), ends, least(best(m.hips[: m.frames // 2].tolist()) - end, 0.2, 0.06))
 
 
 def stand_up(m: Motion, side: str) -> float:
     """Rise from a seat and stay."""
-    begin, end = _hips(m)
-    seated = least(share(_seated(m)[: 2 * _ends(m)]), 0.4, 0.3)
-    return min(_ends_standing(m), least(end, 0.85, 0.06), seated, least(end - begin, 0.22, 0.06))
+    _, end = _hips(m)
+    low = float(m.hips[: max(2 * m.frames // 3, 1)].min())
+    begins = least(share(_on_seat(m)[: 2 * _ends(m)]), 0.4, 0.3)
+    return min(_ends_standing(m), least(end, 0.85, 0.06), begins, least(end - low, 0.22, 0.06))
 
 
 def sit_floor(m: Motion, side: str) -> float:
@@ -119,7 +126,7 @@ def kneel(m: Motion, side: str) -> float:
     """Rest on a knee."""
     hips = m.joints[:, PELVIS, 1]
     mask = (_knee_height(m) < 0.2) & (hips > 0.25) & (_hands_off(m) > 0.08) & (m.tilt < 60)
-    return max(least(share(mask), 0.45, 0.15), least(m.longest(mask), 1.0, 0.3))
+    return max(least(m.most(mask), 0.5, 0.1), least(m.longest(mask), 1.0, 0.3))
 
 
 def _lying(m: Motion) -> Bool:
@@ -128,7 +135,7 @@ def _lying(m: Motion) -> Bool:
 
 def lie(m: Motion, side: str) -> float:
     """Lie on the floor."""
-    return least(share(_lying(m)), 0.55, 0.15)
+    return least(m.most(_lying(m)), 0.55, 0.15)
 
 
 def _falls(m: Motion) -> tuple[float, float]:
@@ -150,7 +157,7 @@ def lie_down(m: Motion, side: str) -> float:
 def die(m: Motion, side: str) -> float:
     """Fall and lie there."""
     there, seconds = _falls(m)
-    return min(there, _begins_standing(m), most(seconds, 1.8, 0.6))
+    return min(there, _begins_standing(m), most(seconds, 2.4, 0.7))
 
 
 def get_up(m: Motion, side: str) -> float:

@@ -40,11 +40,20 @@ def _straight(m: Motion) -> float:
     return most(abs(m.turn), 45, 15)
 
 
+def walks(m: Motion) -> float:
+    """Grade that the body walks forward, whatever it does beside."""
+    return min(_forward(m, 0.25), least(_steps(m), 2.5, 1), 1 - _running(m))
+
+
+def walk_any_way(m: Motion, side: str) -> float:
+    """Walk, straight or not."""
+    on_spot = min(_on_spot(m), most(best([f.seconds for f in m.flights]), 0.1, 0.06))
+    return min(max(walks(m), on_spot), least(share(m.hips > 0.72), 0.7, 0.2))
+
+
 def walk(m: Motion, side: str) -> float:
     """Walk."""
-    there = min(_forward(m, 0.25), least(_steps(m), 2.5, 1), 1 - _running(m))
-    on_spot = min(_on_spot(m), most(best([f.seconds for f in m.flights]), 0.1, 0.06))
-    return min(max(there, on_spot), _straight(m), least(share(m.hips > 0.72), 0.7, 0.2))
+    return min(walk_any_way(m, side), _straight(m))
 
 
 def _on_spot(m: Motion) -> float:
@@ -53,25 +62,40 @@ def _on_spot(m: Motion) -> float:
     return min(IN_PLACE, least(lifts, 2.5, 1), most(m.path, 0.3 * m.seconds, 0.3))
 
 
-def run(m: Motion, side: str) -> float:
-    """Run."""
+def run_any_way(m: Motion, side: str) -> float:
+    """Run, straight or not."""
     there = min(_forward(m, 0.5), _running(m), least(float(np.percentile(m.flow[:, 0], 75)), 1.8, 0.4))
     on_spot = min(
         _on_spot(m), least(_steps(m) / m.seconds, 2.2, 0.4), least(best([f.seconds for f in m.flights]), 0.08, 0.06)
     )
-    return min(max(there, on_spot), _straight(m))
+    return max(there, on_spot)
+
+
+def run(m: Motion, side: str) -> float:
+    """Run."""
+    return min(run_any_way(m, side), _straight(m))
+
+
+def sprint_any_way(m: Motion, side: str) -> float:
+    """Run at 4 m/s, or with 3.2 steps a second in place, straight or not."""
+    fast = max(least(float(np.percentile(m.flow[:, 0], 80)), 4, 0.6), least(_steps(m) / m.seconds, 3.2, 0.4))
+    return min(run_any_way(m, side), fast)
 
 
 def sprint(m: Motion, side: str) -> float:
-    """Run at 4 m/s, or with 3.2 steps a second in place."""
-    fast = max(least(float(np.percentile(m.flow[:, 0], 80)), 4, 0.6), least(_steps(m) / m.seconds, 3.2, 0.4))
-    return min(run(m, side), fast)
+    """Sprint."""
+    return min(sprint_any_way(m, side), _straight(m))
+
+
+def walk_backward_any_way(m: Motion, side: str) -> float:
+    """Walk backward, straight or not."""
+    back = least(-m.travel[0], max(0.5, 0.2 * m.seconds), 0.25)
+    return min(back, least(share(m.flow[:, 0] < -0.12), 0.55, 0.2), least(_steps(m), 1.5, 1))
 
 
 def walk_backward(m: Motion, side: str) -> float:
     """Walk backward."""
-    back = least(-m.travel[0], max(0.5, 0.2 * m.seconds), 0.25)
-    return min(back, least(share(m.flow[:, 0] < -0.12), 0.55, 0.2), most(abs(m.turn), 60, 20), least(_steps(m), 1.5, 1))
+    return min(walk_backward_any_way(m, side), most(abs(m.turn), 60, 20))
 
 
 def turn(m: Motion, side: str) -> float:

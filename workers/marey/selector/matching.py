@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from marey.selector.motion import SHORTEST, Motion
-from marey.selector.rules import RULES
+from marey.selector.rules import RULES, TURNS, WHILE_TURNING
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope
 
@@ -74,12 +74,15 @@ def _step(sentence: str) -> Step | None:
     scope = match_scope(sentence, _every())
     if "negation" in scope.flags:
         return None
-    found = [named.action for named in scope.actions if named.verdict == "known" and named.action in RULES]
-    if len(found) < len(scope.actions):
-        return None
-    side = side_of(sentence)
+    named = [each.action for each in scope.actions if each.verdict == "known" and each.action in RULES]
+    names = list(dict.fromkeys(name for name in named if name is not None))
     actions = load_vocabulary().actions
-    return tuple(WantedAction(name, side if actions[name].sided else "") for name in found if name is not None)
+    beside = {other for name in names for other in (*actions[name].implies, actions[name].kind_of)}
+    if len(names) > 1:
+        beside.add("idle")
+    wanted = [name for name in names if name not in beside] or names
+    side = side_of(sentence)
+    return tuple(WantedAction(name, side if actions[name].sided else "") for name in wanted) or None
 
 
 def side_of(sentence: str) -> str:
@@ -106,7 +109,9 @@ def match(motion: Motion, steps: Sequence[Step]) -> float:
 
 def _grade(motion: Motion, step: Step) -> float:
     """Grade the actions of a step: at one time, or one after the other as they are named."""
-    together = min(RULES[wanted.action](motion, wanted.side) for wanted in step)
+    turning = any(wanted.action in TURNS for wanted in step)
+    rules_at_once = {**RULES, **WHILE_TURNING} if turning else RULES
+    together = min(rules_at_once[wanted.action](motion, wanted.side) for wanted in step)
     if len(step) == 1:
         return together
     rules: list[Callable[[Motion], float]] = [

@@ -218,6 +218,20 @@ class Motion:
         return _local(smooth(arms, 0.03, self.fps), self.heading)
 
     @Signal
+    def ahead(self) -> Array:
+        """(T, 2, 3) each wrist from the point of the trunk at its height: forward, up, left, metres. Up is 0 between
+        pelvis and neck."""
+        pelvis, neck = self.joints[:, [PELVIS]], self.joints[:, [NECK]]
+        wrists, rise = self.joints[:, list(WRISTS)], np.maximum((neck - pelvis)[..., 1], 0.05)
+        along = np.clip((wrists[..., 1] - pelvis[..., 1]) / rise, 0, 1)
+        return _local(smooth(wrists - pelvis - along[..., None] * (neck - pelvis), 0.03, self.fps), self.heading)
+
+    @Signal
+    def still(self) -> Array:
+        """(T, 2) speed of each wrist about the shoulders, smoothed over a tenth of a second, metres a second."""
+        return smooth(np.linalg.norm(velocity(self.hands, self.fps), axis=-1), 0.1, self.fps)
+
+    @Signal
     def over(self) -> Array:
         """(T, 2) height of each wrist over the middle of the shoulders along the trunk, metres."""
         middle = self.joints[:, list(SHOULDERS)].mean(axis=1, keepdims=True)
@@ -279,9 +293,19 @@ class Motion:
                 )
         return found
 
-    def longest(self, mask: Bool) -> float:
-        """Return the seconds of the longest stretch of a mask of frames."""
-        return max((b - a for a, b in runs(mask)), default=0) / self.fps
+    def most(self, mask: Bool) -> float:
+        """Return the share of frames of a mask; up to a second at the beginning and the end in which it is false does
+        not count, as a clip may begin and end so."""
+        frames = np.flatnonzero(mask)
+        if not len(frames):
+            return 0.0
+        spare = round(self.fps)
+        length = len(mask) - min(int(frames[0]), spare) - min(len(mask) - 1 - int(frames[-1]), spare)
+        return len(frames) / length
+
+    def longest(self, mask: Bool, begin: int = 0, end: int | None = None) -> float:
+        """Return the seconds of the longest stretch of a mask of frames, between two frames of it."""
+        return max((b - a for a, b in runs(mask[begin:end])), default=0) / self.fps
 
 
 def _last(mask: Bool) -> int:

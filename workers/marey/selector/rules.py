@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from marey.selector import arms, floor, gaits, jumps
+from marey.selector import arms, bodies, floor, gaits, gestures, guards, jumps
 from marey.selector.motion import Motion
 
 Rule = Callable[[Motion, str], float]
@@ -66,4 +66,41 @@ RULES: Mapping[str, Rule] = {
     "arabesque": arms.arabesque,
     "knee-to-elbow": arms.knee_to_elbow,
     "dance": arms.dance,
+    "carry": bodies.carry,
+    "climb-onto": bodies.climb_onto,
+    "hang": bodies.hang,
+    "swim": bodies.swim,
+    "drive": bodies.drive,
+    "twist": bodies.twist,
+    "dribble": bodies.dribble,
+    "shoot-basket": bodies.shoot_basket,
+    "fight-stance": guards.fight_stance,
+    "stab": guards.stab,
+    "block": guards.block,
+    "aim": guards.aim,
+    "shoot": guards.shoot,
+    "draw-bow": guards.draw_bow,
+    "cast-spell": guards.cast_spell,
+    "dodge": guards.dodge,
+    "flinch": guards.flinch,
+    "karate": guards.karate,
+    "laugh": gestures.laugh,
+    "nod": gestures.nod,
+    "signal": gestures.signal,
+    "guide": gestures.guide,
+    "shiver": gestures.shiver,
+    "talk": gestures.talk,
+    "wash": gestures.wash,
+    "reach-forward": gestures.reach_forward,
+    "push": gestures.push,
 }
+
+TURNS = frozenset({"turn", "turn-around"})
+"""Actions that turn the body, on its way or on the spot."""
+WHILE_TURNING: Mapping[str, Rule] = {
+    "walk": gaits.walk_any_way,
+    "walk-backward": gaits.walk_backward_any_way,
+    "run": gaits.run_any_way,
+    "sprint": gaits.sprint_any_way,
+}
+"""Rules of gaits at once with a turn, which alone go straight ahead."""
