@@ -5,7 +5,7 @@ Joints stay where they are, to less than a millimetre, unless the options move t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, cast
 
@@ -138,17 +138,40 @@ def cycle_turn(clip: Posed, frames: int) -> Array:
     Raises:
         InvalidInput: the record holds something else than numbers.
     """
-    manifest = cast("Mapping[str, Any]", getattr(clip, "manifest", {}))
-    try:
-        cycle = cast(
-            "Mapping[str, Any]", (manifest.get("loop") or {"cycle": {"heading": 0.0, "seconds": 1.0}})["cycle"]
-        )
-        speed = float(cycle["heading"]) / float(cycle["seconds"])
-    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError):
-        speed = np.nan
+    record = cast("Mapping[str, Any]", getattr(clip, "manifest", {})).get("loop")
+    if not record:
+        return np.zeros(frames)
+    heading, seconds = cycle_numbers(record, ("heading", "seconds"))
+    speed = heading / seconds if seconds else np.nan
     if not np.isfinite(speed):
-        raise InvalidInput("is not an object with the numbers heading and seconds", where="manifest: loop.cycle")
+        raise InvalidInput(f"{heading:g} radians in {seconds:g} s are no speed", where="manifest: loop.cycle")
     return speed / clip.fps * np.arange(frames)
+
+
+def cycle_numbers(loop: object, names: Sequence[str]) -> list[float]:
+    """Return numbers of the cycle in the record of a loop.
+
+    Raises:
+        InvalidInput: the record holds something else.
+    """
+    cycle = cast("Mapping[str, Any]", loop).get("cycle") if isinstance(loop, Mapping) else None
+    return _numbers(cycle, names, "loop.cycle")
+
+
+def _numbers(record: object, names: Sequence[str], where: str, *, missing: float = np.nan) -> list[float]:
+    """Return finite numbers of an entry of a manifest by name.
+
+    Raises:
+        InvalidInput: it holds something else than these numbers.
+    """
+    try:
+        found = [float(cast("Mapping[str, Any]", record).get(name, missing)) for name in names]
+    except (AttributeError, TypeError, ValueError):
+        found = [np.nan]
+    if not np.isfinite(found).all():
+        wanted = f"{', '.join(names[:-1])} and {names[-1]}"
+        raise InvalidInput(f"is not an object with the numbers {wanted}", where=f"manifest: {where}")
+    return found
 
 
 def placement_of(clip: object) -> tuple[Array, Array]:
@@ -159,13 +182,7 @@ def placement_of(clip: object) -> tuple[Array, Array]:
         InvalidInput: it holds something else than these numbers.
     """
     manifest = cast("Mapping[str, Any]", getattr(clip, "manifest", {}))
-    given = cast("Mapping[str, Any]", manifest.get("placement") or {})
-    try:
-        x, z, heading = (float(given.get(name, 0.0)) for name in ("x", "z", "heading"))
-    except (AttributeError, TypeError, ValueError):
-        x = z = heading = np.nan
-    if not np.isfinite([x, z, heading]).all():
-        raise InvalidInput("is not an object with the numbers x, z and heading", where="manifest: placement")
+    x, z, heading = _numbers(manifest.get("placement") or {}, ("x", "z", "heading"), "placement", missing=0.0)
     return about("Y", heading), np.array([x, 0.0, z])
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from marey.core.errors import InvalidInput
+from marey.motion.arrange import cycle_numbers
 from marey.motion.clip import MotionClip
 from marey.motion.export_options import ExportOptions
 from marey.motion.kinematics import facing
@@ -56,22 +57,17 @@ def played_around(clip: MotionClip, options: ExportOptions) -> tuple[MotionClip,
 
 
 def _end_of(record: object) -> str:
-    end = cast("Mapping[str, Any]", record).get("end") if isinstance(record, Mapping) else None
+    end = cast("Mapping[str, object]", record).get("end") if isinstance(record, Mapping) else None
     if end not in ("closed", "open"):
         raise InvalidInput("is neither closed nor open", where="manifest: loop.end")
     return cast("str", end)
 
 
-def _travel(clip: MotionClip, record: Any, options: ExportOptions) -> tuple[Array, Array]:
+def _travel(clip: MotionClip, record: object, options: ExportOptions) -> tuple[Array, Array]:
     """Return turn (4,) and way (3,) that take a cycle to the next one, in the world."""
     if options.in_place:
         return about("Y", 0.0), np.zeros(3)
-    try:
-        x, z, angle = (float(record["cycle"][name]) for name in ("x", "z", "heading"))
-    except (KeyError, TypeError, ValueError):
-        x = z = angle = np.nan
-    if not np.isfinite([x, z, angle]).all():
-        raise InvalidInput("is not an object with the numbers x, z and heading", where="manifest: loop.cycle")
+    x, z, angle = cycle_numbers(record, ("x", "z", "heading"))
     ahead = facing(clip.joints[0].astype(np.float64), clip.skeleton)
     way = rotate(about("Y", float(np.arctan2(ahead[0], ahead[2]))), np.array([x, 0.0, z]))
     turn, first = about("Y", angle), clip.root[0].astype(np.float64) * [1.0, 0.0, 1.0]
