@@ -138,6 +138,11 @@ class Clip(BaseModel):
         return {name: value for name, value in values.items() if name not in ADDED or value}
 
     @property
+    def all_captions(self) -> tuple[str, ...]:
+        """Return the captions of the whole, then those of each action: the order of the features in `texts.npz`."""
+        return self.captions + self.act_captions
+
+    @property
     def captured(self) -> bool:
         """Return True for an unchanged capture: not mirrored, joined, made, cropped, slower or faster."""
         return not (self.mirrored or self.spliced or self.made or self.cropped) and self.speed == 1.0

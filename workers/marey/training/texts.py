@@ -63,7 +63,7 @@ class KnownCaptions:
         Raises:
             NotFound, InvalidFile: as `CaptionTexts.load`.
         """
-        captions = (caption for clip in data.clips for caption in clip.captions + clip.act_captions)
+        captions = (caption for clip in data.clips for caption in clip.all_captions)
         return cls(CaptionTexts.load(data), {caption: row for row, caption in enumerate(captions)})
 
 
@@ -110,14 +110,12 @@ class CaptionTexts:
         if known is not None and known.texts.spec != pipeline.spec:
             hint = "Read all captions again, or choose the encoder and labeller of that folder."
             raise InvalidInput("captions were read by another encoder or labeller", where="known", hint=hint)
-        rows = {} if known is None else known.rows
-        texts = cls._read([text for text in unique if text not in rows], pipeline, processes, encoder_path, progress)
-        if known is None:
-            row_of = {text: row for row, text in enumerate(unique)}
-        else:
-            unread = (text for text in unique if text not in rows)
-            row_of = {**rows, **{text: row for row, text in enumerate(unread, len(known.texts.node_start) - 1)}}
+        row_of = {} if known is None else dict(known.rows)
+        unread = [text for text in unique if text not in row_of]
+        texts = cls._read(unread, pipeline, processes, encoder_path, progress)
+        if known is not None:
             texts = known.texts._with(texts)
+        row_of |= {text: row for row, text in enumerate(unread, len(texts.node_start) - 1 - len(unread))}
         return texts._arranged(np.array([row_of[text] for text in flat], np.int64), [len(clip) for clip in captions])
 
     @classmethod

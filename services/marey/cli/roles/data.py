@@ -214,7 +214,7 @@ def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, i
         raise needs_extra("worker", error) from error
     spec = _text_spec(choice)
     data = PreparedData.open(folder)
-    captions = [clip.captions + clip.act_captions for clip in data.clips]
+    captions = [clip.all_captions for clip in data.clips]
     pipeline = TextPipeline.load(spec, encoder_path=choice.weights)
     processes = min(os.cpu_count() or 1, -(-sum(map(len, captions)) // CHUNK))  # each loads the weights
     known = None if choice.reuse is None else KnownCaptions.load(PreparedData.open(choice.reuse))

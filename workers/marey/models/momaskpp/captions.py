@@ -66,7 +66,7 @@ class WordData:
         key = f"{prepared.manifest.files[CLIPS].sha256}:{sha256}:{config.max_words}"
         if _key_of(prepared.path) != key:
             if distributed.rank() == 0:
-                captions = [text for clip in prepared.clips for text in clip.captions + clip.act_captions]
+                captions = [text for clip in prepared.clips for text in clip.all_captions]
                 _write(prepared.path, captions, load_encoder(texts.spec.encoder), config, key)
             distributed.broadcast(torch.zeros(1, device=device))  # the others wait for the files
         return cls(sentences, *_read(prepared.path, config.width, len(sentences.sentence)), config.max_words)
