@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from marey.data import gestures
-from marey.data.gesture_flights import GRAVITY, flight_height, standing_feet
+from marey.data.gesture_flights import flight_height, standing_feet
 from marey.data.gesture_poses import StandingBody
 from marey.data.gestures import KINDS, made_gestures
-from marey.data.part import MAX_FRAMES, Part
+from marey.data.part import GRAVITY, MAX_FRAMES, Part
 from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import FPS
 from tests.unit.data.test_gesture_acts import swings

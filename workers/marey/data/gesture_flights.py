@@ -13,10 +13,10 @@ from marey.data.gesture_poses import LEFT, RIGHT, StandingBody
 from marey.data.gesture_posing import pose
 from marey.data.gesture_postures import FootPlace, Point, Posture
 from marey.data.gesture_sequels import Sequel
+from marey.data.part import GRAVITY
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 
-GRAVITY = 9.81
 _LEGS = {LEFT: (7, 10), RIGHT: (8, 11)}
 _LENGTH = {side: float(np.linalg.norm(HUMANML3D.offsets[toe])) for side, (_, toe) in _LEGS.items()}
 _SHARES = (0.12, 0.3, 0.5, 0.7, 0.88)

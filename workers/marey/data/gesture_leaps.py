@@ -11,7 +11,7 @@ from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_gaits import speed_of
 from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody
 from marey.data.gesture_ways import LEGS
-from marey.data.part import FPS, Part
+from marey.data.part import FPS, GRAVITY, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
 from marey.data.splice import with_bones
@@ -21,7 +21,6 @@ Array = NDArray[np.floating]
 
 _TOES = [10, 11]
 _ALOFT = 0.05  # metres of both toes over the floor
-_GRAVITY = 9.81
 _FLIGHTS = (0.36, 0.56)  # seconds
 _HIGH = 0.48  # seconds of a flight that is called high or long
 _RUN_FLIGHT = 2.5  # frames that both feet of a run are in the air already
@@ -89,7 +88,7 @@ def _leapt(
     way = (joints[-1, 0] - joints[0, 0]) * np.array([1.0, 0.0, 1.0])
     out += ((t - source) / FPS * speed)[:, None, None] * way / np.linalg.norm(way)
     fly = np.sin(np.pi * share) ** 2
-    out[..., 1] += (_GRAVITY / 8 * flight**2 - _RUN_RISE) * (0.5 * fly + 2 * share * (1 - share))[:, None]
+    out[..., 1] += (GRAVITY / 8 * flight**2 - _RUN_RISE) * (0.5 * fly + 2 * share * (1 - share))[:, None]
     body = StandingBody(with_bones(out))
     _spread(body, round(centre), fly, *legs)
     for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):

@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody
 from marey.data.gesture_postures import Point
-from marey.data.part import FPS
+from marey.data.part import FPS, GRAVITY
 from marey.data.retarget import two_bones
 from marey.motion.rotations import cross, from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
@@ -40,7 +40,6 @@ _WRIST, _ANKLE, _TOE, _BEND = 0.035, 0.045, 0.012, 0.06  # lowest metres of join
 _REACH, _LEAST = 0.985, 0.17  # share of the length of an arm; metres from shoulder to wrist
 _PARTS = 6  # parts of the way to a pose that is fallen into
 _SMOOTH = 0.9  # frames
-_GRAVITY = 9.81
 _MASSES = {0: 0.16, 3: 0.1, 6: 0.1, 9: 0.16, 15: 0.08, 18: 0.03, 19: 0.03, 20: 0.02, 21: 0.02}
 _LEG_MASSES = {1: 0.05, 2: 0.05, 4: 0.06, 5: 0.06, 7: 0.04, 8: 0.04}
 """Shares of the mass of a body at its joints."""
@@ -329,5 +328,5 @@ def fly(joints: Array, first: int, last: int) -> None:
     centre = centre_of_mass(joints[first : last + 1])
     x = np.linspace(0.0, 1.0, last - first + 1)[:, None]
     path = (1 - x) * centre[0] + x * centre[-1]
-    path[:, 1] += 0.5 * _GRAVITY * ((last - first) / FPS) ** 2 * (x * (1 - x))[:, 0]
+    path[:, 1] += 0.5 * GRAVITY * ((last - first) / FPS) ** 2 * (x * (1 - x))[:, 0]
     joints[first : last + 1] += (path - centre)[:, None]

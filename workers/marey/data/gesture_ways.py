@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.data.gesture_poses import eased
-from marey.data.part import FPS
+from marey.data.part import FPS, GRAVITY
 from marey.data.splice import knee_poles, with_bones
 from marey.motion.rotations import from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
@@ -26,7 +26,6 @@ _PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
 _ORDER = tuple(j for j in range(1, 22) if j not in {k for leg in LEGS for k in leg[1:]})  # parents first
 _AHEAD = {3: 0.2, 6: 0.4, 9: 0.7}  # share by which the spine is turned like the shoulders
 _GRID = 0.01  # metres
-_GRAVITY = 9.81
 _BANK = 0.6  # share of the lean of a body that leans against all of the pull outward
 _HIPS_INWARD = 0.5  # metres that the hips move inward per radian of lean
 
@@ -134,7 +133,7 @@ def _bank(root: Array, turn: Array) -> Array:
         return np.zeros(len(turn))
     speed = np.linalg.norm(np.gradient(root[:, [0, 2]], axis=0), axis=-1) * FPS
     pull = speed * np.gradient(turn) * FPS
-    return smooth(_BANK * np.arctan(pull / _GRAVITY), 0.2, FPS)
+    return smooth(_BANK * np.arctan(pull / GRAVITY), 0.2, FPS)
 
 
 def _tilted(local: Array, bank: Array) -> Array:
