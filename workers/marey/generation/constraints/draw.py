@@ -153,9 +153,11 @@ def _draw(
     control: GenerationControl,
 ) -> None:
     """Draw one candidate of each row, and keep it if it is among the best."""
-    open_rows = [row for row in rows if not row.dropped and (number == 0 or row.request.recording is None)]
+    owners = [
+        owner for owner, row in enumerate(rows) if not row.dropped and (number == 0 or row.request.recording is None)
+    ]
+    open_rows = [rows[owner] for owner in owners]
     part = [_candidate(row, number, generator.limits) for row in open_rows]
-    owners = [number_of for number_of, row in enumerate(rows) if row in open_rows]
     watched = PassControl(control, owners, number * len(rows), candidates * len(rows))
     made = generate_any(generator, part, settings, control=watched) if part else []
     for row, request, generated in zip(open_rows, part, made, strict=True):
