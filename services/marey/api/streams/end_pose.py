@@ -38,20 +38,21 @@ async def read_end_pose(shared: Context, key: ApiKey, stream: UUID, given: Mappi
     pose = read_pose(given, FIELD)
     named = NamedPoses()
     keyframe = {"type": POSE_KEYFRAME, "frame": 0, **pose}
-    _check([*named.add([keyframe], None)])
+    _refuse_first(list(named.add([keyframe], None)))
     try:
         poses = await read_poses(shared, key, named)
     except InvalidItems as error:
-        _check(error.problems)
+        _refuse_first(error.problems)
         raise
-    for (_, _), found in poses.items():
+    for found in poses.values():
         pose = with_pose(pose, found)
     return await run_in_threadpool(_ordered, shared, key, stream, pose)
 
 
-def _check(problems: Sequence[Problem]) -> None:
-    for problem in problems:
-        raise InvalidInput(problem.message, where=str(problem.field).replace(ITEM, FIELD, 1))
+def _refuse_first(problems: Sequence[Problem]) -> None:
+    """Raise the first problem of the keyframe as one of the pose, if there is one."""
+    if problems:
+        raise InvalidInput(problems[0].message, where=str(problems[0].field).replace(ITEM, FIELD, 1))
 
 
 def _ordered(shared: Context, key: ApiKey, stream: UUID, pose: Mapping[str, Any]) -> dict[str, Any]:
