@@ -198,21 +198,24 @@ def _swings(joints: Array, wrist: Array, shoulder: Array, raised: NDArray[np.boo
     return best
 
 
+def swings(values: Array, smallest: float) -> list[int]:
+    """Return the frames of the turning points of a signal (T,), those of moves under `smallest` left out."""
+    found, direction, extreme, best = list[int](), 0, 0, float(values[0])
+    for frame, value in enumerate(values.tolist()):
+        if direction >= 0 and value < best - smallest:
+            found.append(extreme)
+            direction, extreme, best = -1, frame, value
+        elif direction <= 0 and value > best + smallest:
+            found.append(extreme)
+            direction, extreme, best = 1, frame, value
+        elif (value - best) * direction > 0:
+            extreme, best = frame, value
+    return [*found, extreme] if direction else found
+
+
 def turning_points(values: Array, least: float) -> int:
-    """Number of turning points of a signal (T,), ignoring moves smaller than `least` (zigzag count)."""
-    turns, direction, extreme = 0, 0, float(values[0])
-    for value in values:
-        if direction >= 0 and value < extreme - least:
-            turns += direction > 0
-            direction, extreme = -1, float(value)
-        elif direction <= 0 and value > extreme + least:
-            turns += direction < 0
-            direction, extreme = 1, float(value)
-        elif direction > 0:
-            extreme = max(extreme, float(value))
-        elif direction < 0:
-            extreme = min(extreme, float(value))
-    return turns + 1 if direction else 0
+    """Number of turning points of a signal (T,), ignoring moves smaller than `least`, its beginning not counted."""
+    return max(len(swings(values, least)) - 1, 0)
 
 
 def lean(joints: Array, fps: float) -> Array:

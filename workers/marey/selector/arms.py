@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, velocity
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, swings, velocity
 from marey.checks.stretch import Arm, arm
 from marey.motion.feet import runs
-from marey.selector.grades import SIDES, best, least, most, of_side, share, some, swings
+from marey.selector.gaits import stays
+from marey.selector.grades import SIDES, best, least, most, of_side, share, some
 from marey.selector.motion import SHORTEST, Array, Motion
 
 
@@ -41,7 +42,7 @@ def wave(m: Motion, side: str) -> float:
     grades = _half_swings(m, 0), _half_swings(m, 1)
     hands = _arms(m)
     ups = _up(hands[0]), _up(hands[1])
-    return min(_of_side((least(grades[0], 2.6, 1), least(grades[1], 2.6, 1)), ups, side), _stays(m))
+    return min(_of_side((least(grades[0], 2.6, 1), least(grades[1], 2.6, 1)), ups, side), stays(m))
 
 
 def _half_swings(m: Motion, k: int) -> int:
@@ -73,11 +74,7 @@ def raise_arm(m: Motion, side: str) -> float:
             )
         return min(best(found), most(_half_swings(m, k), 4, 2))
 
-    return min(_of_side((of(0), of(1)), ups, side), _stays(m))
-
-
-def _stays(m: Motion) -> float:
-    return most(m.path, 0.3 * m.seconds + 0.5, 0.3)
+    return min(_of_side((of(0), of(1)), ups, side), stays(m))
 
 
 def reach_up(m: Motion, side: str) -> float:
@@ -101,7 +98,7 @@ def cheer(m: Motion, side: str) -> float:
         for a, b in runs(pump):
             both = min(float(rising[a:b, k].max()), -float(rising[a:b, k].min()))
             grades.append(least(both, 1.5, 0.3))
-    return min(best(grades), _stays(m))
+    return min(best(grades), stays(m))
 
 
 def clap(m: Motion, side: str) -> float:
@@ -109,7 +106,7 @@ def clap(m: Motion, side: str) -> float:
     gap = np.linalg.norm(m.joints[:, WRISTS[0]] - m.joints[:, WRISTS[1]], axis=-1)
     turns = swings(gap, 0.05)
     meets = sum(gap[a] < 0.23 for a in turns)
-    return min(least(meets, 2.5, 1), least(len(turns) / 2, 2.5, 1), most(float(gap.min()), 0.2, 0.05), _stays(m))
+    return min(least(meets, 2.5, 1), least(len(turns) / 2, 2.5, 1), most(float(gap.min()), 0.2, 0.05), stays(m))
 
 
 def kick(m: Motion, side: str) -> float:
@@ -209,7 +206,7 @@ def arm_circles(m: Motion, side: str) -> float:
                 grades[k] = max(
                     grades[k], min(least(float(np.ptp(angle)), 300, 40), least(high, 0.25, 0.1), most(low, -0.2, 0.1))
                 )
-    return min(of_side(grades, side), _stays(m))
+    return min(of_side(grades, side), stays(m))
 
 
 def arabesque(m: Motion, side: str) -> float:

@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, HIPS, PELVIS, SHOULDERS, WRISTS, smooth, velocity
+from marey.checks.kinematics import ANKLES, HEAD, HIPS, PELVIS, SHOULDERS, WRISTS, smooth, swings, velocity
 from marey.motion.feet import runs
 from marey.selector.floor import seated
 from marey.selector.gaits import walks
-from marey.selector.grades import best, every, least, most, of_side, swings
+from marey.selector.grades import best, every, least, most, of_side
 from marey.selector.motion import Array, Motion
 
 

@@ -13,6 +13,11 @@ IN_PLACE = 0.7
 """Grade of a gait that steps on the spot at most: its words say travel."""
 
 
+def stays(m: Motion) -> float:
+    """Grade that the body hardly travels."""
+    return most(m.path, 0.3 * m.seconds + 0.5, 0.3)
+
+
 def _steps(m: Motion) -> int:
     """Return how often the feet pass each other, or rise one after the other."""
     local, feet = m.foot_local, m.feet

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import HEAD, KNEES, NECK, PELVIS, SHOULDERS, WRISTS, body_frame, smooth
+from marey.checks.kinematics import HEAD, KNEES, NECK, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, swings
 from marey.motion.feet import runs
-from marey.selector.grades import every, least, most, of_side, share, some, swings
+from marey.selector.gaits import stays
+from marey.selector.grades import every, least, most, of_side, share, some
 from marey.selector.motion import Array, Bool, Motion
-
-
-def stays(m: Motion) -> float:
-    """Grade that the body hardly travels."""
-    return most(m.path, 0.3 * m.seconds + 0.5, 0.3)
 
 
 def _stands(m: Motion) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from marey.selector.motion import Array, Bool
+from marey.selector.motion import Bool
 
 SIDES = ("left", "right")
 
@@ -39,22 +39,6 @@ def every(mask: Bool) -> Bool:
 def some(mask: Bool) -> Bool:
     """(T,) True where any column of a mask (T, K) is."""
     return np.asarray(mask.any(axis=1), np.bool_)
-
-
-def swings(values: Array, smallest: float) -> list[int]:
-    """Return the frames of the turning points of a signal (T,), those of moves under `smallest` left out."""
-    found, direction, extreme, best = list[int](), 0, 0, float(values[0])
-    for frame, value in enumerate(values.tolist()):
-        move = value - best
-        if direction >= 0 and move < -smallest:
-            found.append(extreme)
-            direction, extreme, best = -1, frame, value
-        elif direction <= 0 and move > smallest:
-            found.append(extreme)
-            direction, extreme, best = 1, frame, value
-        elif move * direction > 0:
-            extreme, best = frame, value
-    return [*found, extreme] if direction else found
 
 
 def of_side(values: Sequence[float], side: str) -> float:
