@@ -87,6 +87,20 @@ def dataset_of(clip: Clip) -> str:
 
 
 @dataclass(frozen=True)
+class Cuts:
+    """Which part of each clip of a batch is read, drawn without knowing how long the clips are."""
+
+    kept: Tensor  # (B,) share of the clip, 0 to 1; 1 = all of it
+    place: Tensor  # (B,) where the part lies: 0 = at the start, below 1
+    least: int  # tokens that a part has at least
+
+    def of(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the first token (B,) and the number of tokens (B,) of the parts of clips of `lengths` (B,)."""
+        count = (self.kept * lengths).round().long().clamp(min=self.least).minimum(lengths)
+        return (self.place * (lengths - count + 1)).long(), count
+
+
+@dataclass(frozen=True)
 class TokenData:
     """Tokens of all clips. A training clip is tokenized from its frames 0, 1, … on, up to the number of frames of a
     token (P): the same motion on P token grids."""
@@ -130,14 +144,17 @@ class TokenData:
         return (counts / counts.sum(1, keepdim=True)).log()
 
     def batch(
-        self, clips: Tensor, phases: Tensor, max_tokens: int, *, size: int | None = None
+        self, clips: Tensor, phases: Tensor, max_tokens: int, *, size: int | None = None, cuts: Cuts | None = None
     ) -> tuple[Tensor, Tensor]:
         """Return tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end. n is
-        `size`, or the longest length."""
-        lengths = self.lengths[clips, phases].clamp(max=max_tokens)
+        `size`, or the longest length. With `cuts`, a part of each clip."""
+        starts, lengths = self.starts[clips, phases], self.lengths[clips, phases].clamp(max=max_tokens)
+        if cuts is not None:
+            first, lengths = cuts.of(lengths)
+            starts = starts + first
         size = int(lengths.max()) if size is None else size
         position = torch.arange(size, device=clips.device)
-        index = (self.starts[clips, phases][:, None] + position).clamp(max=len(self.tokens) - 1)
+        index = (starts[:, None] + position).clamp(max=len(self.tokens) - 1)
         valid = position[None] < lengths[:, None]
         return self.tokens[index].masked_fill(~valid[..., None], -1), lengths
 

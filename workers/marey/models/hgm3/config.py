@@ -140,6 +140,9 @@ class HGM3Config(ModelConfig):
     0 = all actions equally often."""
     sequences: Share = field(default=0.46, metadata=ADDED)
     """Ours: share of draws that are sequences of several actions."""
+    crops: Share = field(default=0.0, metadata=ADDED)
+    """Ours: share of the draws of walks, runs, idles and other actions without beginning and end, of which both
+    transformers learn a part of any length."""
     residual_drop: Share = 0.2  # condition drop of the residual transformer
     length_hidden: tuple[Count, ...] = (512, 256, 128)  # widths of the length estimator (MoMask)
     mining: MiningConfig = MiningConfig()

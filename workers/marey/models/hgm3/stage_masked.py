@@ -139,7 +139,9 @@ class MaskedStage(MaskedObjective):
         self.optimisation = config.train_masked
         self.tokens, self.captions = tokens.first_phases(config.phases), captions
         draws = Draws(config.class_power, config.sequences)
-        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws)
+        self.pairs = Pairs(
+            clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws, crops=config.crops
+        )
         captions.standardise(self.module.masked.text.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.masked.head.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[0])
@@ -225,12 +227,13 @@ class MaskedStage(MaskedObjective):
     def sample(
         self, clips: NDArray[np.int64], rng: np.random.Generator, *, drop: bool = True, size: int | None = None
     ) -> MaskedSample:
-        """Draw phase, caption, τ, noise, drop and level for each clip; with `drop` False, all keep their condition. The
-        sequences are padded to `size` tokens, or to the longest of them."""
+        """Draw phase, part, caption, τ, noise, drop and level for each clip; with `drop` False, all are whole and keep
+        their condition. The sequences are padded to `size` tokens, or to the longest of them."""
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         chosen = torch.from_numpy(clips).to(device)
-        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size)
+        cuts = self.pairs.cuts(clips, rng, device) if drop else None
+        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size, cuts=cuts)
         captions = self.captions.choose(clips, rng)
         return MaskedSample(
             tokens[..., 0],

@@ -60,7 +60,9 @@ class ResidualStage:
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
         draws = Draws(config.class_power, config.sequences)
-        self.pairs = Pairs(clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws)
+        self.pairs = Pairs(
+            clips, self.tokens, captions, config.min_tokens, speeds=config.speeds, draws=draws, crops=config.crops
+        )
         captions.standardise(self.module.normalizer, self.pairs.train.tolist(), config.condition)
         with torch.no_grad():
             self.module.bias.copy_(self.tokens.log_shares(config.tokenizer.codes, self.pairs.train)[1:])
@@ -128,7 +130,8 @@ class ResidualStage:
         device = self.tokens.tokens.device
         phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         chosen = torch.from_numpy(clips).to(device)
-        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size)
+        cuts = self.pairs.cuts(clips, rng, device) if level is None else None
+        tokens, lengths = self.tokens.batch(chosen, phases, self.config.max_tokens, size=size, cuts=cuts)
         sentences = self.captions.sentences(self.captions.choose(clips, rng))
         drawn = rng.integers(1, self.module.levels, size=len(clips))
         levels = torch.from_numpy(drawn).to(device) if level is None else torch.full_like(lengths, level)
