@@ -374,3 +374,21 @@ def test_a_padded_batch_of_the_residual_stage_has_the_loss_of_its_pieces(prepare
     )
     torch.testing.assert_close(padded, loss)
     assert float(shown["accuracy"]) == pytest.approx(float(logs["accuracy"]))
+
+
+def test_both_transformers_learn_parts_of_walks_and_are_judged_by_whole_ones(prepared: PreparedData) -> None:
+    config = replace(TINY, crops=1.0)
+    tokenizer, tokens, captions = encoded(prepared, config)
+    masked = MaskedStage(config, prepared.clips, tokens, captions)
+    residual = ResidualStage(config, prepared.clips, tokens, captions, tokenizer.codebooks)
+    walks = [int(c) for c in masked.pairs.train if prepared.clips[c].content == "walk" and not prepared.clips[c].seams]
+    longest = max(walks, key=lambda c: int(tokens.lengths[c, 0]))
+    clips, whole = np.full(64, longest), set(tokens.lengths[longest].tolist())
+    rng = np.random.default_rng(0)
+    for learned, judged in (
+        (masked.sample(clips, rng).lengths, masked.sample(clips, rng, drop=False).lengths),
+        (residual._draw(clips, rng, None).lengths, residual._draw(clips, rng, 1).lengths),
+    ):
+        assert min(learned.tolist()) == config.min_tokens
+        assert len(set(learned.tolist())) > 10
+        assert set(judged.tolist()) == whole
