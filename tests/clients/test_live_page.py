@@ -147,6 +147,21 @@ def test_it_pauses_goes_on_and_stops(tab, server):
     tab.wait(f"{IN_FORCE} === 'another one'")
 
 
+def test_it_ends_in_the_pose_of_a_motion(browser, tab, server):
+    assert not tab.ask("document.getElementById('motion').offsetParent")
+    begin(tab)
+    tab.type("another", "motion")
+    tab.press("Enter")
+    tab.wait("document.getElementById('message').textContent === 'There is no such motion. List motions. '")
+    browser.complaints.clear()  # the refusal
+    tab.type("motion-of-the-clip", "motion")
+    tab.type("12", "pose-frame")
+    tab.press("Enter")
+    tab.wait(state("ended"))
+    assert server.heard == [{"kind": "end", "pose": {"motion": {"id": "motion-of-the-clip", "frame": 12}}}]
+    assert not tab.ask("document.getElementById('motion').offsetParent")
+
+
 def test_the_keyboard_is_enough(tab, server):
     begin(tab)
     tab.press("Escape")  # from the prompt to the view, where letters are keys

@@ -133,6 +133,7 @@ class WalkingServer:
         app.add_api_route("/v1/motions/motion-of-the-clip/files/{format}", self._file, methods=["GET"])
         app.add_api_route("/v1/streams", self._begin, methods=["POST"])
         app.add_api_route("/v1/streams/{stream}", self._show, methods=["GET"])
+        app.add_api_route("/v1/streams/{stream}/end", self._end, methods=["POST"])
         app.add_api_websocket_route("/v1/streams/{stream}", self._watch)
         return app
 
@@ -171,6 +172,17 @@ class WalkingServer:
     async def _show(self, stream: str) -> JSONResponse:
         walk = self._walks.get(stream)
         return JSONResponse(walk.view()) if walk else _problem(404, "there is no such stream", "")
+
+    async def _end(self, request: Request, stream: str) -> JSONResponse:
+        """It ends at once, whatever the pose; it knows one motion."""
+        if request.headers.get("authorization") != f"Bearer {KEY}":
+            return _problem(401, "this API key is unknown or revoked", "")
+        pose = (await request.json())["pose"]
+        if pose["motion"]["id"] != "motion-of-the-clip":
+            return _problem(422, "there is no such motion", "List motions.")
+        self.heard.append({"kind": "end", "pose": pose})
+        self._walks[stream].state = "ended"
+        return JSONResponse(self._walks[stream].view(), 202)
 
     async def _watch(self, websocket: WebSocket, stream: str) -> None:
         self._loop = asyncio.get_running_loop()

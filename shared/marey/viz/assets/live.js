@@ -46,6 +46,7 @@
     $("pause").disabled = state !== "live" && state !== "paused";
     $("stop").disabled = !open || state === "starting";
     $("options").hidden = open;
+    $("ending").hidden = state !== "live" && state !== "paused";
     $("examples").hidden = !SUGGESTED.length || state === "starting";
     $("clip").hidden = open || !$("clip").childElementCount;
     resize();
@@ -334,6 +335,13 @@
     else if (await ask("DELETE", `v1/streams/${encodeURIComponent(session.stream.id)}`, session.link.key)) say("Stopping, when the connection is back …");
   }
 
+  // The last second passes into the pose of a frame of a stored motion.
+  async function endOnPose(motion, frame) {
+    const { stream, link } = session;
+    const answer = await ask("POST", `v1/streams/${encodeURIComponent(stream.id)}/end`, link.key, { pose: { motion: { id: motion, frame } } });
+    if (answer) say("Passing into the pose …");
+  }
+
   // ---------------------------------------------------------------- drawing
   let last = null;
   let told = 0;
@@ -394,6 +402,10 @@
     } else if (prompt) start(prompt);
     else if (wanted()) watch(wanted());
     else $("prompt").focus();
+  };
+  $("ending").onsubmit = (event) => {
+    event.preventDefault();
+    endOnPose($("motion").value.trim(), Number($("pose-frame").value));
   };
 
   const KEYS = {
