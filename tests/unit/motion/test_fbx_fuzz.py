@@ -53,7 +53,7 @@ def read_damaged(name: str, count: int, seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["ours", "ours, FBX 7.5, packed"])
 def test_damaged_files_are_refused_or_read(name: str) -> None:
-    read_damaged(name, 120, 1)
+    read_damaged(name, 60, 1)
 
 
 @pytest.mark.data

@@ -306,7 +306,7 @@ def test_what_is_no_body_is_finished_without_nan(scale):
 
 
 def test_features_reach_every_export_format(tmp_path):
-    clip = finish_motion(SNAPMOGEN_296.encode_pose(*rigged(7, 45)), SNAPMOGEN_296, manifest={"prompt": "sway"})
+    clip = finish_motion(SNAPMOGEN_296.encode_pose(*rigged(7, 16)), SNAPMOGEN_296, manifest={"prompt": "sway"})
     others = ("smplx", "usd")  # the one needs a model of the user's, the other an extra
     known = {name: each for name, each in exporters().items() if name not in others}
     files = {name: each.encode(clip, Coordinates()) for name, each in known.items()}
