@@ -117,7 +117,7 @@ def ndjson(_context: object, value: object) -> bytes:
 document = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 operations = document.exclude(path="/readyz")  # which answers 503 on purpose: no worker runs here
 OPERATIONS = {found.ok().label: found.ok() for found in operations.get_all_operations()}
-"""By their labels. Tests make their cases when they run: those of `parametrize()` are made by every process that collects."""
+"""By their labels. Tests make their cases when they run: `parametrize()` makes them in every process that collects."""
 QUICK = settings(
     max_examples=EXAMPLES,
     deadline=None,
