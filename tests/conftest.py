@@ -45,8 +45,18 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 """Tests run in several processes, which share the cores already; those of more threads set their number."""
 
 
-def pytest_configure() -> None:
-    """Refuse to run where the installed entry points are not those of pyproject.toml: registries would be empty."""
+FEW_EXAMPLES = 40
+"""Of a property in the fast tests, where it names no number of its own; `make test-all` tries hypothesis' 100."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse to run where the installed entry points are not those of pyproject.toml: registries would be empty.
+
+    Properties are tried with few examples unless slow tests run, too.
+    """
+    if "not slow" in config.getoption("markexpr"):
+        settings.register_profile("fast tests", settings.get_profile("shared machine"), max_examples=FEW_EXAMPLES)
+        settings.load_profile("fast tests")
     project = tomllib.loads((Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
     for group, wanted in project["project"]["entry-points"].items():
         missing = wanted.keys() - {entry.name for entry in entry_points(group=group)}
