@@ -56,3 +56,27 @@ def write_tiny_t5(name: str, folder: Path) -> Path:
     )  # fmt: skip
     T5EncoderModel(config).save_pretrained(folder)
     return folder
+
+
+def write_tiny_distilbert(folder: Path) -> Path:
+    """DistilBERT with its head for masked words, as published: 768 wide, two layers, a tokenizer without case."""
+    from tokenizers import Tokenizer, models, normalizers, pre_tokenizers, processors
+    from transformers import DistilBertConfig, DistilBertForMaskedLM
+
+    letters = "abcdefghijklmnopqrstuvwxyz"
+    pieces = ["[PAD]", "[UNK]", "[CLS]", "[SEP]", "[MASK]", *WORDS]
+    pieces += [mark + letter for mark in ("", "##") for letter in letters if mark + letter not in pieces] + list(".,'")
+    raw = Tokenizer(models.WordPiece({piece: index for index, piece in enumerate(pieces)}, unk_token="[UNK]"))
+    raw.normalizer = normalizers.BertNormalizer(lowercase=True)
+    raw.pre_tokenizer = pre_tokenizers.BertPreTokenizer()
+    raw.post_processor = processors.TemplateProcessing(
+        single="[CLS] $A [SEP]", special_tokens=[("[CLS]", 2), ("[SEP]", 3)]
+    )
+    raw.save(str(folder / "tokenizer.json"))
+    (folder / "vocab.txt").write_text("\n".join(pieces) + "\n", encoding="utf-8")
+    settings = {"do_lower_case": True, "model_max_length": 512}
+    (folder / "tokenizer_config.json").write_text(json.dumps(settings), encoding="utf-8")
+    torch.manual_seed(0)
+    config = DistilBertConfig(vocab_size=len(pieces), dim=768, hidden_dim=64, n_layers=2, n_heads=4)
+    DistilBertForMaskedLM(config).save_pretrained(folder)
+    return folder

@@ -62,7 +62,9 @@ class DataSource(_Frozen):
 class TextSpec(_Frozen):
     """The text pipeline of a bundle: fixed at training, refused when a component differs."""
 
-    encoder: Literal["minilm", "clip-vit-b32", "clip-vit-l14", "t5-base", "t5-v1_1-base"] = "minilm"
+    encoder: Literal["minilm", "clip-vit-b32", "clip-vit-l14", "t5-base", "t5-v1_1-base", "distilbert-base-uncased"] = (
+        "minilm"
+    )
     encoder_sha256: Sha256 | None = None
     width: int = Field(default=384, ge=1)
     labeller: str = "light"

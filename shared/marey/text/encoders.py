@@ -23,7 +23,14 @@ from marey.core.errors import InvalidBundle, InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.core.settings import Settings, settings
 
-WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "clip-vit-l14": 768, "t5-base": 768, "t5-v1_1-base": 768}
+WIDTHS = {
+    "minilm": 384,
+    "clip-vit-b32": 512,
+    "clip-vit-l14": 768,
+    "t5-base": 768,
+    "t5-v1_1-base": 768,
+    "distilbert-base-uncased": 768,
+}
 BUNDLES = {"minilm": "minilm-l6"}
 """Encoders that are bundles, by name."""
 HUB = {
@@ -31,6 +38,7 @@ HUB = {
     "clip-vit-l14": "openai/clip-vit-large-patch14",
     "t5-base": "google-t5/t5-base",
     "t5-v1_1-base": "google/t5-v1_1-base",
+    "distilbert-base-uncased": "distilbert/distilbert-base-uncased",
 }
 
 

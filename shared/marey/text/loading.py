@@ -38,6 +38,10 @@ def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
         from marey.text.clip_encoder import ClipEncoder
 
         return ClipEncoder(name, folder)
+    if name.startswith("distilbert"):
+        from marey.text.distilbert_encoder import DistilBertEncoder
+
+        return DistilBertEncoder(name, folder)
     from marey.text.t5_encoder import T5Encoder
 
     return T5Encoder(name, folder)

@@ -2,55 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
-from marey.nn.threads import one_thread
-from marey.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
-from marey.text.pretrained import load_pretrained, read_config
+from marey.text.encoders import HUB, WIDTHS
+from marey.text.pretrained import read_config
+from marey.text.states_encoder import StatesEncoder
 
-MAX_TOKENS = 512
 FEED_FORWARD = {"t5-base": "relu", "t5-v1_1-base": "gated-gelu"}
 """Both are 768 wide; the feed-forward identifies the version."""
 
 
-class T5Encoder:
-    """Token states of the encoder; pooled = their mean, the end token included."""
+class T5Encoder(StatesEncoder):
+    """Token states of T5's encoder, the end token included."""
 
     def __init__(self, name: str, folder: Path) -> None:
-        from transformers import AutoTokenizer, T5EncoderModel
+        from transformers import T5EncoderModel
 
         check_t5(name, folder)
-        self.name = name
-        self.width = WIDTHS[name]
-        self.sha256 = weights_sha256(folder)
-        self._tokenizer: Any = load_pretrained(AutoTokenizer, folder)
-        self._model: Any = load_pretrained(T5EncoderModel, folder, weights=True)
-
-    @one_thread()
-    @torch.inference_mode()
-    def encode(self, text: str) -> Encoding:
-        """Encode one text; tokens past 512 are left out."""
-        inputs = self._tokenizer(
-            text, truncation=True, max_length=MAX_TOKENS, return_offsets_mapping=True, return_tensors="pt"
-        )
-        offsets = tuple((int(a), int(b)) for a, b in inputs.pop("offset_mapping")[0].tolist())
-        tokens = self._model(**inputs).last_hidden_state[0]
-        return Encoding(tokens.mean(dim=0).numpy(), tokens.numpy(), offsets)
-
-    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """One by one: a product of other rows may round differently."""
-        return [self.encode(text).pooled for text in texts]
-
-    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """One by one, as `pooled`."""
-        return [self.encode(text).tokens for text in texts]
+        super().__init__(name, folder, T5EncoderModel)
 
 
 def check_t5(name: str, folder: Path) -> None:

@@ -20,9 +20,10 @@ from marey.importing.encoder_files import write_encoder
 from marey.text.encoders import find_weights, weights_sha256
 from marey.text.loading import load_encoder
 from marey.text.pipeline import TextPipeline
-from tests.support.tiny_encoders import write_tiny_clip, write_tiny_t5
+from tests.support.tiny_encoders import write_tiny_clip, write_tiny_distilbert, write_tiny_t5
 
 TEXT = "a person walks and waves"
+DISTILBERT = "distilbert-base-uncased"
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     write_tiny_clip(root / "clip-vit-b32")
     for name in ("t5-base", "t5-v1_1-base"):
         write_tiny_t5(name, root / name)
+    (root / DISTILBERT).mkdir()
+    write_tiny_distilbert(root / DISTILBERT)
     return {path.name: path for path in root.iterdir()}
 
 
@@ -49,6 +52,9 @@ def pickled(folder: Path, target: Path) -> Path:
     shutil.copytree(folder, target)
     weights = load_file(target / "model.safetensors")
     (target / "model.safetensors").unlink()
+    if "vocab_transform.weight" in weights:  # DistilBERT's head is a part of the published file
+        torch.save(weights, target / "pytorch_model.bin")
+        return target
     clip = "text_projection.weight" in weights
     more = {"vision_model.x": torch.ones(2)} if clip else {"decoder.block.0.x": torch.ones(2), "lm_head.weight": None}
     if clip:
@@ -68,7 +74,7 @@ def change_weights(folder: Path, target: Path, change: Callable[[dict[str, torch
     return target
 
 
-@pytest.mark.parametrize("name", ["clip-vit-b32", "t5-base", "t5-v1_1-base"])
+@pytest.mark.parametrize("name", ["clip-vit-b32", "t5-base", "t5-v1_1-base", DISTILBERT])
 def test_an_imported_encoder_is_the_published_one_and_a_bundle(
     folders: dict[str, Path], models: Path, name: str
 ) -> None:
@@ -83,13 +89,13 @@ def test_an_imported_encoder_is_the_published_one_and_a_bundle(
         write_encoder(name, folders[name], models / name)
 
 
-@pytest.mark.parametrize("name", ["clip-vit-b32", "t5-v1_1-base"])
+@pytest.mark.parametrize("name", ["clip-vit-b32", "t5-v1_1-base", DISTILBERT])
 def test_pickled_weights_are_converted_without_the_other_towers(
     folders: dict[str, Path], models: Path, tmp_path: Path, name: str
 ) -> None:
     write_encoder(name, pickled(folders[name], tmp_path / "bin"), models / name)
     stored = Bundle.open(models / name).tensors("encoder")
-    assert not [key for key in stored if key.startswith(("vision_model", "decoder", "lm_head"))]
+    assert not [key for key in stored if key.startswith(("vision_model", "decoder", "lm_head", "vocab_"))]
     mine, theirs = load_encoder(name).encode(TEXT), load_encoder(name, folders[name]).encode(TEXT)
     np.testing.assert_allclose(mine.tokens, theirs.tokens, atol=1e-5)
 
@@ -99,6 +105,15 @@ def claim(folder: Path, target: Path, **fields: object) -> Path:
     shutil.copytree(folder, target)
     config = json.loads((target / "config.json").read_text(encoding="utf-8"))
     (target / "config.json").write_text(json.dumps({**config, **fields}), encoding="utf-8")
+    return target
+
+
+def keep_case(folder: Path, target: Path) -> Path:
+    """A copy whose tokenizer tells upper case from lower case."""
+    shutil.copytree(folder, target)
+    content = json.loads((target / "tokenizer.json").read_text(encoding="utf-8"))
+    content["normalizer"]["lowercase"] = False
+    (target / "tokenizer.json").write_text(json.dumps(content), encoding="utf-8")
     return target
 
 
@@ -117,6 +132,7 @@ def drop_layer(weights: dict[str, torch.Tensor]) -> None:
 
 def test_other_models_versions_and_widths_are_refused(folders: dict[str, Path], models: Path, tmp_path: Path) -> None:
     t5, old, clip = folders["t5-v1_1-base"], folders["t5-base"], folders["clip-vit-b32"]
+    bert = folders[DISTILBERT]
     cases: list[tuple[str, Path, type[MareyError], str]] = [
         ("t5-v1_1-base", old, InvalidFile, "its feed-forward is 'relu', not 'gated-gelu'"),
         ("t5-base", t5, InvalidFile, "its feed-forward is 'gated-gelu'"),
@@ -131,6 +147,15 @@ def test_other_models_versions_and_widths_are_refused(folders: dict[str, Path], 
         ("t5-v1_1-base", change_weights(t5, tmp_path / "nan", poison), InvalidFile, "shared.weight holds NaN"),
         ("t5-v1_1-base", change_weights(t5, tmp_path / "one", drop_layer), InvalidFile, "has 1 layers, and its"),
         ("t5-v1_1-base", tmp_path / "nowhere", NotFound, "no such folder"),
+        (DISTILBERT, t5, InvalidFile, "is not DistilBERT of width 768"),
+        ("t5-base", bert, InvalidFile, "is not T5 of width 768"),
+        (DISTILBERT, claim(bert, tmp_path / "wider", dim=1024), InvalidFile, "is not DistilBERT of width 768"),
+        (
+            DISTILBERT, claim(bert, tmp_path / "tuned", architectures=["DistilBertForSequenceClassification"]),
+            InvalidFile, "its weights are those of .*ForSequenceClassification",
+        ),
+        (DISTILBERT, keep_case(bert, tmp_path / "cased"), InvalidFile, "its tokenizer keeps upper case"),
+        (DISTILBERT, claim(bert, tmp_path / "deep", n_layers=6), InvalidFile, "has 2 layers, and its config"),
     ]  # fmt: skip
     for name, folder, kind, said in cases:
         with pytest.raises(kind, match=said) as caught:

@@ -162,6 +162,19 @@ def test_the_two_t5_of_one_width_are_not_taken_for_each_other(tiny_t5: tuple[str
         load_encoder(other, folder)
 
 
+def test_distilbert_gives_aligned_tokens_without_case_up_to_512(tiny_distilbert: Path) -> None:
+    encoder = load_encoder("distilbert-base-uncased", tiny_distilbert)
+    encoding = encoder.encode(TEXT)
+    assert (encoder.width, encoding.pooled.shape) == (768, (768,))
+    assert encoding.tokens.shape == (len(encoding.offsets), 768)
+    assert encoding.offsets[0] == encoding.offsets[-1] == (0, 0)
+    check_alignment(encoding, TEXT, "waves")
+    np.testing.assert_array_equal(encoder.encode(TEXT.upper()).tokens, encoding.tokens)
+    long = encoder.encode(" ".join([LONG] * 4))
+    assert len(long.tokens) == 512
+    assert long.offsets[-1] == (0, 0)
+
+
 def test_another_model_is_not_taken_for_clip(tiny_t5: tuple[str, Path]) -> None:
     with pytest.raises(InvalidFile, match="CLIP"):
         load_encoder("clip-vit-b32", tiny_t5[1])

@@ -23,6 +23,7 @@ from marey.core.errors import InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.importing.checkpoint import Account, Checkpoint
 from marey.text.clip_encoder import check_clip
+from marey.text.distilbert_encoder import check_distilbert
 from marey.text.encoders import HUB, WIDTHS
 from marey.text.loading import load_encoder
 from marey.text.pretrained import read_config
@@ -97,6 +98,15 @@ PUBLISHED = {
         {"shared.weight": 768, f"{_T5_FEED_FORWARD}wi_0.weight": 768, f"{_T5_FEED_FORWARD}wi_1.weight": 768},
         _T5_BLOCKS, ("num_layers",),
     ),
+    "distilbert-base-uncased": Published(
+        "Apache-2.0",
+        "Sanh et al. 2019, DistilBERT, a distilled version of BERT",
+        r"distilbert\.(embeddings|transformer)\..*",
+        "the head that predicts masked words",
+        {"distilbert.embeddings.word_embeddings.weight": 768},
+        r"distilbert\.transformer\.layer\.(\d+)\.",
+        ("n_layers",),
+    ),
 }  # fmt: skip
 
 
@@ -123,10 +133,7 @@ def write_encoder(
     known = PUBLISHED[name]
     if not source.is_dir():
         raise NotFound("there is no such folder", where=str(source), hint=f"It should hold the files of {HUB[name]}.")
-    if name.startswith("t5"):
-        check_t5(name, source)
-    else:
-        check_clip(name, source)
+    _check_files(name, source)
     with (
         BundleWriter(output, overwrite=overwrite) as writer,
         TemporaryDirectory(prefix=".", dir=output.parent) as temporary,  # /tmp may not have room for a gigabyte
@@ -149,6 +156,15 @@ def write_encoder(
             licence=licence or known.licence,
             training={"command": f"marey models import {name} FOLDER -o {output.name}", "sha256": account.sha256},
         )
+
+
+def _check_files(name: str, source: Path) -> None:
+    if name.startswith("t5"):
+        check_t5(name, source)
+    elif name.startswith("distilbert"):
+        check_distilbert(name, source)
+    else:
+        check_clip(name, source)
 
 
 def _weights(name: str, source: Path, temporary: Path) -> tuple[Path, Account]:

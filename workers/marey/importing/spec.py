@@ -23,6 +23,12 @@ CLIP_L14 = ImportKind(
     run="marey.importing.encoders:import_encoder",
     licence="MIT",
 )
+DISTILBERT = ImportKind(
+    name="distilbert-base-uncased",
+    help="Text encoder DistilBERT: the folder of distilbert/distilbert-base-uncased.",
+    run="marey.importing.encoders:import_encoder",
+    licence="Apache-2.0",
+)
 T5 = ImportKind(
     name="t5-base",
     help="Text encoder T5 base: the folder of google-t5/t5-base.",

@@ -138,7 +138,10 @@ def text(
     ] = None,
     encoder: Annotated[
         str | None,
-        typer.Option("--encoder", help="minilm (the standard), clip-vit-b32, clip-vit-l14, t5-base or t5-v1_1-base."),
+        typer.Option(
+            "--encoder",
+            help="minilm (the standard), clip-vit-b32, clip-vit-l14, t5-base, t5-v1_1-base or distilbert-base-uncased.",
+        ),
     ] = None,
     labeller: Annotated[
         str | None,
