@@ -95,3 +95,44 @@ def test_statistics_of_another_shape_or_kind_are_refused(folder: Path, values: n
     np.save(download.root / "rvq_nq6" / "meta" / "std.npy", values)
     with pytest.raises(InvalidFile, match=said):
         download.statistics(download.root / "rvq_nq6" / "meta", 4)
+
+
+def test_statistics_are_read_from_files_of_torch_as_well(tmp_path: Path) -> None:
+    values = {"mean": torch.tensor([-1.0, 0.25]), "std": torch.tensor([0.1, 2.0]).double()}
+    for name, value in values.items():
+        torch.save(value, tmp_path / f"{name}.pt")
+    download = Download(tmp_path)
+    mean, std = download.statistics(tmp_path, 2, ending="pt")
+    assert mean.dtype == std.dtype == np.float32
+    assert (mean.tolist(), std.tolist()) == ([-1, 0.25], [np.float32(0.1), 2])
+    assert [each.file for each in download.finish()] == ["mean.pt", "std.pt"]
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (torch.tensor([1.0, 0.0]), r"std\.pt: holds deviations that are not above 0"),
+        (torch.tensor([1.0, torch.nan]).bfloat16(), "NaN"),
+        (torch.ones(3), r"has shape \(3,\), not \(2\)"),
+        (torch.ones(2, dtype=torch.int64), "holds int64"),
+        (torch.ones(2).to_sparse(), "not one array of numbers"),
+        (torch.ones(2, device="meta"), "not one array of numbers"),
+        ({"std": torch.ones(2)}, "holds dict, not one array of numbers"),
+        (torch.nn.Linear(1, 1), "holds code or objects of Python"),
+    ],
+)
+def test_files_of_torch_with_anything_else_are_refused(tmp_path: Path, value: object, said: str) -> None:
+    torch.save(torch.ones(2), tmp_path / "mean.pt")
+    torch.save(value, tmp_path / "std.pt")
+    with pytest.raises(InvalidFile, match=said):
+        Download(tmp_path).statistics(tmp_path, 2, ending="pt")
+
+
+def test_a_configuration_in_json_is_read_and_in_the_account(tmp_path: Path) -> None:
+    (tmp_path / "config.json").write_text('{"model": {"layers": 6}}', encoding="utf-8")
+    download = Download(tmp_path)
+    assert download.json(tmp_path / "config.json").section("model").integer("layers") == 6
+    assert [each.file for each in download.finish()] == ["config.json"]
+    (tmp_path / "config.json").write_text("[1]", encoding="utf-8")
+    with pytest.raises(InvalidFile, match="no table of fields"):
+        download.json(tmp_path / "config.json")

@@ -138,3 +138,15 @@ def test_a_missing_or_empty_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "opt.txt").write_text("nothing here\n", encoding="utf-8")
     with pytest.raises(InvalidFile, match="holds no lines"):
         read_options(tmp_path / "opt.txt")
+
+
+def test_sizes_have_limits() -> None:
+    fields = Fields("opt.txt", {"heads": 6, "width": 0})
+    assert fields.size("heads", 6) == 6
+    assert fields.size("layers", 9, default=2) == 2
+    for name, high, low, said in (("heads", 5, 1, "heads: 6 is outside 1 to 5"), ("width", 9, 1, "width: 0 is outside"),
+                                  ("heads", 9, 7, "6 is outside 7 to 9")):  # fmt: skip
+        with pytest.raises(InvalidFile, match=said):
+            fields.size(name, high, low=low)
+    with pytest.raises(InvalidFile, match="has no 'layers'"):
+        fields.size("layers", 9)

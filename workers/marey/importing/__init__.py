@@ -28,7 +28,7 @@ from marey.importing.card import make_card, provenance
 from marey.importing.checkpoint import Account, Checkpoint, Section
 from marey.importing.download import Download, Statistics
 from marey.importing.encoders import spec_of, text_encoder_of
-from marey.importing.fields import Fields, read_options, read_yaml
+from marey.importing.fields import Fields, read_json_fields, read_options, read_yaml
 from marey.importing.request import ImportRequest, find_kind, run_import
 
 __all__ = [
@@ -42,6 +42,7 @@ __all__ = [
     "find_kind",
     "make_card",
     "provenance",
+    "read_json_fields",
     "read_options",
     "read_yaml",
     "run_import",

@@ -12,7 +12,8 @@ from marey.core.arrays import check_array, read_npy
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
 from marey.importing.checkpoint import Account, Checkpoint
-from marey.importing.fields import Fields, read_options, read_yaml
+from marey.importing.fields import Fields, read_json_fields, read_options, read_yaml
+from marey.importing.torch_files import load_array
 
 Statistics = tuple[NDArray[np.float32], NDArray[np.float32]]
 AGAIN = "Unpack the download as it is, and name the folder that holds this file."
@@ -92,26 +93,34 @@ class Download:
         self.note(file)
         return found
 
-    def statistics(self, folder: Path, width: int) -> Statistics:
-        """Read `mean.npy` and `std.npy`, each (width,).
+    def json(self, file: Path) -> Fields:
+        """Read a JSON file; see `read_json_fields` for errors."""
+        found = read_json_fields(file)
+        self.note(file)
+        return found
+
+    def statistics(self, folder: Path, width: int, *, ending: str = "npy") -> Statistics:
+        """Read `mean` and `std`, each (width,), with the ending of numpy's files (`npy`) or of torch's (`pt`).
 
         Raises:
             NotFound: one is missing.
             InvalidFile: of another shape, not finite, or a deviation that is not above 0.
         """
-        mean, std = (self.array(folder / f"{name}.npy", (width,)).astype(np.float32) for name in ("mean", "std"))
+        mean, std = (self.array(folder / f"{name}.{ending}", (width,)).astype(np.float32) for name in ("mean", "std"))
         if not (std > 0).all():
-            raise InvalidFile("holds deviations that are not above 0", where=str(folder / "std.npy"), hint=AGAIN)
+            where = str(folder / f"std.{ending}")
+            raise InvalidFile("holds deviations that are not above 0", where=where, hint=AGAIN)
         return mean, std
 
     def array(self, file: Path, shape: tuple[int | None, ...]) -> NDArray[np.floating]:
-        """Read an npy file of finite numbers; None = any length of this axis.
+        """Read an npy file of finite numbers, or a `.pt` file of one tensor of them; None = any length of this axis.
 
         Raises:
             NotFound: it is missing.
             InvalidFile: of another shape or kind, damaged, or pickled.
         """
-        found = check_array(read_npy(file, hint=AGAIN), "array", str(file), kinds="f", shape=shape, hint=AGAIN)
+        stored = load_array(file) if file.suffix == ".pt" else read_npy(file, hint=AGAIN)
+        found = check_array(stored, "array", str(file), kinds="f", shape=shape, hint=AGAIN)
         self.note(file)
         return found
 

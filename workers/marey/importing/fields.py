@@ -1,4 +1,4 @@
-"""Configurations of other projects: `opt.txt` and YAML, with typed fields whose errors name file and field."""
+"""Configurations of other projects: `opt.txt`, YAML and JSON, with typed fields whose errors name file and field."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marey.core.documents import read_bytes
+from marey.core.documents import read_bytes, read_json
 from marey.core.errors import InvalidFile
 
 MAX_BYTES = 2**20
@@ -58,6 +58,17 @@ class Fields:
         if not isinstance(found, int) or isinstance(found, bool):
             raise self._not(name, found, "a whole number")
         return found
+
+    def size(self, name: str, high: int, *, low: int = 1, default: int | None = None) -> int:
+        """Return a whole number between `low` and `high`, both included: a size beyond them is damaged.
+
+        Raises:
+            InvalidFile: it is outside, something else, or missing without a default.
+        """
+        value = self.integer(name, default)
+        if not low <= value <= high:
+            raise InvalidFile(f"{name}: {value} is outside {low} to {high}", where=self.where, hint=HINT)
+        return value
 
     def number(self, name: str, default: float | None = None) -> float:
         """Return a finite number; `1e-05` counts, which both formats read as text. See `integer`."""
@@ -159,6 +170,19 @@ def read_yaml(file: Path) -> Fields:
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise InvalidFile(f"is not YAML of plain values: {reason}", where=str(file), hint=HINT) from None
+    if not isinstance(values, Mapping):
+        raise InvalidFile("holds no table of fields", where=str(file), hint=HINT)
+    return Fields(str(file), values)
+
+
+def read_json_fields(file: Path) -> Fields:
+    """Read a JSON file.
+
+    Raises:
+        NotFound: there is no such file.
+        InvalidFile: too large, not JSON, or no table of fields.
+    """
+    values: Any = read_json(file, limit=MAX_BYTES, hint=HINT)
     if not isinstance(values, Mapping):
         raise InvalidFile("holds no table of fields", where=str(file), hint=HINT)
     return Fields(str(file), values)

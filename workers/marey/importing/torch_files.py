@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.core.errors import InvalidFile, NotFound
@@ -40,6 +41,26 @@ def load_torch(file: Path, *, limit: int = MAX_BYTES) -> Mapping[str, Any]:
         NotFound: there is no such file.
         InvalidFile: over the limit, truncated, of another format, with Python objects, or no dictionary.
     """
+    loaded = _load(file, limit)
+    if not isinstance(loaded, Mapping) or not all(isinstance(key, str) for key in loaded):
+        raise InvalidFile(f"holds {type(loaded).__name__}, not a dictionary of weights", where=str(file), hint=AGAIN)
+    return loaded
+
+
+def load_array(file: Path, *, limit: int = MAX_BYTES) -> NDArray[Any]:
+    """Load a file that `torch.save` wrote of one tensor; floating numbers become float64.
+
+    Raises:
+        NotFound, InvalidFile: as `load_torch`, or it holds something else.
+    """
+    loaded = _load(file, limit)
+    plain = isinstance(loaded, Tensor) and loaded.layout is torch.strided and loaded.device.type == "cpu"
+    if not plain or loaded.is_quantized:
+        raise InvalidFile(f"holds {type(loaded).__name__}, not one array of numbers", where=str(file), hint=AGAIN)
+    return (loaded.double() if loaded.is_floating_point() else loaded).numpy(force=True)
+
+
+def _load(file: Path, limit: int) -> Any:
     mapped = _check_format(file, limit)
     try:
         loaded: Any = torch.load(file, map_location="cpu", weights_only=True, mmap=mapped)
@@ -49,8 +70,6 @@ def load_torch(file: Path, *, limit: int = MAX_BYTES) -> Mapping[str, Any]:
         raise InvalidFile(
             f"cannot be read: {_first_line(error)}", where=str(file), hint=f"It is truncated or damaged. {AGAIN}"
         ) from None
-    if not isinstance(loaded, Mapping) or not all(isinstance(key, str) for key in loaded):
-        raise InvalidFile(f"holds {type(loaded).__name__}, not a dictionary of weights", where=str(file), hint=AGAIN)
     _check_sizes(file, loaded, limit)
     return loaded
 
@@ -127,7 +146,7 @@ def tensors_in(value: object) -> Iterator[Tensor]:
             left += each
 
 
-def _check_sizes(file: Path, loaded: Mapping[str, Any], limit: int) -> None:
+def _check_sizes(file: Path, loaded: object, limit: int) -> None:
     """Refuse tensors that claim more numbers than a file can hold: a stride of 0 repeats one without end."""
     if sum(each.numel() * each.element_size() for each in tensors_in(loaded)) > limit:
         raise InvalidFile(f"its tensors have over {limit:,} bytes", where=str(file), hint="Is it a checkpoint?")

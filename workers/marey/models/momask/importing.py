@@ -116,7 +116,7 @@ def _read_config(download: Download, folder: Folder) -> MoMaskConfig:
     return replace(
         known,
         tokenizer=tokenizer,
-        max_frames=_size(masked, "max_motion_length", known.max_frames, default=known.max_frames),
+        max_frames=masked.size("max_motion_length", known.max_frames, default=known.max_frames),
         masked=_read_transformer(masked),
         residual=_read_transformer(residual),
         shared=residual.flag("share_weight"),
@@ -137,31 +137,23 @@ def _read_tokenizer(vq: Fields) -> TokenizerConfig:
     vq.expect("vq_act", "relu")
     vq.expect("vq_norm", "None")
     vq.expect("shared_codebook", False)
-    code_width = _size(vq, "code_dim", MAX_SIZE)
+    code_width = vq.size("code_dim", MAX_SIZE)
     vq.expect("output_emb_width", code_width)
     return TokenizerConfig(
-        width=_size(vq, "width", MAX_SIZE),
-        depth=_size(vq, "depth", 8),
-        stages=_size(vq, "down_t", 4),
-        levels=_size(vq, "num_quantizers", MAX_COUNT, low=2),
-        codes=_size(vq, "nb_code", 2 * MAX_SIZE),
+        width=vq.size("width", MAX_SIZE),
+        depth=vq.size("depth", 8),
+        stages=vq.size("down_t", 4),
+        levels=vq.size("num_quantizers", MAX_COUNT, low=2),
+        codes=vq.size("nb_code", 2 * MAX_SIZE),
         code_width=code_width,
     )
 
 
 def _read_transformer(fields: Fields) -> TransformerConfig:
-    width, heads = _size(fields, "latent_dim", MAX_SIZE), _size(fields, "n_heads", MAX_COUNT)
+    width, heads = fields.size("latent_dim", MAX_SIZE), fields.size("n_heads", MAX_COUNT)
     if width % heads or width % 2:
         raise InvalidFile(f"n_heads: {heads} heads do not divide a width of {width}", where=fields.where)
-    return TransformerConfig(_size(fields, "n_layers", MAX_COUNT), heads, width, _size(fields, "ff_size", MAX_SIZE))
-
-
-def _size(fields: Fields, name: str, high: int, *, low: int = 1, default: int | None = None) -> int:
-    """Return a whole number between `low` and `high`; raise InvalidFile if it is missing or out of range."""
-    value = fields.integer(name, default)
-    if not low <= value <= high:
-        raise InvalidFile(f"{name}: {value} is outside {low} to {high}", where=fields.where)
-    return value
+    return TransformerConfig(fields.size("n_layers", MAX_COUNT), heads, width, fields.size("ff_size", MAX_SIZE))
 
 
 def _options(checkpoint: Path) -> Path:
