@@ -19,16 +19,11 @@ from marey.evaluator.assembly import renew_reference
 from marey.evaluator.bundle import write_bundle
 from marey.evaluator.config import EvaluatorConfig, NetworkConfig
 from marey.evaluator.loading import load_evaluator
+from marey.evaluator.published_names import published_name
 from marey.evaluator.reference import RealClips
 from marey.evaluator.snapmogen import SnapMoGenEvaluator
 from marey.evaluator.snapmogen_import import import_snapmogen
-from marey.evaluator.snapmogen_model import (
-    MODEL,
-    PUBLIC,
-    SnapMoGenMotionEncoder,
-    SnapMoGenSentenceEncoder,
-    published_name,
-)
+from marey.evaluator.snapmogen_model import MODEL, PUBLIC, SnapMoGenMotionEncoder, SnapMoGenSentenceEncoder
 from marey.importing import ImportRequest, spec_of
 from marey.text.encoders import weights_sha256
 from tests.support.prepared import write_prepared

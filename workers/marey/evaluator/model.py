@@ -132,6 +132,11 @@ class SentenceEncoder(nn.Module):
         """Return mean vectors (B, E) of `forward`'s input."""
         return self.encoder.mean(*self._tokens(states, lengths))
 
+    @property
+    def unchanged(self) -> dict[str, Tensor]:
+        """Statistics of token states that change nothing, by the names of the buffers."""
+        return {"text_mean": torch.zeros_like(self.text_mean), "text_std": torch.ones_like(self.text_std)}
+
     def _tokens(self, states: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
         valid = frame_mask(lengths, states.shape[1])
         x = (states - self.text_mean) / self.text_std

@@ -16,13 +16,8 @@ from marey.bundles import Bundle, DataSource
 from marey.core.errors import InvalidFile
 from marey.evaluator.bundle import write_bundle
 from marey.evaluator.config import EvaluatorConfig
-from marey.evaluator.snapmogen_model import (
-    MODEL,
-    PUBLIC,
-    SnapMoGenMotionEncoder,
-    SnapMoGenSentenceEncoder,
-    published_name,
-)
+from marey.evaluator.published_names import published_name
+from marey.evaluator.snapmogen_model import MODEL, PUBLIC, SnapMoGenMotionEncoder, SnapMoGenSentenceEncoder
 from marey.importing import Checkpoint, Download, Fields, ImportRequest, make_card, provenance, text_encoder_of
 
 INSIDE = ("checkpoint_dir/snapmogen/evaluator",)

@@ -9,10 +9,8 @@ Shapes: B batch, T frames, S text tokens, E latent width.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
-import torch
 from torch import Tensor, nn
 
 from marey.evaluator.config import EvaluatorConfig
@@ -31,29 +29,6 @@ PUBLIC = EvaluatorConfig(
     max_frames=320,
     text_width=768,  # T5 v1.1 base
 )
-PUBLISHED = (
-    (r"encoder\.project\.(.*)", r"projection.\1"),
-    (r"encoder\.distribution", "tokens"),
-    (r"encoder\.transformer\.blocks\.(\d+)\.attention\.qkv\.(.*)", r"seqTransEncoder.layers.\1.self_attn.in_proj_\2"),
-    (r"encoder\.transformer\.blocks\.(\d+)\.attention\.out\.(.*)", r"seqTransEncoder.layers.\1.self_attn.out_proj.\2"),
-    (r"encoder\.transformer\.blocks\.(\d+)\.wide\.(.*)", r"seqTransEncoder.layers.\1.linear1.\2"),
-    (r"encoder\.transformer\.blocks\.(\d+)\.narrow\.(.*)", r"seqTransEncoder.layers.\1.linear2.\2"),
-    (r"encoder\.transformer\.blocks\.(\d+)\.(norm.*)", r"seqTransEncoder.layers.\1.\2"),
-    (r"head\.(.*)", r"linear.\1"),
-)
-"""Our names of tensors, and the published ones."""
-
-
-def published_name(name: str) -> str:
-    """Return the published name of one of our tensors; see `PUBLISHED`.
-
-    Raises:
-        KeyError: it has none.
-    """
-    for own, published in PUBLISHED:
-        if re.fullmatch(own, name):
-            return re.sub(own, published, name)
-    raise KeyError(name)
 
 
 class _Head(nn.Module):
@@ -88,13 +63,8 @@ class SnapMoGenMotionEncoder(_Head, MotionEncoder):
 
 
 class SnapMoGenSentenceEncoder(_Head, SentenceEncoder):
-    """Encoder of T5's token states; `text_mean` and `text_std` are those of no change."""
+    """Encoder of T5's token states; their statistics are `unchanged`."""
 
     def __init__(self, config: EvaluatorConfig) -> None:
         SentenceEncoder.__init__(self, config)
         self._add_head(config.width)
-
-    @property
-    def unchanged(self) -> dict[str, Tensor]:
-        """Statistics of token states that change nothing, by the names of the buffers."""
-        return {"text_mean": torch.zeros_like(self.text_mean), "text_std": torch.ones_like(self.text_std)}
