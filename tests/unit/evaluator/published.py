@@ -31,9 +31,14 @@ def inputs(seed: int, *shape: int) -> Tensor:
 
 def encoder_shapes(features: int, width: int = 256, feedforward: int = 1024, layers: int = 6) -> dict:
     """Names and shapes of one encoder of SnapMoGen's evaluator: 77 tensors at the published sizes."""
+    head = {"linear.weight": (width, width), "linear.bias": (width,)}
+    return actor_shapes(features, width, feedforward, layers) | head
+
+
+def actor_shapes(features: int, width: int = 256, feedforward: int = 1024, layers: int = 6) -> dict:
+    """Names and shapes of one encoder of TMR, of ACTOR's design: 75 tensors at the published sizes."""
     shapes: dict[str, tuple[int, ...]] = {
         "tokens": (2, width), "projection.weight": (width, features), "projection.bias": (width,),
-        "linear.weight": (width, width), "linear.bias": (width,),
     }  # fmt: skip
     for layer in (f"seqTransEncoder.layers.{n}" for n in range(layers)):
         shapes |= {

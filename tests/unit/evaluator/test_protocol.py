@@ -18,6 +18,7 @@ from marey.bundles import Bundle
 from marey.cli.main import app
 from marey.cli.roles.tokenizers import tokenizer_of
 from marey.core.errors import InvalidFile, InvalidInput
+from marey.core.settings import settings
 from marey.data.prepared import PreparedData
 from marey.data.t2m_folder import HUMANML3D_SET, prepare_t2m
 from marey.evaluator.loading import load_evaluator
@@ -35,6 +36,8 @@ from marey.models.hgm3.generate import Generator as HGM3
 from tests.support.t2m_evaluator import SMALL, write_public_files
 from tests.support.t2m_folder import write_folder
 from tests.support.texts import shared_pipeline
+from tests.support.tiny_encoders import write_tiny_distilbert
+from tests.support.tmr_download import write_tmr_download
 
 SIZES = ProtocolOptions(repeats=2, pool=4, many=5, prompts=2, pairs=3)
 
@@ -116,9 +119,10 @@ def test_every_repeat_generates_the_captions_anew_at_the_lengths_of_their_clips(
     assert {frames for frames, _ in echo.asked} <= {56, 60, 64, 92, 96}
     assert seen[-1] == (1, 46, 46)
     rows = found["repeats"][0][judge.evaluator.name]
-    assert set(rows["generated"]) == set(METRICS)
-    assert set(rows["real"]) == set(METRICS) - {"fid", "mmodality"}
-    assert set(rows["reconstructed"]) == set(METRICS) - {"mmodality"}
+    measured = set(METRICS) - {"clip_score"}  # which evaluators have that compare by cosine
+    assert set(rows["generated"]) == measured
+    assert set(rows["real"]) == measured - {"fid", "mmodality"}
+    assert set(rows["reconstructed"]) == measured - {"mmodality"}
     assert rows["generated"]["fid"] > 0 < rows["generated"]["mmodality"]
     assert found["repeats"][1] != found["repeats"][0]
 
@@ -222,6 +226,43 @@ def test_the_command_measures_real_motions_and_writes_the_report(
     alone = CliRunner().invoke(app, ["eval", "run", "--bundle", "hgm3", "--data", str(data.path)])
     assert alone.exit_code == 2
     assert "is for --protocol" in alone.stderr
+
+
+def test_the_command_measures_by_an_imported_evaluator_that_compares_by_cosine(
+    data: PreparedData, t2m: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(settings(), "models", tmp_path / "bundles")
+    monkeypatch.setattr(settings(), "home", tmp_path / "home")
+    (tmp_path / "distilbert").mkdir()
+    distilbert = write_tiny_distilbert(tmp_path / "distilbert")
+    words = ["models", "import", "tmr", str(write_tmr_download(tmp_path)), "-o", str(tmp_path / "bundles" / "tmr"),
+             "--text-encoder", str(distilbert)]  # fmt: skip
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 2
+    assert "--licence" in refused.stderr
+    done = CliRunner().invoke(app, [*words, "--licence", "LicenseRef-AMASS-NC"])
+    assert done.exit_code == 0, done.output
+
+    words = ["eval", "run", "--protocol", "humanml3d", "--bundle", "real", "--evaluator", str(t2m.path), "--evaluator",
+             "tmr", "--data", str(data.path), "--repeats", "2", "-o", str(tmp_path / "out")]  # fmt: skip
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    document = json.loads((tmp_path / "out" / "report.json").read_text())
+    evaluator = load_evaluator("tmr", device="cpu")
+    assert document["kinds"] == {t2m.reference: "t2m", evaluator.name: "tmr-published"}
+    drawing = np.random.default_rng(np.random.SeedSequence([0, 1]).spawn(2)[0])
+    samples = draw_samples(data, "test", 32, drawing)
+    text = evaluator.embed_text([sample.caption for sample in samples])
+    motion = evaluator.embed_motion([sample.motion for sample in samples])
+    unit = [each / np.linalg.norm(each, axis=1, keepdims=True) for each in (text, motion)]
+    found = document["repeats"][1][evaluator.name]["real"]
+    assert found["clip_score"] == pytest.approx(float((unit[0] * unit[1]).sum(1).mean()), abs=1e-6)
+    assert 0 <= found["r1"] <= found["r2"] <= found["r3"] <= 1
+    assert "clip_score" not in document["repeats"][1][t2m.reference]["real"]
+    by_t2m, by_tmr = (tmp_path / "out" / "report.md").read_text().split("\n## By ")[1:]
+    assert "| MoMask | HGM³ Tab. 1 |" in by_t2m
+    assert "HGM³ Tab. 1" not in by_tmr, "papers did not measure by this evaluator"
+    assert "| CLIP score ↑ |" in by_tmr
 
 
 def test_real_motion_has_no_distance_from_itself(data: PreparedData, judge: Judge) -> None:

@@ -20,8 +20,11 @@ from marey.motion.features import layout
 from marey.nn.bundling import NOT_STORED
 
 MODEL = "tmr"
+PUBLISHED = "tmr-published"
+"""The weights of the paper, which its authors trained."""
 NETWORKS = {
     MODEL: (MotionEncoder, SentenceEncoder),
+    PUBLISHED: (MotionEncoder, SentenceEncoder),
     snapmogen_model.MODEL: (snapmogen_model.SnapMoGenMotionEncoder, snapmogen_model.SnapMoGenSentenceEncoder),
 }
 """The encoders of each model of evaluators that is built like TMR."""

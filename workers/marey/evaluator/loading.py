@@ -31,6 +31,10 @@ def load_evaluator(
         from marey.evaluator.tmr import TMREvaluator
 
         return TMREvaluator.load(verified, device=device)
+    if manifest.kind == "evaluator" and manifest.model == "tmr-published":
+        from marey.evaluator.tmr_published import PublishedTMREvaluator
+
+        return PublishedTMREvaluator.load(verified, device=device)
     if manifest.kind == "evaluator" and manifest.model == "snapmogen":
         from marey.evaluator.snapmogen import SnapMoGenEvaluator
 

@@ -27,3 +27,10 @@ SNAPMOGEN_IMPORT = ImportKind(
     licence="LicenseRef-Snap-NC",
     text_encoder=True,
 )
+
+TMR_IMPORT = ImportKind(
+    name="tmr",
+    help="Evaluator TMR (Petrovich et al. 2023): a folder tmr_… of models, with the repository's stats in or above it.",
+    run="marey.evaluator.tmr_import:import_tmr",
+    text_encoder=True,  # its repository states terms of the code, and refers to those of the data sets
+)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from marey.evaluator.metrics.distribution import diversity, fid, multimodality
-from marey.evaluator.metrics.retrieval import Distance, matching_score, r_precision
+from marey.evaluator.metrics.retrieval import Distance, clip_score, matching_score, r_precision
 from marey.evaluator.port import Embeddings
 
 TOP = (1, 2, 3)
 RETRIEVAL = tuple(f"r{k}" for k in TOP)
-METRICS = (*RETRIEVAL, "fid", "mm_dist", "diversity", "mmodality")
-"""In the order of the papers' tables."""
+METRICS = (*RETRIEVAL, "fid", "mm_dist", "clip_score", "diversity", "mmodality")
+"""In the order of the papers' tables; `clip_score` for evaluators that compare by cosine alone."""
 PAIRS = 300
 """Pairs of motions of the diversity; 100 of up to 300 motions, as published, and fewer of under 101."""
 FEW = 100
@@ -40,6 +40,8 @@ def measure(
     found = {name: hits.at(k) for name, k in zip(RETRIEVAL, TOP, strict=True)}
     if real is not None:
         found["fid"] = fid(real, motion).value
+    if distance == "cosine":
+        found["clip_score"] = clip_score(text, motion)
     drawn = PAIRS if len(motion) > FEW else len(motion) - 1
     return found | {"mm_dist": matching_score(text, motion), "diversity": diversity(motion, pairs=drawn, rng=rng)}
 

@@ -20,6 +20,7 @@ TITLES = {
     "r3": "R@3 ↑",
     "fid": "FID ↓",
     "mm_dist": "MM-Dist ↓",
+    "clip_score": "CLIP score ↑",
     "diversity": "Diversity →",
     "mmodality": "MModality ↑",
 }
