@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile
@@ -41,7 +42,7 @@ def check_distilbert(name: str, folder: Path) -> None:
         )
     tokenizer = folder / TOKENIZER
     if tokenizer.is_file():
-        content = read_json(tokenizer, hint=hint)
-        normalizer = content.get("normalizer") if isinstance(content, dict) else None
-        if not isinstance(normalizer, dict) or normalizer.get("lowercase") is not True:
+        content: Any = read_json(tokenizer, hint=hint)
+        normalizer: Any = cast("dict[str, Any]", content).get("normalizer") if isinstance(content, dict) else None
+        if not isinstance(normalizer, dict) or cast("dict[str, Any]", normalizer).get("lowercase") is not True:
             raise InvalidFile(f"is not {name}: its tokenizer keeps upper case", where=str(tokenizer), hint=hint)

@@ -17,10 +17,10 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.evaluator.loading import load_evaluator
 from marey.evaluator.metrics.retrieval import all_ranks
-from marey.evaluator.port import Evaluator
+from marey.evaluator.tmr_published import PublishedTMREvaluator
 from marey.importing import run_import
+from marey.text.loading import load_encoder
 from tests.support.tiny_encoders import write_tiny_distilbert
 from tests.support.tmr_download import PUBLISHED, write_tmr_download
 
@@ -59,28 +59,21 @@ def distilbert(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def evaluator(folder: Path, distilbert: Path, tmp_path_factory: pytest.TempPathFactory) -> Evaluator:
+def evaluator(folder: Path, distilbert: Path, tmp_path_factory: pytest.TempPathFactory) -> PublishedTMREvaluator:
     output = tmp_path_factory.mktemp("models") / "tmr"
     run_import("tmr", folder, output, text_encoder=distilbert, licence="LicenseRef-AMASS-NC")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("marey.evaluator.sentences.load_encoder", lambda name: _loaded(name, distilbert))
-        return load_evaluator(Bundle.open(output), device="cpu")
-
-
-def _loaded(name: str, folder: Path) -> object:
-    from marey.text.loading import load_encoder
-
-    return load_encoder(name, folder)
+    encoder = load_encoder("distilbert-base-uncased", distilbert)
+    return PublishedTMREvaluator.load(Bundle.open(output), device="cpu", encoder=encoder)
 
 
 @torch.inference_mode()
-def test_motions(evaluator: Evaluator, folder: Path) -> None:
+def test_motions(evaluator: PublishedTMREvaluator, folder: Path) -> None:
     network = public("src/model/actor.py").ACTORStyleEncoder(263, vae=True, num_layers=6).eval()
     network.load_state_dict(torch.load(folder / "last_weights" / "motion_encoder.pt"))
     stats = folder.parents[1] / "stats" / "humanml3d"
     normalizer = public("src/data/motion.py").Normalizer(str(stats / "guoh3dfeats"))
     rng = np.random.default_rng(5)
-    motions = [rng.normal(size=(frames, 263)).astype(np.float32) / 4 for frames in (40, 117, 199)]
+    motions = [rng.normal(scale=0.25, size=(frames, 263)).astype(np.float32) for frames in (40, 117, 199)]
     x = torch.nn.utils.rnn.pad_sequence([normalizer(torch.from_numpy(each)) for each in motions], batch_first=True)
     mask = torch.arange(199) < torch.tensor([40, 117, 199])[:, None]
     theirs = network({"x": x, "mask": mask})[:, 0]
@@ -88,7 +81,7 @@ def test_motions(evaluator: Evaluator, folder: Path) -> None:
 
 
 @torch.inference_mode()
-def test_sentences(evaluator: Evaluator, folder: Path, distilbert: Path, tmp_path: Path) -> None:
+def test_sentences(evaluator: PublishedTMREvaluator, folder: Path, distilbert: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, tmp_path / "model")
     config = json.loads((folder / "config.json").read_text())
     config["data"]["text_to_token_emb"]["modelname"] = str(distilbert)
