@@ -14,7 +14,8 @@ from pydantic import SecretStr
 
 from marey.api.making import maker
 from marey.client import Client
-from marey.client.fetching import ATTEMPTS, FileToFetch, download_all
+from marey.client.fetching import ATTEMPTS, download_all
+from marey.client.file_to_fetch import FileToFetch
 from marey.core.errors import InvalidInput, Unreachable
 from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction

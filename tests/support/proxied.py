@@ -6,7 +6,8 @@ import threading
 import time
 from pathlib import Path
 
-from marey.client.fetching import FileToFetch, download_all
+from marey.client.fetching import download_all
+from marey.client.file_to_fetch import FileToFetch
 from marey.client.link import Link
 from marey.client.place import Server
 from marey.client.transport import Transport

@@ -87,15 +87,17 @@ Placement = Annotated[
 Mesh = Annotated[
     bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
 ]
-Rig = Annotated[
-    str | None,
-    typer.Option(
-        "--rig",
-        metavar="NAME|FILE",
-        help="Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json,"
-        " .npz of SMPL-X); acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it.",
-    ),
-]
+RIG_HELP = (
+    "Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json, .npz of"
+    " SMPL-X){more}; acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it."
+)
+BODY_HELP = (
+    "Give the motion the proportions of a character, in every format: a file as of --rig, or .npz of Marey{more};"
+    " default: the body that it has."
+)
+SERVERS = ", or one of the server (`marey rigs list`), which then makes the files"
+Rig = Annotated[str | None, typer.Option("--rig", metavar="NAME|FILE", help=RIG_HELP.format(more=""))]
+FetchedRig = Annotated[str | None, typer.Option("--rig", metavar="NAME|FILE", help=RIG_HELP.format(more=SERVERS))]
 RigMap = Annotated[
     Path | None,
     typer.Option(
@@ -111,14 +113,17 @@ JointNames = Annotated[
     ),
 ]
 
-Body = Annotated[
+Body = Annotated[str | None, typer.Option("--body", metavar="NAME|FILE", help=BODY_HELP.format(more=""))]
+GeneratedBody = Annotated[
     str | None,
     typer.Option(
         "--body",
-        metavar="standard|FILE",
-        help="Put the motion on a body with the proportions of a .bvh or .npz file; default: the body that it has.",
+        metavar="NAME|FILE",
+        help="Body that the motions are solved onto: standard, or the proportions of a character (mixamo, ue4, humanik,"
+        " or a file as of --rig, or .npz of Marey); default: standard.",
     ),
 ]
+FetchedBody = Annotated[str | None, typer.Option("--body", metavar="NAME|FILE", help=BODY_HELP.format(more=SERVERS))]
 
 ServerRig = Annotated[
     str | None,
@@ -126,6 +131,15 @@ ServerRig = Annotated[
         "--rig",
         metavar="NAME",
         help="Put the motion on a rig: one of `marey rigs list`, or mixamo, ue4, humanik; of BVH, glb, FBX and USD.",
+    ),
+]
+ServerBody = Annotated[
+    str | None,
+    typer.Option(
+        "--body",
+        metavar="NAME",
+        help="Give the motion the proportions of a rig, in every format: one of `marey rigs list`, or mixamo, ue4,"
+        " humanik; `standard` = Marey's own.",
     ),
 ]
 OPTIONS: Mapping[str, tuple[Any, object]] = {

@@ -24,6 +24,8 @@ OPTIONS = {
     "overwrite": "--overwrite",
     "placement": "--placement",
     "rest_pose": "--rest-pose",
+    "rig": "--rig",
+    "rig_map": "--map",
     "root_bone": "--root-bone",
     "seconds": "--seconds",
     "seed": "--seed",

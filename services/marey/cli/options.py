@@ -115,14 +115,6 @@ BestOf = Annotated[
         "--best-of", help=f"Candidates of each motion, of which the best is kept: 1 to {MAX_BEST_OF}; default 1."
     ),
 ]
-Body = Annotated[
-    str,
-    typer.Option(
-        "--body",
-        metavar="standard|FILE",
-        help="Body of the motions: standard, or the proportions of a .bvh or .npz file.",
-    ),
-]
 Redraws = Annotated[
     int | None,
     typer.Option("--redraws", help=f"Further rounds of candidates while none is good. 0 to {MAX_REDRAWS}, default 0."),

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marey.client.making import SOURCE, check_body, making_of
+from marey.client.file_to_fetch import FORMAT, FileToFetch
+from marey.client.made import made_file
+from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
+from marey.client.rigs import Rigs
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
@@ -27,27 +28,8 @@ PARALLEL = 8
 ATTEMPTS = 4
 """Downloads of one file that may break off; each continues where the last one stopped."""
 BLOCK = 2**18
-FORMAT = re.compile(r"[a-z0-9]{1,16}")
-"""File formats that a server may name; the format is the extension if its exporter is not installed."""
-
-
-@dataclass(frozen=True)
-class FileToFetch:
-    """One file to fetch."""
-
-    url: str
-    """Path on the server."""
-    sha256: str
-    size: int
-    path: Path
-    making: FileRecipe | None = None
-    """How the file is made of what the server sends; None = it is that."""
-
-    @property
-    def format(self) -> str:
-        """The format of the file, such as `npz`."""
-        return self.url.rpartition("/")[2] if self.making is None else self.making.format
-
+MAKING_SECONDS = 600.0
+"""Seconds to wait for a file that the server makes."""
 
 Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
 """Items of the API, in input order, each with its files."""
@@ -94,7 +76,8 @@ def fetch_job(
         prune: remove files that earlier manifests named for the job and this one does not.
         overwrite: replace files with other content.
         export: options of the files, such as a root bone: those of formats that have these options are made here of the
-            npz, as are formats that the server does not have and this process has.
+            npz, as are formats that the server does not have and this process has. Where they name a rig of the server
+            (`ExportOptions.server_rig`), the server makes them.
 
     Returns:
         The items with their files.
@@ -107,7 +90,8 @@ def fetch_job(
     observer = observer or FetchObserver()
     known = exporters()
     check_options((known[name] for name in formats or known if name in known), export)
-    check_body(export.body)
+    check_body(export)
+    check_rig(Rigs(transport), export)
     pages = transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
     check_folder(folder)
@@ -124,7 +108,8 @@ def fetch_job(
     try:
         download_all(transport, wanted, overwrite=overwrite, done=note)
     except BaseException as error:
-        if not isinstance(error, Conflict) or any(file.making for file in wanted):  # else nothing was fetched
+        late = any(file.making or file.asked is not None for file in wanted)
+        if not isinstance(error, Conflict) or late:  # else nothing was fetched
             _write_part(folder, job, planned, done, observer, overwrite=overwrite)
         raise
     left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
@@ -211,13 +196,13 @@ def plan(
     for item in items:
         downloads: list[FileToFetch] = []
         motion = item["motion"]
-        for file, making in _wanted(motion["files"], formats, export, item["id"]) if motion else ():
+        for file, making, asked in _wanted(motion["files"], formats, export, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # it becomes part of the path, which must stay in the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
             wanted = file["format"] if making is None else making.format
             name = names.of(item["id"], naming(item), extension_of(wanted))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
-            downloads.append(FileToFetch(url, file["sha256"], file["size"], folder / name, making))
+            downloads.append(FileToFetch(url, file["sha256"], file["size"], folder / name, making, asked))
         planned.append((item, downloads))
     return planned
 
@@ -258,7 +243,13 @@ def download_all(
             missing.append(download)
 
     def fetch(download: FileToFetch) -> None:
-        done(_download(client, download, overwrite=overwrite))
+        if download.asked is None:
+            _download(client, download, overwrite=overwrite)
+        else:
+            made = made_file(client, download.url, download.path, download.asked, timeout=MAKING_SECONDS)
+            if not _is_there(made, overwrite):
+                _download(client, made, overwrite=overwrite)
+        done(download)
 
     with ThreadPoolExecutor(PARALLEL) as pool:
         try:
@@ -271,18 +262,23 @@ def download_all(
 
 def _wanted(
     files: list[dict[str, Any]], formats: Sequence[str] | None, export: ExportOptions, item: str
-) -> Iterator[tuple[dict[str, Any], FileRecipe | None]]:
-    """Yield the file to fetch for each format, with how the wanted one is made of it."""
+) -> Iterator[tuple[dict[str, Any], FileRecipe | None, Mapping[str, str | bool] | None]]:
+    """Yield the file to fetch for each format, with how the wanted one is made of it, and the options of one that the
+    server makes."""
     by_format = {file["format"]: file for file in files}
     for name in by_format if formats is None else formats:
+        asked = asked_of(name, by_format, export)
+        if asked is not None:
+            yield {"format": name, "sha256": "", "size": 0}, None, asked
+            continue
         making = making_of(name, by_format, export)
         if making is None and name not in by_format:
             raise Conflict(f"was not made as {name}", where=f"item {item}", hint=f"It has {', '.join(by_format)}.")
-        yield by_format[name if making is None else SOURCE], making
+        yield by_format[name if making is None else SOURCE], making, None
 
 
 def _is_there(download: FileToFetch, overwrite: bool) -> bool:
-    if download.making is not None:  # only making it again tells
+    if download.making is not None or download.asked is not None:  # only making it again tells
         return False
     try:
         if download.path.stat().st_size == download.size and sha256_of(download.path) == download.sha256:
@@ -303,12 +299,12 @@ def _conflict(path: Path) -> Conflict:
     )
 
 
-def _finish(download: FileToFetch, part: Path, overwrite: bool) -> FileToFetch:
+def _finish(download: FileToFetch, part: Path, overwrite: bool) -> None:
     """Put a file that has arrived in its place, or what is made of it."""
     path = download.path
     if download.making is None:
         part.replace(path)
-        return download
+        return
     try:
         content = download.making.make(part.read_bytes(), str(path))
     finally:
@@ -317,10 +313,9 @@ def _finish(download: FileToFetch, part: Path, overwrite: bool) -> FileToFetch:
         if path.exists() and not overwrite:
             raise _conflict(path)
         write_atomically(path, content)
-    return download
 
 
-def _download(client: Transport, download: FileToFetch, *, overwrite: bool) -> FileToFetch:
+def _download(client: Transport, download: FileToFetch, *, overwrite: bool) -> None:
     part = download.path.with_name(download.path.name + ".part")
     for attempt in range(1, ATTEMPTS + 1):
         try:

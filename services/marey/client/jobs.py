@@ -329,9 +329,10 @@ class Jobs(Resource):
             review: only motions with this review.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
-            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig, rig_map, names: of files whose
+            bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig_map, names: of files whose
                 formats have these options; see `docs/reference/formats.md`.
-            body: put the motions on a body of other proportions, a BVH or npz file; see `docs/how-to/bodies.md`.
+            rig, body: a file, or the name of a rig of the server, which then makes the files; `body` gives the motions
+                the proportions of it, see `docs/how-to/bodies.md`.
             on_progress: called with the numbers of fetched files and of all files, one call at a time, from any thread;
                 or an observer with a method for each event.
 
@@ -341,7 +342,8 @@ class Jobs(Resource):
         Raises:
             Conflict: a file exists with other content, or a format was not made and cannot be made here; nothing is
                 fetched then, unless it is the content of a made file.
-            NotFound: the file of a body or a rig does not exist.
+            NotFound: the file of a body or a rig does not exist, or the server has no such rig.
+            TimedOut: the server does not make a file within 10 minutes.
             InvalidFile: the data that arrived has another sha256, or cannot be written; or the body is no human one.
             InvalidInput: the folder cannot be written, two motions would have one name, an option is of no format, or
                 two contradict each other.

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 
 import httpx2
 
-from marey.client.fetching import FORMAT, FileToFetch
+from marey.client.file_to_fetch import FORMAT, FileToFetch
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile, InvalidInput, TimedOut
 from marey.exporters import exporters

@@ -1,12 +1,15 @@
-"""Files that the server does not have, made here of the npz: another format, or one with options."""
+"""Files that the server does not have: another format, or one with options. They are made here of the npz, or by the
+server where they need a rig of its."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
-from marey.core.errors import Conflict
+from marey.client.rigs import Rigs
+from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.core.extras import needs_extra
 from marey.exporters import exporters
+from marey.exporters.exporter import EVERYWHERE
 from marey.exporters.making import FileRecipe
 from marey.motion.export_options import ExportOptions
 
@@ -35,16 +38,57 @@ def making_of(name: str, stored: Collection[str], export: ExportOptions) -> File
     return FileRecipe(name, export)
 
 
-def check_body(body: str | None) -> None:
-    """Read the body that an export names, so that an error comes before anything is fetched or submitted.
+def asked_of(name: str, stored: Collection[str], export: ExportOptions) -> Mapping[str, str | bool] | None:
+    """Return the options of a file that the server makes on a rig or a body of its own, None if it is not such a file.
+
+    Args:
+        name: the format.
+        stored: formats that the server has of the motion.
+        export: options that the file is to have.
+    """
+    if export.server_rig is None:
+        return None
+    exporter = exporters().get(name)
+    heeded = EVERYWHERE if exporter is None else exporter.heeded
+    asked = {option: value for option, value in export.values.items() if option in heeded}
+    return asked if asked or name not in stored else None
+
+
+def check_body(export: ExportOptions) -> None:
+    """Read the body that an export names, so that an error comes before anything is fetched or submitted; one of the
+    server is left to `check_rig`.
 
     Raises:
-        NotFound, InvalidFile, InvalidInput: the file is missing, or no human body; or numpy is not installed.
+        NotFound, InvalidFile, InvalidInput: the file is missing, or no human body; a map is given for a rig of the
+            server; or numpy is not installed.
     """
-    if body is None:
+    if export.server_rig is not None:
+        if export.rig_map is not None:
+            raise InvalidInput(
+                "a rig of the server has a map of its own",
+                where="rig_map",
+                hint="Leave it out, or add it with the rig: marey rigs add FILE --map MAP.",
+                argument="rig_map",
+            )
+    elif export.body is not None:
+        try:
+            from marey.motion.change_body import load_shape
+        except ImportError as error:
+            raise needs_extra("motion", error) from error
+        load_shape(export.body, export.rig_map)
+
+
+def check_rig(rigs: Rigs, export: ExportOptions) -> None:
+    """Find the rig of the server that an export names, if it does.
+
+    Raises:
+        NotFound: there is no such rig.
+    """
+    if export.server_rig is None:
         return
     try:
-        from marey.motion.change_body import load_shape
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
-    load_shape(body)
+        rigs.get(export.server_rig)
+    except NotFound as error:
+        error.where = error.argument = "rig" if export.rig else "body"
+        error.hint = f"`marey rigs list` shows those of the server; a file has an ending: {export.server_rig}.fbx."
+        raise

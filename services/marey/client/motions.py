@@ -7,10 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from marey.client.fetching import FORMAT, FileToFetch, check_folder, download_all
+from marey.client.fetching import check_folder, download_all
+from marey.client.file_to_fetch import FORMAT, FileToFetch
 from marey.client.made import format_of, made_file
-from marey.client.making import SOURCE, check_body, making_of
+from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.resources import Resource, identifier, identifiers
+from marey.client.rigs import Rigs
 from marey.client.types.jobs import Job
 from marey.client.types.motions import Motion, MotionDetail, Reroll
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
@@ -123,19 +125,22 @@ class Motions(Resource):
 
         Args:
             path: its ending names the format, such as `.bvh`.
-            body: put the motion on a body of other proportions, a BVH or npz file; this needs the extra `motion`.
+            body: put the motion on a body of other proportions: a file, which needs the extra `motion`, or the name of
+                a rig of the server, which then makes the file.
             overwrite: replace a file with other content.
 
         Raises:
-            NotFound: the motion has no such file, or there is no file of the body.
+            NotFound: the motion has no such file, or there is no file or rig of the body.
             Conflict: the file exists with other content.
             InvalidInput: the folder cannot be written, or the motion has another skeleton than bodies have.
             InvalidFile: the data that arrived has another sha256, or cannot be written; or the body is no human one.
+            TimedOut: the server does not make the file within 10 minutes.
         """
         path = Path(path)
-        check_body(body)
+        export = ExportOptions(body=body)
+        self._check(export)
         found = motion if isinstance(motion, Motion) else self.get(motion)
-        download = _download(found, path.suffix.removeprefix(".").lower(), path, ExportOptions(body=body))
+        download = _download(found, path.suffix.removeprefix(".").lower(), path, export)
         check_folder(path.parent)
         download_all(self._transport, [download], overwrite=overwrite, done=lambda _: None)
         return path
@@ -161,7 +166,8 @@ class Motions(Resource):
             timeout: seconds to wait until the file is made.
             overwrite: replace a file with other content.
             options: of the format, such as `root_bone=True` or `in_place="heading"`; the reference of the HTTP API
-                lists them. `rig="hero"` puts the motion on a rig of `client.rigs`, or on `mixamo`, `ue4` or `humanik`.
+                lists them. `rig="hero"` puts the motion on a rig of `client.rigs`, or on `mixamo`, `ue4` or `humanik`;
+                `body="hero"` gives it the proportions of one.
 
         Raises:
             NotFound: there is no such motion or rig, or the server does not make such files.
@@ -197,16 +203,21 @@ class Motions(Resource):
             overwrite: replace files with other content.
 
         Raises:
-            NotFound, Conflict, InvalidInput, InvalidFile: as `fetch`.
+            NotFound, Conflict, InvalidInput, InvalidFile, TimedOut: as `fetch`.
         """
-        check_body(body)
-        place, export = check_folder(Path(folder)), ExportOptions(body=body)
+        export = ExportOptions(body=body)
+        self._check(export)
+        place = check_folder(Path(folder))
         downloads = [
             _download(motion, file_format, place / f"{motion.id}.{extension_of(file_format)}", export)
             for motion in motions
         ]
         download_all(self._transport, downloads, overwrite=overwrite, done=lambda _: None)
         return [download.path for download in downloads]
+
+    def _check(self, export: ExportOptions) -> None:
+        check_body(export)
+        check_rig(Rigs(self._transport), export)
 
     def load(self, motion: Motion | str) -> MotionClip:
         """Fetch a motion as a clip in memory; needs the extra `motion`.
@@ -244,6 +255,9 @@ def _download(motion: Motion, wanted: str, path: Path, export: ExportOptions = P
         formats = ", ".join(by_format)
         hint = f"It has {formats}." if formats else "If its prompt is being erased, wait a moment."
         raise NotFound(f"has no {wanted or 'such'} file", where=f"motion {motion.id}", hint=hint)
+    asked = asked_of(named, by_format, export)
+    if asked is not None:
+        return FileToFetch(f"/v1/motions/{identifier(motion)}/files/{named}", "", 0, path, asked=asked)
     making = making_of(named, by_format, export)
     source = by_format[named if making is None else SOURCE]
     url = f"/v1/motions/{identifier(motion)}/files/{source.format}"

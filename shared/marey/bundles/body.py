@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -38,10 +39,10 @@ def body_of(manifest: BundleManifest) -> NamedBody:
     return standard_body(layout_of(manifest).skeleton)
 
 
-def read_body_for(manifest: BundleManifest, given: str) -> NamedBody:
+def read_body_for(manifest: BundleManifest, given: str, rig_map: Path | str | None = None) -> NamedBody:
     """Return the body `standard` of a generator's bundle, or that of a file; see `layout_of` and `read_body` for
-    errors."""
-    return read_body(given, layout_of(manifest).skeleton)
+    arguments and errors."""
+    return read_body(given, layout_of(manifest).skeleton, rig_map)
 
 
 @lru_cache(maxsize=16)

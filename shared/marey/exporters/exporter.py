@@ -95,11 +95,12 @@ class Exporter(Generic[Decoded]):
         """Names of all `ExportOptions` that files of the format heed."""
         return self.options | EVERYWHERE
 
-    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates, body: RigBody | None = None) -> bytes:
+    def write(self, clip: MotionClip | Decoded, coordinates: Coordinates, rig: RigBody | None = None) -> bytes:
         """Encode a clip with those of the coordinates that the format has.
 
         Args:
-            body: the rig that the coordinates name; None = find it (`marey.motion.retarget.load.load_body`).
+            rig: the rig that the coordinates name as `rig` or as `body`; None = find it
+                (`marey.motion.retarget.load.load_body`, `marey.motion.change_body.load_shape`).
 
         Raises:
             InvalidInput: the clip cannot be written with these options, or put on the rig or the body.
@@ -108,17 +109,20 @@ class Exporter(Generic[Decoded]):
         others = {name: value for name, value in _DEFAULTS.items() if name not in self.options}
         kept = replace(coordinates, **others)
         if coordinates.body is not None:
-            clip = _on_body(clip, coordinates.body)
+            clip = _on_body(clip, coordinates.body, coordinates.rig_map, rig)
         if kept.rig is None or self.encode_rigged is None:
             return self.encode(clip, kept)
         from marey.motion.io.convert import as_motion_clip
         from marey.motion.retarget.apply import put_on_rig
 
-        return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept, body), kept)
+        return self.encode_rigged(put_on_rig(as_motion_clip(cast("MotionClip | BvhClip", clip)), kept, rig), kept)
 
 
-def _on_body(clip: Any, body: str) -> MotionClip:
+def _on_body(clip: Any, body: str, rig_map: str | None, rig: RigBody | None) -> MotionClip:
+    from marey.motion.body_files import body_of_rig
     from marey.motion.change_body import change_body, load_shape
     from marey.motion.io.convert import as_motion_clip
+    from marey.motion.skeleton import HUMANML3D
 
-    return change_body(as_motion_clip(clip), load_shape(body))
+    shape = load_shape(body, rig_map) if rig is None else body_of_rig(rig, HUMANML3D)
+    return change_body(as_motion_clip(clip), shape)

@@ -53,7 +53,7 @@ class FileRecipe:
         export: options of the file.
             Those that the format does not have are ignored: `check_options` refuses them.
         fps: its frame rate; None = that of the motion.
-        rig: the rig that the options name; None = none, or a reference rig.
+        rig: the rig that the options name as `rig` or `body`; None = none, a reference rig or `standard`.
     """
 
     format: str
@@ -104,11 +104,11 @@ class FileRecipe:
         decode = exporters()[CANONICAL].decode
         assert decode is not None
         try:
-            body = None if self.rig is None else self.rig.body(rig)
+            named = None if self.rig is None else self.rig.body(rig)
             clip = decode(npz, where, Coordinates())
             if self.fps is not None:
                 clip = _at_rate(clip, self.fps)
-            return exporter.write(clip, Coordinates.of(self.export), body)
+            return exporter.write(clip, Coordinates.of(self.export), named)
         except ImportError as error:
             raise needs_extra("motion", error) from error
 

@@ -109,6 +109,8 @@ def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> N
     """
     writers = list(writers)
     for name in options.chosen:
+        if name == "rig_map" and options.body is not None:  # it is that of the body, which every format has
+            continue
         if not any(name in each.heeded for each in writers):
             having = [each.format for each in exporters().values() if name in each.heeded]
             raise InvalidInput(

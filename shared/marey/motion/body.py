@@ -13,9 +13,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from marey.motion.export_options import STANDARD as STANDARD
 from marey.motion.skeleton import Skeleton
 
-STANDARD = "standard"
 STATURE = 1.75
 """Metres from the sole to the top of the head."""
 _STATURE_OF_SPAN = 1.73 / 1.555

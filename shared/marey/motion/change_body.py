@@ -19,14 +19,14 @@ from marey.motion.pose import aim_bones
 from marey.motion.skeleton import HUMANML3D
 
 
-def load_shape(given: str | Path) -> NamedBody:
-    """Return the body `standard`, or that of a BVH or npz file, for motions of 22 joints. A file is read again when it
-    changes.
+def load_shape(given: str | Path, rig_map: str | Path | None = None) -> NamedBody:
+    """Return the body `standard`, or that of a rig or an npz file, for motions of 22 joints. A file is read again when
+    it changes.
 
     Raises:
-        NotFound, InvalidFile, InvalidInput: see `read_body`.
+        NotFound, InvalidFile, InvalidInput, TooLarge: see `read_body`.
     """
-    return _load(str(given), stamp_of(given))
+    return _load(str(given), stamp_of(given), None if rig_map is None else str(rig_map), stamp_of(rig_map))
 
 
 def change_body(clip: MotionClip, body: NamedBody) -> MotionClip:
@@ -65,5 +65,5 @@ def change_body(clip: MotionClip, body: NamedBody) -> MotionClip:
 
 
 @lru_cache(maxsize=16)
-def _load(given: str, stamp: tuple[int, int]) -> NamedBody:
-    return read_body(given, HUMANML3D)
+def _load(given: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> NamedBody:
+    return read_body(given, HUMANML3D, rig_map)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -14,6 +15,10 @@ RestPose = Literal["t", "a"]
 Names = Literal["mixamo", "ue5", "humanik", "smplx", "vrm"]
 REFERENCE_RIGS = ("mixamo", "ue4", "humanik")
 """Names of the reference skeletons that `rig` may name; their tables need numpy (`marey.motion.retarget.reference`)."""
+STANDARD = "standard"
+"""The body that motions are generated on (`marey.motion.body`)."""
+OWN_BODIES = (STANDARD, *REFERENCE_RIGS)
+"""Names that `body` may give without a file."""
 RIG_NAME = r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}"
 """Pattern of the names of rigs on a server: without a dot, so that none looks like a file."""
 
@@ -34,9 +39,11 @@ class ExportOptions:
         placement: put the motion where its manifest says it was taken from (`keep`), or leave it at the origin.
         mesh: add a neutral body of round limbs, which moves with the skeleton.
         rig: put the motion on a rig: a reference skeleton (`mixamo`, `ue4`, `humanik`) or a file with a skeleton.
-        rig_map: JSON file that says which joint of the rig is which part of the body, where the joints are not found.
+        rig_map: JSON file that says which joint of the rig is which part of the body, where the joints are not found;
+            of the rig of `rig` or of `body`.
         names: names of the joints, without a change of anything else.
-        body: put the motion on a body of other proportions: `standard`, or a BVH or npz file. It acts on every format.
+        body: put the motion on a body of other proportions: `standard`, those of a rig as in `rig`, or of an npz of
+            Marey. It acts on every format.
 
     Raises:
         InvalidInput: two options contradict each other.
@@ -92,10 +99,22 @@ class ExportOptions:
                 hint="Leave out body, or the rig.",
                 argument="body",
             )
-        if self.rig_map and not self.rig:
+        if self.rig_map and not (self.rig or self.body):
             raise InvalidInput(
                 "a map of joints belongs to a rig", where="rig_map", hint="Name the rig too.", argument="rig_map"
             )
+
+    @property
+    def server_rig(self) -> str | None:
+        """Name of a rig of a server that `rig` or `body` names, None if they name none.
+
+        It is a word without a dot or a slash, which files have, and not one of Marey's own: `standard` and the
+        reference rigs.
+        """
+        named = self.rig or self.body
+        if named is None or named in OWN_BODIES or not re.fullmatch(RIG_NAME, named):
+            return None
+        return named
 
     @property
     def chosen(self) -> tuple[str, ...]:

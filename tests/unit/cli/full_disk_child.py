@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from marey.client.fetching import FileToFetch, download_all
+from marey.client.fetching import download_all
+from marey.client.file_to_fetch import FileToFetch
 from marey.client.lines import Lines
 from marey.client.manifest import COLUMNS, write_manifest
 from marey.client.place import Server

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from marey.client.fetching import ATTEMPTS, BLOCK, FileToFetch, download_all, plan
+from marey.client.fetching import ATTEMPTS, BLOCK, download_all, plan
+from marey.client.file_to_fetch import FileToFetch
 from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile

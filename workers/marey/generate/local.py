@@ -167,6 +167,7 @@ def load(
     bundle: str | os.PathLike[str],
     *,
     body: str | os.PathLike[str] | None = None,
+    rig_map: str | os.PathLike[str] | None = None,
     device: str | None = None,
     threads: int | None = None,
 ) -> LocalModel:
@@ -174,14 +175,15 @@ def load(
 
     Args:
         bundle: a model (`hgm3`), a bundle (`hgm3-starter`), an exact bundle, or the path of its folder.
-        body: of the motions: `standard`, or a BVH or npz file with other proportions; None = standard.
+        body: of the motions: `standard`, or a rig or an npz file with other proportions; None = standard.
+        rig_map: JSON file that says which joint of that rig is which part of the body, where joints are not found.
         device: `cpu`, `cuda` or `auto`; None = that of MAREY_DEVICE.
         threads: of the CPU; None = that of MAREY_THREADS, by default all cores.
 
     Raises:
         InvalidInput: the extra `worker` is not installed, or the device is unknown.
         NotFound, InvalidBundle: the bundle is unknown, damaged, or not a generator.
-        NotFound, InvalidFile: the file of the body is missing, or no human body.
+        NotFound, InvalidInput, InvalidFile: the file of the body is missing, or no human body.
     """
     try:
         from marey.bundles import choose_bundle
@@ -198,7 +200,11 @@ def load(
             where=str(found.path),
             hint=f"Models that run here: {', '.join(model_names())}.",
         )
-    chosen = None if body is None else read_body_for(found.manifest, os.fspath(body))
+    chosen = (
+        None
+        if body is None
+        else read_body_for(found.manifest, os.fspath(body), None if rig_map is None else os.fspath(rig_map))
+    )
     return LocalModel(found, OneShot(found, config, body=chosen))
 
 

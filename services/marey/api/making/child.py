@@ -139,8 +139,11 @@ def _problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
         error = InvalidInput(f"this server makes no {request['format']} files", where="format", hint=hint)
     elif isinstance(error, InvalidFile) and error.where == request["where"]:
         error = Conflict(f"the npz of the motion cannot be read: {error.message}", where=request["where"])
+    elif isinstance(error, InvalidFile) and error.argument == "body":
+        error = InvalidInput(error.message, where="body", hint="Add the character in the size of a person.")
     elif isinstance(error, InvalidFile):  # an upgrade may change what is read
-        error = Conflict(f"the rig cannot be read: {error.message}", where="rig", hint="Add it again: marey rigs add.")
+        hint = "Add it again: marey rigs add."
+        error = Conflict(f"the rig cannot be read: {error.message}", where="rig", hint=hint, argument="body")
     known = {*request["options"], "fps", request["where"]}
     where = next((each for each in (error.where, error.argument) if each in known), "format")
     return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}

@@ -56,7 +56,7 @@ class FileOrder:
 
     Attributes:
         source: sha256 of the npz that it is made of.
-        rig: the tenant's rig that it is made on; None = none, or a reference rig.
+        rig: the tenant's rig that it is made on, or has the proportions of; None = none, or one of Marey's.
     """
 
     key: ApiKey

@@ -80,6 +80,13 @@ WantedRig = Annotated[
     Annotated[str, Bounds(min_length=1, max_length=63), FreeText()] | None,
     Query(description="Put the motion on a rig: one of `GET /v1/rigs`, or `mixamo`, `ue4`, `humanik`."),
 ]
+WantedBody = Annotated[
+    Annotated[str, Bounds(min_length=1, max_length=63), FreeText()] | None,
+    Query(
+        description="Give the motion the proportions of a rig: one of `GET /v1/rigs`, or `mixamo`, `ue4`, `humanik`; "
+        "`standard` = Marey's own. In every format; not together with `rig`, which has proportions of its own."
+    ),
+]
 Rate = Annotated[
     float | None,
     Query(

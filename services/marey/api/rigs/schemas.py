@@ -17,7 +17,9 @@ MAX_MAP = 8192
 """Characters of a map; all parts of the body with long names of joints take half of it."""
 
 RigPath = Annotated[str, Path(pattern=NAME, description="Name of a rig.")]
-RigName = Annotated[str, Query(pattern=NAME, description="Letters, digits, `_` and `-`; not that of a reference rig.")]
+RigName = Annotated[
+    str, Query(pattern=NAME, description="Letters, digits, `_` and `-`; not `standard`, nor that of a reference rig.")
+]
 RigFormat = Annotated[
     str, Query(pattern=r"^[a-z0-9]{1,8}$", description="Ending of the file's name: `glb`, `fbx`, `bvh`, `vrm`, …")
 ]

@@ -10,7 +10,7 @@ from marey.api.context import Context
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidInput, TooLarge
 from marey.http.bodies import KeptBody
-from marey.motion.export_options import REFERENCE_RIGS
+from marey.motion.export_options import OWN_BODIES, REFERENCE_RIGS
 from marey.takes import AddedRig, NewRig, add_rig
 from marey.tenants import Actor, ApiKey
 
@@ -27,8 +27,9 @@ async def add(shared: Context, key: ApiKey, name: str, format: str, rig_map: str
         Conflict, QuotaUsedUp, Busy: the tenant has as many rigs, bytes or waiting requests as it may.
         Unreachable: the store or the database does not answer.
     """
-    if name in REFERENCE_RIGS:
-        raise InvalidInput(f"{name!r} is a reference rig", where="name", hint="Choose another name.")
+    if name in OWN_BODIES:
+        kind = "a reference rig" if name in REFERENCE_RIGS else "Marey's own body"
+        raise InvalidInput(f"{name!r} is {kind}", where="name", hint="Choose another name.")
     given = _map_of(rig_map)
     data = await body.run(_read, body.file, shared.config.rig_bytes)
     report = await shared.maker.report(key, name, format, given, data)

@@ -19,7 +19,7 @@ from marey.exporters.making import FileRecipe, RigFile
 from marey.exporters.registry import CANONICAL
 from marey.http.schemas import View
 from marey.jobs.types import MotionFile
-from marey.motion.export_options import REFERENCE_RIGS
+from marey.motion.export_options import OWN_BODIES, REFERENCE_RIGS
 from marey.takes import RigRow, get_rig
 
 RETRY_SECONDS = 2
@@ -47,20 +47,27 @@ def motion_of(shared: Context, tenant: str, motion: UUID) -> jobs.MotionRow:
         return jobs.get_motion(conn, tenant, motion)
 
 
-def rig_of(shared: Context, tenant: str, name: str) -> RigRow | None:
-    """Return the tenant's rig of a name; None for a reference rig.
+def rig_of(shared: Context, tenant: str, *, rig: str | None, body: str | None) -> RigRow | None:
+    """Return the tenant's rig that a request names as `rig` or as `body`; None if it names none, or one of Marey's.
 
     Raises:
         NotFound: the tenant has no such rig.
+        InvalidInput: the request names both.
     """
-    if name in REFERENCE_RIGS:
+    export_options({"rig": rig, "body": body})
+    name = rig if rig is not None else body
+    if name is None or name in (REFERENCE_RIGS if rig is not None else OWN_BODIES):
         return None
     with transaction(shared.engine) as conn:
-        return get_rig(conn, tenant, name)
+        try:
+            return get_rig(conn, tenant, name)
+        except NotFound as error:
+            error.where = "rig" if rig is not None else "body"
+            raise
 
 
 def rig_header(rig: RigRow) -> dict[str, str]:
-    """Return the header that says which version of a rig a file is made on."""
+    """Return the header that says which version of a rig a file is made on, or has the proportions of."""
     return {"Marey-Rig": f"{rig.name}; version={rig.version}; sha256={rig.sha256}"}
 
 
@@ -72,7 +79,7 @@ def recipe(
     Args:
         given: options, by name.
         fps: frames a second; None = the motion's.
-        rig: the tenant's rig that the options name; None = none, or a reference rig.
+        rig: the tenant's rig that the options name; None = none, or one of Marey's.
 
     Raises:
         NotFound: the motion has no such file, and no installed exporter makes it.

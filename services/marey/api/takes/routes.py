@@ -17,7 +17,7 @@ from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
 from marey.api.files import CHECKED, FILE_RESPONSES, FOR_EVER, FileRequest, FileView, file_response
 from marey.api.making.maker import FileOrder
-from marey.api.making.query import GivenOptions, Rate, WantedRig
+from marey.api.making.query import GivenOptions, Rate, WantedBody, WantedRig
 from marey.api.takes.files import (
     MAKING_RESPONSES,
     being_made,
@@ -136,6 +136,7 @@ async def get_file(
     options: GivenOptions,
     fps: Rate = None,
     rig: WantedRig = None,
+    body: WantedBody = None,
 ) -> Response:
     """Get a file of a motion; its ETag is its SHA-256.
 
@@ -143,8 +144,8 @@ async def get_file(
     while; 202 if that takes longer than 5 s: ask again.
     """
     row = await run_in_threadpool(motion_of, shared, key.tenant, motion)
-    own_rig = None if rig is None else await run_in_threadpool(rig_of, shared, key.tenant, rig)
-    file = stored_file(row, wanted := recipe(row, format, {**options, "rig": rig}, fps, own_rig))
+    own_rig = await run_in_threadpool(rig_of, shared, key.tenant, rig=rig, body=body)
+    file = stored_file(row, wanted := recipe(row, format, {**options, "rig": rig, "body": body}, fps, own_rig))
     caching = FOR_EVER if file is not None else CHECKED
     if file is None:
         file = await shared.maker.get(FileOrder(key, motion, source_of(row), wanted, own_rig))

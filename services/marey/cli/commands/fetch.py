@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console, options
-from marey.cli.exporting import with_export
+from marey.cli.exporting import FetchedBody, FetchedRig, with_export
 from marey.cli.references import FORMS, find_all
 from marey.client.names import check_template
 from marey.motion.export_options import PLAIN, ExportOptions
@@ -29,7 +29,7 @@ class FetchReviewOption(StrEnum):
     REROLLED = "rerolled"
 
 
-@with_export()
+@with_export(instead={"rig": FetchedRig, "body": FetchedBody})
 def fetch(
     jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help=f"Jobs whose motions to fetch: {FORMS}.")],
     output: options.Folder = Path(),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts, report_gaps, row_defaults
-from marey.cli.exporting import with_export
+from marey.cli.exporting import GeneratedBody, with_export
 from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
@@ -20,7 +20,7 @@ from marey.items.item import Item
 from marey.items.problems import Problem
 from marey.items.timeline import prompts_with_rows
 from marey.items.values import MAX_SEED
-from marey.motion.export_options import PLAIN, ExportOptions
+from marey.motion.export_options import PLAIN, STANDARD, ExportOptions
 
 OFF_PROMPT = "off-prompt"
 """The flag of a motion that does not show its prompt; see docs/reference/quality.md."""
@@ -50,7 +50,7 @@ class Planned:
     """The path of each format."""
 
 
-@with_export(without=("body",))  # it has one of its own, which motions are solved onto
+@with_export(instead={"body": GeneratedBody})
 def generate(
     prompts: options.Prompts = None,
     timelines: options.Timelines = None,
@@ -66,7 +66,6 @@ def generate(
     best_of: options.BestOf = None,
     redraws: options.Redraws = None,
     variety: options.Variety = None,
-    body: options.Body = "standard",
     tags: options.Tags = None,
     sampling: options.Sampling = None,
     scope: options.Scope = options.ScopeOption.WARN,
@@ -102,7 +101,9 @@ def generate(
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
     items = list(report_gaps(reader))
     chosen, config = _bundle_for(reader, items, bundle)
-    shaped = _body_of(chosen, body)
+    shaped = _body_of(chosen, export)
+    if export.body is not None:  # motions are solved onto it: files have it already
+        export = replace(export, body=None, rig_map=None)
     if scope is options.ScopeOption.REFUSE:
         _refuse(reader, items, chosen)
     planned = _plan(items, chosen, output, name_template, kinds, read_constraints_file(constraints))
@@ -128,12 +129,13 @@ def generate(
                     console.result(console.home_relative(path))
 
 
-def _body_of(bundle: Bundle, given: str) -> NamedBody | None:
+def _body_of(bundle: Bundle, export: ExportOptions) -> NamedBody | None:
     """Return the body that `--body` names, None for the standard one; it is read before the bundle is loaded."""
     from marey.bundles.body import read_body_for
-    from marey.motion.body import STANDARD
 
-    return None if given == STANDARD else read_body_for(bundle.manifest, given)
+    if export.body is None or export.body == STANDARD:
+        return None
+    return read_body_for(bundle.manifest, export.body, export.rig_map)
 
 
 def _report_rewrite(clip: MotionClip) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console, options
-from marey.cli.exporting import Body
+from marey.cli.exporting import FetchedBody
 from marey.cli.poses import StoredMotions
 from marey.client import rows
 from marey.client.names import check_template
@@ -64,7 +64,7 @@ def submit(
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
     ] = None,
     formats: options.Formats = None,
-    body: Body = None,
+    body: FetchedBody = None,
     name_template: options.Template = options.TEMPLATE,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Validate everything without submitting.")] = False,
     timeout: Annotated[
@@ -75,6 +75,7 @@ def submit(
     """Put prompts into the queue of a server; prints the job's id."""
     from marey.client import Client
     from marey.client.lines import Lines
+    from marey.client.making import check_rig
 
     check_template(name_template)
     if fetch is not None:
@@ -103,6 +104,7 @@ def submit(
         if reader.total:
             raise _all_problems(reader, lines)
         with Client() as client:
+            check_rig(client.rigs, export)
             wanted: JobOptions = {
                 "name": name, "priority": priority, "fail_early": fail_early, "keep_days": keep_days,
                 "scope": scope.value,
@@ -126,7 +128,7 @@ def submit(
 
 
 def _export_of(folder: Path | None, body: str | None) -> ExportOptions:
-    """Return the options of the files that `--fetch` writes; the body is read before anything is enqueued.
+    """Return the options of the files that `--fetch` writes; the file of a body is read before anything is enqueued.
 
     Raises:
         InvalidInput: a body without `--fetch`, or a file that is none.
@@ -138,10 +140,11 @@ def _export_of(folder: Path | None, body: str | None) -> ExportOptions:
         raise InvalidInput(
             "the server has one body; files are put on another where they are fetched",
             where="--body",
-            hint="Add --fetch FOLDER, or leave it to `marey fetch JOB --body FILE`.",
+            hint="Add --fetch FOLDER, or leave it to `marey fetch JOB --body NAME|FILE`.",
         )
-    check_body(body)
-    return ExportOptions(body=body)
+    export = ExportOptions(body=body)
+    check_body(export)
+    return export
 
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:

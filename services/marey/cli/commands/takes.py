@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from marey.cli import console, options
-from marey.cli.exporting import ServerRig, with_export
+from marey.cli.exporting import ServerBody, ServerRig, with_export
 from marey.cli.operations import OperationsCommand, Ops, given_operations, with_operations
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
@@ -191,7 +191,7 @@ def revert(motions: Motions, as_json: console.Json = False) -> None:
 
 
 @app.command("file")
-@with_export(without=("rig_map", "names", "body"), instead={"rig": ServerRig})
+@with_export(without=("rig_map", "names"), instead={"rig": ServerRig, "body": ServerBody})
 def make_file(
     motion: Annotated[str, typer.Argument(metavar="ID", help=f"The motion: {MOTION_FORMS}.")],
     file_format: Annotated[str, typer.Argument(metavar="FORMAT", help="Format of the file, such as glb or mp4.")],

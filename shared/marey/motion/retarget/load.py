@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.documents import read_json
-from marey.core.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput
 from marey.motion.files import stamp_of
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
@@ -45,6 +45,16 @@ def parse_body(data: bytes, name: str, rig_map: Any = None) -> RigBody:
     return RigBody.of(found, map_joints(found, given, where="map"))
 
 
+def _unknown(rig: str) -> InvalidInput:
+    endings = ", ".join(f".{each}" for each in READERS)
+    suffix = Path(rig).suffix
+    if suffix:
+        hint = f"Endings that are read: {endings}; or name {', '.join(REFERENCES)}."
+        return InvalidInput(f"`{suffix}` is not a rig format", where=rig, hint=hint, argument="rig")
+    hint = f"Reference skeletons: {', '.join(REFERENCES)}. Files: {endings}."
+    return InvalidInput(f"there is no rig {rig!r}", where="rig", hint=hint, argument="rig")
+
+
 @lru_cache(maxsize=16)
 def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> RigBody:
     given = None if rig_map is None else read_map(read_json(Path(rig_map)), rig_map)
@@ -53,11 +63,5 @@ def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tupl
     elif Path(rig).suffix.lower().removeprefix(".") in READERS:
         found = read_rig(rig)
     else:
-        kind = NotFound if "." in Path(rig).name else InvalidInput
-        raise kind(
-            f"there is no rig {rig!r}",
-            where="rig",
-            hint=f"Reference skeletons: {', '.join(REFERENCES)}. Files: {', '.join('.' + each for each in READERS)}.",
-            argument="rig",
-        )
+        raise _unknown(rig)
     return RigBody.of(found, map_joints(found, given, where=rig_map))
