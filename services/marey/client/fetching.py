@@ -62,7 +62,7 @@ def fetch_job(
     formats: Sequence[str] | None = None,
     *,
     template: str = DEFAULT_TEMPLATE,
-    review: str | None = None,
+    review: str | Sequence[str] | None = None,
     prune: bool = False,
     overwrite: bool = False,
     export: ExportOptions = PLAIN,
@@ -72,7 +72,7 @@ def fetch_job(
 
     Args:
         formats: of files; None = all there are.
-        review: fetch only motions with this verdict.
+        review: fetch only motions with this verdict, or with one of several.
         prune: remove files that earlier manifests named for the job and this one does not.
         overwrite: replace files with other content.
         export: options of the files, such as a root bone: those of formats that have these options are made here of the
@@ -92,7 +92,8 @@ def fetch_job(
     check_options((known[name] for name in formats or known if name in known), export)
     check_body(export)
     check_rig(Rigs(transport), export)
-    pages = transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000)
+    reviews = review if isinstance(review, str) or not review else [*review]
+    pages = transport.pages(f"/v1/jobs/{job}/items", review=reviews or None, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)

@@ -31,6 +31,8 @@ from marey.vocabulary.scope import ScopePolicy
 
 WAIT_HINT = "Wait again with a longer timeout, or cancel the job."
 
+ReviewName = Literal["kept", "rejected", "rerolled"]
+
 
 class Jobs(Resource):
     """`client.jobs`. Errors of all methods: NotFound, InvalidInput, Conflict, Refused, Unreachable."""
@@ -301,7 +303,7 @@ class Jobs(Resource):
         *,
         formats: Sequence[str] | None = None,
         name_template: str = DEFAULT_TEMPLATE,
-        review: Literal["kept", "rejected", "rerolled"] | None = None,
+        review: ReviewName | Sequence[ReviewName] | None = None,
         prune: bool = False,
         overwrite: bool = False,
         bvh_root: BvhRoot = "zero",
@@ -326,7 +328,7 @@ class Jobs(Resource):
             formats: such as bvh and npz; None = all that the server has. Others that this process can write, and files
                 with options of the export, are made of the npz (extra `motion`), at every fetch anew.
             name_template: of the paths, from `{index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}`.
-            review: only motions with this review.
+            review: only motions with this review, or with one of several.
             prune: remove files of earlier fetches of the job that this fetch does not include.
             overwrite: replace files with other content.
             bvh_root, root_bone, in_place, tpose_frame, rest_pose, placement, mesh, rig_map, names: of files whose

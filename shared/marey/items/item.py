@@ -103,13 +103,28 @@ class Unreadable:
 
 
 def read_json(line: str | bytes) -> object:
-    """Parse the JSON value of one line, or return `Unreadable`."""
+    """Parse the JSON value of one line, or return `Unreadable`, also where an object gives a key twice: JSON would keep
+    the last, and the caller cannot have meant both."""
     try:
-        return json.loads(line)
+        return json.loads(line, object_pairs_hook=_object)
+    except _RepeatedKeyError as error:
+        return Unreadable(f"gives {error.args[0]!r} twice")
     except RecursionError:
         return Unreadable("is nested too deeply")
     except ValueError as error:
         return Unreadable(f"is not JSON: {error}")
+
+
+class _RepeatedKeyError(ValueError):
+    """A key that an object has twice."""
+
+
+def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise _RepeatedKeyError(next(key for key in keys if keys.count(key) > 1))
+    return found
 
 
 def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[Problem]]:

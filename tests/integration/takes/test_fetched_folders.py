@@ -71,6 +71,20 @@ def test_files_of_takes_that_are_not_chosen_any_more_are_told_and_pruned(
     assert "earlier" not in marey("fetch", job, "-o", folder, "--review", "kept", *NAMES).ok().err
 
 
+def test_motions_with_one_of_several_reviews_are_fetched(marey: Command, job: str, tmp_path: Path) -> None:
+    ids = {m["name"]: m["id"] for m in marey("motions", "list", "--job", job, "--json").ok().lines}
+    some = sorted(ids)
+    marey("motions", "keep", *(ids[name] for name in some[:2])).ok()
+    marey("motions", "reject", ids[some[2]]).ok()
+    marey("motions", "clear", *(ids[name] for name in some[3:])).ok()
+    marey("fetch", job, "-o", tmp_path / "both", "--review", "kept", "--review", "rejected", *NAMES).ok()
+    assert [row["name"] for row in manifest(tmp_path / "both")] == some[:3]
+    ran = marey("fetch", job, "-o", tmp_path / "none", "--review", "rerolled", *NAMES).ok()
+    assert f"no motion of job {job} is rerolled" in ran.err
+    marey("fetch", job, "-o", tmp_path / "one", "--review", "rejected", *NAMES).ok()
+    assert [row["name"] for row in manifest(tmp_path / "one")] == some[2:3]
+
+
 def test_every_option_of_an_export_reaches_the_files(marey: Command, api: LiveApi, tmp_path: Path) -> None:
     with api.client() as client:
         job = client.submit([{"prompt": "a person walks", "name": "walk"}])["id"]

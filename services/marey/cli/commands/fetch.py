@@ -36,7 +36,10 @@ def fetch(
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
     export: ExportOptions = PLAIN,
-    review: Annotated[FetchReviewOption | None, typer.Option("--review", help="Only motions with this review.")] = None,
+    reviews: Annotated[
+        list[FetchReviewOption] | None,
+        typer.Option("--review", help="Only motions with this review; repeated: any of them."),
+    ] = None,
     prune: Annotated[
         bool,
         typer.Option("--prune", help="Remove files of earlier fetches that are no longer part of the job's selection."),
@@ -58,7 +61,8 @@ def fetch(
             folder = output if len(found) == 1 else output / job.id
             write_job(
                 client, job.id, folder, formats,
-                template=name_template, review=review, prune=prune, overwrite=overwrite, export=export, as_json=as_json,
+                template=name_template, reviews=reviews or (), prune=prune, overwrite=overwrite, export=export,
+                as_json=as_json,
             )  # fmt: skip
 
 
@@ -69,7 +73,7 @@ def write_job(
     formats: Sequence[str] | None,
     *,
     template: str = options.TEMPLATE,
-    review: FetchReviewOption | None = None,
+    reviews: Sequence[FetchReviewOption] = (),
     prune: bool = False,
     overwrite: bool = False,
     export: ExportOptions = PLAIN,
@@ -77,8 +81,9 @@ def write_job(
 ) -> None:
     """Fetch the files that a job has so far and print a line for each of its items, in input order."""
     lines = fetch_job(
-        client, job, folder, formats, template=template, review=review, prune=prune, overwrite=overwrite, export=export
-    )
+        client, job, folder, formats,
+        template=template, reviews=reviews, prune=prune, overwrite=overwrite, export=export,
+    )  # fmt: skip
     for line in lines:
         if as_json:
             console.result_json(line)
@@ -88,8 +93,9 @@ def write_job(
     waiting = sum(line["state"] in ("ready", "leased") for line in lines)
     if waiting:
         console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
-    if review is not None and not lines:
-        console.say(f"no motion of job {job} is {review.value}: `marey motions keep ID…` marks motions as kept.")
+    if reviews and not lines:
+        named = " or ".join(review.value for review in reviews)
+        console.say(f"no motion of job {job} is {named}: `marey motions keep ID…` marks motions as kept.")
 
 
 def fetch_job(
@@ -99,7 +105,7 @@ def fetch_job(
     formats: Sequence[str] | None = None,
     *,
     template: str = options.TEMPLATE,
-    review: FetchReviewOption | None = None,
+    reviews: Sequence[FetchReviewOption] = (),
     prune: bool = False,
     overwrite: bool = False,
     export: ExportOptions = PLAIN,
@@ -107,7 +113,7 @@ def fetch_job(
     """Fetch the files that a job has so far, with a progress bar, and return the output lines of its items.
 
     Args:
-        review: items whose motion has this review.
+        reviews: items whose motion has one of these; none = all.
         prune: remove files that earlier manifests named for the job and this one does not.
         export: options of the files.
     """
@@ -138,7 +144,7 @@ def fetch_job(
         fetched = client.jobs.fetch(
             job, folder,
             formats=formats or None, name_template=template,
-            review=None if review is None else review.value, prune=prune, overwrite=overwrite,
+            review=[review.value for review in reviews], prune=prune, overwrite=overwrite,
             on_progress=Observer(), **export.values,
         )  # fmt: skip
     for message in left:
