@@ -67,7 +67,7 @@ def check_body(export: ExportOptions) -> None:
             raise InvalidInput(
                 "a rig of the server has a map of its own",
                 where="rig_map",
-                hint="Leave it out, or add it with the rig: marey rigs add FILE --map MAP.",
+                hint="Leave it out, or add the rig again with this map.",
                 argument="rig_map",
             )
     elif export.body is not None:
