@@ -93,6 +93,7 @@ def _verb_phrases(action: Action) -> list[str]:
 
 
 def _sentence(phrase: str) -> str:
-    """Return a verb phrase as a sentence: "a person waves goodbye"."""
+    """Return a verb phrase as a sentence: "a person waves goodbye", "a person is lying on back"."""
+    begins_exactly = phrase.startswith(EXACT)
     first, *rest = (word.removeprefix(EXACT) for word in phrase.split() if word != WILDCARD)
-    return " ".join(["a person", third_person(first), *rest])
+    return " ".join(["a person", f"is {first}" if begins_exactly else third_person(first), *rest])

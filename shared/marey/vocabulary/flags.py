@@ -81,7 +81,9 @@ class Flagger:
         """Yield the flags of a prompt whatever it names."""
         lists = self._lists
         texts = [word.text for word in words]
-        if any(text in lists.negations for text in texts) or _NEGATIONS & {*pairwise(texts)}:
+        inside = {at for match in found for at in range(match.start, match.end)}  # "does nothing" is idle
+        denied = (self._negates(words, at) for at in range(len(words)) if at not in inside)
+        if any(denied) or _NEGATIONS & {*pairwise(texts)}:
             yield "negation"
         named = (m.start for m in found if m.end - m.start == 1 or not all(meaning.noun for meaning in m.meanings))
         verbs = {*named}  # "bows deeply" has no bow
@@ -109,6 +111,17 @@ class Flagger:
         return any(
             len(word.text) > 1 and not word.text.isascii() and not any(map(_is_latin, word.text)) for word in words
         )
+
+    def _negates(self, words: list[Word], at: int) -> bool:
+        """Return True for "not" and its like; for "stops" and its like only before what is not done: "stops walking",
+        not "stops at the door"."""
+        text = words[at].text
+        if text not in self._lists.negations:
+            return False
+        if text not in self._lists.ending:
+            return True
+        after = words[at + 1].text if at + 1 < len(words) else ""
+        return after == "to" or after.endswith("ing")
 
     def _counts(self, words: list[Word], at: int) -> bool:
         text, lists = words[at].text, self._lists

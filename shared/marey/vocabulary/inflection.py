@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 _IRREGULAR = {  # base: forms that no rule makes
     "be": "was were been is are am being",
@@ -108,6 +109,7 @@ def verb_forms(base: str) -> frozenset[str]:
     return frozenset(forms | _pasts(base))
 
 
+@lru_cache(maxsize=4096)
 def noun_forms(base: str) -> frozenset[str]:
     """Return singular and plural of a noun."""
     return frozenset({base, _PLURALS.get(base) or third_person(base)})

@@ -12,7 +12,14 @@ WILDCARD = "~"
 """Stands in a phrase for one to three words: "pick ~ up"."""
 EXACT = "="
 """Before a word of a phrase that stands for this form alone: "be =punched"."""
-_LEFT_OUT = frozenset({"a", "an", "the", "his", "her", "one", "two", "both", "own", "self"})
+_LEFT_OUT = frozenset({"a", "an", "the", "his", "her", "one", "two", "both", "own"})
+SELF = "self"
+"""Stands in a phrase for any reflexive pronoun: "pick self up"."""
+REFLEXIVES = frozenset(f"{who}self" for who in ("my", "your", "him", "her", "it", "one", "them")) | {
+    "ourselves",
+    "yourselves",
+    "themselves",
+}
 
 
 @dataclass(frozen=True)
@@ -23,11 +30,13 @@ class Meaning:
         action: id; None = an action outside the vocabulary.
         near: the phrase is only read as this action.
         noun: the phrase is a noun, and names the action wherever it stands.
+        aside: the phrase is no action beside others: "throws in some jumps".
     """
 
     action: str | None
     near: bool = False
     noun: bool = False
+    aside: bool = False
 
 
 @dataclass(slots=True)
@@ -41,13 +50,16 @@ class PhraseNode:
 class Lexicon:
     """The words of a vocabulary, with verbs and idioms that are outside it."""
 
-    def __init__(self, vocabulary: Vocabulary, other_verbs: Iterable[str], idioms: Iterable[str]) -> None:
+    def __init__(
+        self, vocabulary: Vocabulary, other_verbs: Iterable[str], idioms: Iterable[str], asides: Iterable[str] = ()
+    ) -> None:
         """Build the tree of all phrases."""
         self.root: dict[str, PhraseNode] = {}
-        self._base: dict[str, str] = {}
+        self._base: dict[str, str] = dict.fromkeys(REFLEXIVES, SELF)
         self._verbs = set[str]()
         entries = [(words_of(phrase), meaning) for phrase, meaning in _phrases(vocabulary)]
         outside = [(words_of(phrase), Meaning(None)) for phrase in (*other_verbs, *idioms)]
+        outside += [(words_of(phrase), Meaning(None, aside=True)) for phrase in asides]
         for words, meaning in (*entries, *outside):
             self._add_forms(words, noun=meaning.noun)
         for words, meaning in entries:

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
+from marey.vocabulary.grammar import Grammar
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.lexicon import Lexicon, Meaning, words_of
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
@@ -32,6 +33,8 @@ Left = Literal["noun", "verb"]
 VERSION = 1
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
+_OFF_FEET = ("seat", "whole-body")
+"""Supports from which the body rises by different actions."""
 _ORDER: dict[str, int] = {verdict: rank for rank, verdict in enumerate(get_args(Verdict))}
 
 
@@ -140,12 +143,13 @@ class ScopeMatcher:
     def __init__(self, vocabulary: Vocabulary) -> None:
         """Build the tables, once."""
         lists = load_word_lists()
-        lexicon = Lexicon(vocabulary, lists.other_verbs, lists.idioms)
-        self._vocabulary = vocabulary
-        self._phrases = PhraseFinder(lexicon, lists)
+        lexicon = Lexicon(vocabulary, lists.other_verbs, lists.idioms, lists.asides)
         travels = frozenset(
             action.id for action in vocabulary.actions.values() if action.in_place and not action.kind_of
         )
+        self._vocabulary = vocabulary
+        self._phrases = PhraseFinder(lexicon, lists, travels)
+        self._grammar = Grammar(lexicon, lists, vocabulary, travels)
         handling = frozenset(
             verb
             for action in vocabulary.actions.values()
@@ -159,7 +163,7 @@ class ScopeMatcher:
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
         words = self._phrases.words(prompt)
-        found = self._phrases.find(words)
+        found = self._grammar.actions(words, self._phrases.find(words))
         flags = list(self._flagger.details(words, found))
         if stated_length(prompt).is_partial:
             flags.append("length")
@@ -169,7 +173,7 @@ class ScopeMatcher:
             return Scope((_nothing(prompt),), (*flags, foreign or "no-action"), left=left)
         if self._flagger.has_other_script(words):
             flags.append("other-language")
-        named = tuple(_unique(self._named(words, match, lists) for match in found))
+        named = tuple(_unique(self._named(words, match, lists) for match in self._in_context(found)))
         scope = Scope(named, tuple(flags))
         ambiguous = scope.verdict != "unknown" and self._phrases.may_be_things(words, found)
         return replace(scope, left="noun") if ambiguous else scope
@@ -178,6 +182,22 @@ class ScopeMatcher:
         """Return the scope of a prompt in which the words name no action, read as this one."""
         flags: list[Flag] = [flag for flag in self.match(prompt, lists).flags if flag != "no-action"]
         return Scope((self._judged(prompt[:MAX_TEXT], Meaning(action, near=True), lists),), tuple(flags), by="encoder")
+
+    def _in_context(self, found: list[Match]) -> Iterator[Match]:
+        """Yield the phrases; of one that is several actions those that begin as the action before has ended: "gets up"
+        behind "sits" is from a seat, behind "falls" from the floor."""
+        support = ""
+        for match in found:
+            fitting = [each for each in match.meanings if support in _OFF_FEET and self._support(each) == support]
+            if fitting and len({each.action for each in match.meanings}) > 1:
+                match = replace(match, meanings=tuple(replace(each, near=False) for each in fitting))
+            support = next((self._support(each) for each in match.meanings if each.action), "")
+            yield match
+
+    def _support(self, meaning: Meaning) -> str:
+        """Return what carries the body in an action; nothing on the knees, with the hips as high as on a seat."""
+        name = meaning.action
+        return "" if name is None or name == "kneel" else self._vocabulary.actions[name].support
 
     def _named(self, words: list[Word], match: Match, lists: ActionLists) -> NamedAction:
         """Return the best of a phrase's meanings."""

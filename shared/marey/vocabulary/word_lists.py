@@ -9,10 +9,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from marey.vocabulary.inflection import noun_forms
+
 
 @dataclass(frozen=True)
 class WordLists:
-    """All lists; the file says what each is for. `skipped` may stand inside a phrase, `english` is all of them."""
+    """All lists; the file says what each is for. `skipped` may stand inside a phrase, `english` is all of them.
+
+    `limbs` maps both numbers of a part to the singular, `kinds` a noun to the one that stands for it in phrases.
+    """
 
     skipped: frozenset[str]
     determiners: frozenset[str]
@@ -31,12 +36,22 @@ class WordLists:
     not_people: frozenset[str]
     objects: frozenset[str]
     negations: frozenset[str]
+    ending: frozenset[str]
     counts: frozenset[str]
     uncounted: frozenset[str]
     manner: frozenset[str]
     hypothetical: frozenset[str]
+    limbs: Mapping[str, str]
+    units: frozenset[str]
+    light: frozenset[str]
+    averting: frozenset[str]
+    of_things: frozenset[str]
+    turning: frozenset[str]
+    adverbials: tuple[tuple[str, ...], ...]
+    kinds: Mapping[str, str]
     other_verbs: tuple[str, ...]
     idioms: tuple[str, ...]
+    asides: tuple[str, ...]
     languages: tuple[frozenset[str], ...]
     english: frozenset[str]
 
@@ -50,11 +65,18 @@ def load_word_lists() -> WordLists:
     sets["skipped"] = sets.pop("dropped") | sets.pop("adverbs") | sets["sides"]
     sets["people"] |= sets["body_parts"]
     sets["breaks"] |= frozenset(".,;:!?")
+    limbs = {form: word for word in sets.pop("limbs") for form in noun_forms(word)}
     del sets["other_verbs"]
     return WordLists(
         **sets,
+        limbs=limbs,
         other_verbs=tuple(table["other_verbs"].split()),
         idioms=tuple(table["idioms"]),
+        asides=tuple(table["asides"]),
+        adverbials=tuple(tuple(phrase.split()) for phrase in table["adverbials"]),
+        kinds={
+            form: name for name, words in table["kinds"].items() for word in words.split() for form in noun_forms(word)
+        },
         languages=tuple(frozenset(value.split()) for value in table["languages"].values()),
         english=english,
     )

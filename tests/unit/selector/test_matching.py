@@ -131,6 +131,21 @@ def test_a_gait_with_a_turn_need_not_go_straight() -> None:
     assert matched(walker(turn=90.0), "a person walks") < SHOWN
 
 
+@pytest.mark.parametrize(
+    "prompt", ["a person walks in a circle", "she jogs in a full circle", "he circles to the left"]
+)
+def test_a_circle_goes_all_the_way_round(prompt: str) -> None:
+    assert matched(walker(turn=360.0), prompt) >= SHOWN
+    assert matched(walker(turn=180.0), prompt) < SHOWN
+
+
+def test_a_turn_and_half_a_circle_stay_within_their_definition() -> None:
+    for prompt in ("a person walks in a half circle", "someone turns left", "she walks in a semicircle"):
+        assert matched(walker(turn=180.0), prompt) >= SHOWN
+        assert matched(walker(turn=360.0), prompt) < SHOWN
+    assert matched(walker(turn=360.0), "a person walks in a circle to the right") < SHOWN
+
+
 def test_words_of_other_meanings_beside_an_action_do_not_count() -> None:
     assert wanted_of(["a man is running to catch the bus"]) == ((WantedAction("run"),),)
 

@@ -110,6 +110,12 @@ def turn(m: Motion, side: str) -> float:
     return min(least(angle, 45, 15), most(angle, 200, 30), going, least(m.travel[0], 0.4, 0.2))
 
 
+def circle(m: Motion, side: str) -> float:
+    """Walk or run all the way round."""
+    angle = {"left": m.turn, "right": -m.turn}.get(side, abs(m.turn))
+    return min(least(angle, 300, 60), least(m.path, 1.0, 0.4), least(m.travel[0], 0.8, 0.4))
+
+
 def turn_around(m: Motion, side: str) -> float:
     """Turn on the spot."""
     angle = m.heading - m.heading[0]

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from marey.selector.gaits import circle
 from marey.selector.motion import SHORTEST, Motion
-from marey.selector.rules import RULES, TURNS, WHILE_TURNING
+from marey.selector.rules import RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope
 
@@ -21,6 +22,8 @@ FEWEST_CUTS = 7
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
+_CIRCLE = re.compile(r"\bcircl(?:es?|ed|ing)\b")
+_PART_OF_CIRCLE = re.compile(r"\b(?:half|semi|quarter|part)\b")
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,12 @@ class WantedAction:
     Attributes:
         action: id in the vocabulary, one that `RULES` has.
         side: `left`, `right`, `both`, or empty: any.
+        circle: a `turn` that the words say goes all the way round, beyond the angles of its definition.
     """
 
     action: str
     side: str = ""
+    circle: bool = False
 
 
 Step = tuple[WantedAction, ...]
@@ -82,7 +87,19 @@ def _step(sentence: str) -> Step | None:
         beside.add("idle")
     wanted = [name for name in names if name not in beside] or names
     side = side_of(sentence)
-    return tuple(WantedAction(name, side if actions[name].sided else "") for name in wanted) or None
+    circles = {each.action for each in scope.actions if _CIRCLE.search(each.text)} if goes_round(sentence) else set()
+    return (
+        tuple(
+            WantedAction(name, side if actions[name].sided else "", circle=name == "turn" and name in circles)
+            for name in wanted
+        )
+        or None
+    )
+
+
+def goes_round(sentence: str) -> bool:
+    """Return True if a circle that a sentence names is a whole one."""
+    return not _PART_OF_CIRCLE.search(sentence.lower())
 
 
 def side_of(sentence: str) -> str:
@@ -111,13 +128,17 @@ def _grade(motion: Motion, step: Step) -> float:
     """Grade the actions of a step: at one time, or one after the other as they are named."""
     turning = any(wanted.action in TURNS for wanted in step)
     rules_at_once = {**RULES, **WHILE_TURNING} if turning else RULES
-    together = min(rules_at_once[wanted.action](motion, wanted.side) for wanted in step)
+    together = min(_rule(wanted, rules_at_once)(motion, wanted.side) for wanted in step)
     if len(step) == 1:
         return together
     rules: list[Callable[[Motion], float]] = [
-        lambda part, wanted=wanted: RULES[wanted.action](part, wanted.side) for wanted in step
+        lambda part, wanted=wanted: _rule(wanted, RULES)(part, wanted.side) for wanted in step
     ]
     return max(together, _in_order(motion, rules))
+
+
+def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
+    return circle if wanted.circle else rules[wanted.action]
 
 
 def _in_order(motion: Motion, rules: Sequence[Callable[[Motion], float]]) -> float:
