@@ -13,9 +13,9 @@ from typing import Any, Literal, get_args
 
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
-from marey.vocabulary.grammar import Grammar
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.lexicon import Lexicon, Meaning, words_of
+from marey.vocabulary.phrase_roles import PhraseRoles
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -149,7 +149,7 @@ class ScopeMatcher:
         )
         self._vocabulary = vocabulary
         self._phrases = PhraseFinder(lexicon, lists, travels)
-        self._grammar = Grammar(lexicon, lists, vocabulary, travels)
+        self._roles = PhraseRoles(lexicon, lists, vocabulary, travels)
         handling = frozenset(
             verb
             for action in vocabulary.actions.values()
@@ -163,7 +163,7 @@ class ScopeMatcher:
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
         words = self._phrases.words(prompt)
-        found = self._grammar.actions(words, self._phrases.find(words))
+        found = self._roles.actions(words, self._phrases.find(words))
         flags = list(self._flagger.details(words, found))
         if stated_length(prompt).is_partial:
             flags.append("length")

@@ -36,7 +36,7 @@ _STRUCK = frozenset(["him", "her", "them", "in", "at"])
 _DEFINITE = frozenset(["the", "his", "her", "their", "its"])
 
 
-class Grammar:
+class PhraseRoles:
     """Rules by which a phrase names no action of the person, though its words are in the vocabulary."""
 
     def __init__(self, lexicon: Lexicon, lists: WordLists, vocabulary: Vocabulary, travels: frozenset[str]) -> None:
@@ -135,7 +135,7 @@ class Grammar:
         )
 
     def _is_part(self, words: list[Word], match: Match) -> bool:
-        """Return True for a part of the body whose word is a verb, too, where nobody is struck: "elbows bent"."""
+        """Return True for a part of the body whose word is a verb, too, that strikes nothing: "elbows bent"."""
         if match.end - match.start > 1 or words[match.start].text not in self._lists.limbs:
             return False
         after = words[match.end].text if match.end < len(words) else ""
@@ -223,7 +223,7 @@ class Grammar:
         return before >= 0 and words[before].text in _HOW
 
     def _is_by_others(self, words: list[Word], match: Match) -> bool:
-        """Return True if somebody else does it in a clause of time: "while somebody explains the plan"."""
+        """Return True if another person does it in a clause of time: "while someone explains the plan"."""
         verb = words[match.start]
         if verb.text == verb.base or verb.text.endswith("ing") or match.start == 0:
             return False
