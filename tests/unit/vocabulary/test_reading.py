@@ -1,6 +1,6 @@
 """Actions read in prompts in ordinary phrasing."""
 
-from marey.checks.reading import ReadingPrompt, reading_prompts
+from marey.checks.action_prompts import ReadingPrompt, ReadingSet, reading_prompts
 from marey.selector import wanted_of
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.marey import REPOSITORY
@@ -13,7 +13,8 @@ def read(text: str) -> set[str]:
 
 def test_the_published_counts_are_those_of_the_sets() -> None:
     page = (REPOSITORY / "docs" / "reference" / "scope.md").read_text()
-    for which, before in (("development", 124), ("held_out", 120)):
+    counts: dict[ReadingSet, int] = {"development": 124, "held_out": 120}
+    for which, before in counts.items():
         prompts = reading_prompts(which)
         right = sum(prompt.is_right(read(prompt.text)) for prompt in prompts)
         assert f"| {len(prompts)} | {before}, {right} |" in page
