@@ -232,6 +232,8 @@ OPEN = replace(
     # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
     phases=1,
     speeds=False,
+    # Captured walks last three seconds and more; prompts ask for two.
+    crops=0.4,
     # Waves and claps must be in the first level: upper levels are drawn without regard to their neighbours.
     tokenizer=replace(STARTER.tokenizer, level_dropout=0.4, swing_weight=4.0),
     residual=replace(STARTER.residual, layers=6, feedforward=768, dropout=0.1),
