@@ -27,6 +27,8 @@ def names_the_field(_context: CheckContext, response: Response, case: Case) -> N
     for each in told:
         field, line = each.get("field"), each.get("line")
         named = line is not None if field is None else _leads(field.lower(), known)
+        if field and each.get("message", "").startswith("is missing"):  # of an element that is free in form
+            named = named or _leads(field.lower().rpartition(".")[0], known)
         if response.status_code == 409 or problem["type"].endswith(":idempotency-mismatch"):
             named = named or bool(field)  # about what stands there: its kind and id
         assert named, f"{field!r} (line {line}) is no field of the request: {problem}"
