@@ -5,58 +5,35 @@ ViT-B/32, 512-d, is that of MoMask and HGM³; ViT-L/14, 768-d, that of GraphMoti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
+from torch import Tensor
 
 from marey.core.errors import InvalidFile
-from marey.nn.threads import one_thread
-from marey.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
-from marey.text.pretrained import load_pretrained, read_config
+from marey.text.encoders import HUB, WIDTHS
+from marey.text.pretrained import read_config
+from marey.text.states_encoder import StatesEncoder
 
-MAX_TOKENS = 77
 NAMES = {"clip-vit-b32": "ViT-B/32", "clip-vit-l14": "ViT-L/14"}
 
 
-class ClipEncoder:
+class ClipEncoder(StatesEncoder):
     """Pooled = projected state of the end token. Token states pass the same projection: one space for all nodes (ours;
     GraphMotion mixes projected sentences with unprojected tokens). Tokens past 77 are left out; the sentence is then
     that of the first 75 words' pieces and the end token.
     """
 
+    max_tokens = 77
+
     def __init__(self, name: str, folder: Path) -> None:
         from transformers import CLIPTextModelWithProjection, CLIPTokenizer
 
         check_clip(name, folder)
-        self.name = name
-        self.width = WIDTHS[name]
-        self.sha256 = weights_sha256(folder)
-        self._tokenizer: Any = load_pretrained(CLIPTokenizer, folder)
-        self._model: Any = load_pretrained(CLIPTextModelWithProjection, folder, weights=True)
+        super().__init__(name, folder, CLIPTextModelWithProjection, CLIPTokenizer)
 
-    @one_thread()
-    @torch.inference_mode()
-    def encode(self, text: str) -> Encoding:
-        """Encode one text; tokens past 77 are left out."""
-        inputs = self._tokenizer(
-            text, truncation=True, max_length=MAX_TOKENS, return_offsets_mapping=True, return_tensors="pt"
-        )
-        offsets = tuple((int(a), int(b)) for a, b in inputs.pop("offset_mapping")[0].tolist())
-        output = self._model(**inputs)
-        tokens = self._model.text_projection(output.last_hidden_state[0])
-        return Encoding(output.text_embeds[0].numpy(), tokens.numpy(), offsets)
-
-    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """One by one: a product of other rows may round differently."""
-        return [self.encode(text).pooled for text in texts]
-
-    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """One by one, as `pooled`."""
-        return [self.encode(text).tokens for text in texts]
+    def _read(self, output: Any) -> tuple[Tensor, Tensor]:
+        return output.text_embeds[0], self._model.text_projection(output.last_hidden_state[0])
 
 
 def check_clip(name: str, folder: Path) -> None:
