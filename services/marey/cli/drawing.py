@@ -59,18 +59,15 @@ class Drawers:
         self._pool: ProcessPoolExecutor | None = None
         if self._processes > 1:
             self._pool = ProcessPoolExecutor(self._processes, multiprocessing.get_context("spawn"), initializer=_begin)
-        self._others = set(multiprocessing.active_children())
 
     def __enter__(self) -> Drawers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._pool is None:
-            return
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - self._others:
-            process.terminate()
-            process.join()
+        if self._pool is not None:
+            # The few pictures that are begun are finished: a process that is terminated while it sends one leaves the
+            # pool's thread, and with it the command, waiting for the rest for ever.
+            self._pool.shutdown(cancel_futures=True)
 
     def draw(self, drawings: Iterable[Drawing]) -> Iterator[Image.Image]:
         """Draw motions, in their order.
