@@ -9,9 +9,8 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from marey.api.app import create_app
-from marey.core.settings import Settings
 from marey.embedded import EmbeddedServer
+from tests.support.document import openapi
 from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_generator
 from tests.support.live_api import running_api, settings_of
 
@@ -76,7 +75,7 @@ def test_a_bundle_of_the_wrong_kind_or_of_nobody_is_told_by_the_field_that_names
 
 
 def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: httpx2.Client) -> None:
-    paths = create_app(Settings()).openapi()["paths"]
+    paths = openapi()["paths"]
     del paths["/metrics"]  # which wants a scope that this key lacks, and that is told first
     for template, operations in paths.items():
         path = re.sub(r"{\w+}", lambda _: str(uuid4()), template)

@@ -20,12 +20,11 @@ from schemathesis.generation import GenerationMode
 from schemathesis.generation.hypothesis.builder import HypothesisTestConfig, HypothesisTestMode, create_test
 from schemathesis.specs.openapi.checks import response_schema_conformance
 
-from marey.api.app import create_app
-from marey.core.settings import Settings
 from marey.db import transaction
 from marey.embedded import EmbeddedServer
 from marey.tenants import create_key, create_tenant
 from tests.support.auth_states import Knock, invalid_knocks, lesser_knocks
+from tests.support.document import openapi
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import add_streamer
 from tests.support.named_fields import names_the_field
@@ -114,7 +113,7 @@ def ndjson(_context: object, value: object) -> bytes:
     return b"".join(json.dumps(line).encode() + b"\n" for line in (value if isinstance(value, list) else [value]))
 
 
-document = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
+document = schemathesis.openapi.from_dict(openapi())
 operations = document.exclude(path="/readyz")  # which answers 503 on purpose: no worker runs here
 OPERATIONS = {found.ok().label: found.ok() for found in operations.get_all_operations()}
 """By their labels. Tests make their cases when they run: `parametrize()` makes them in every process that collects."""

@@ -10,10 +10,10 @@ import httpx2
 import pytest
 from fastapi.routing import APIRoute
 
-from marey.api.app import ROUTERS, create_app
+from marey.api.app import ROUTERS
 from marey.api.docs.routes import FILES
-from marey.core.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
+from tests.support.document import openapi
 from tests.support.live_api import LiveApi
 
 PAGES = {"GET /", "GET /live", "GET /docs", "GET /openapi.json", *(f"GET /docs/{name}" for name in FILES)}
@@ -41,7 +41,7 @@ OTHERS = {
 
 def documented() -> dict[str, str | None]:
     """By operation, the scope that the OpenAPI document says it wants."""
-    paths = create_app(Settings()).openapi()["paths"]
+    paths = openapi()["paths"]
     return {
         f"{method.upper()} {path}": security[0]["HTTPBearer"][0] if (security := operation.get("security")) else None
         for path, operations in paths.items()

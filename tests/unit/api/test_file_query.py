@@ -8,16 +8,15 @@ from typing import Literal
 
 import pytest
 
-from marey.api.app import create_app
 from marey.api.making import query
-from marey.core.settings import Settings
 from marey.motion.export_options import ExportOptions
+from tests.support.document import openapi
 
 PATH = "/v1/motions/{motion}/files/{format}"
 
 
 def test_every_option_of_fixed_values_is_a_described_parameter() -> None:
-    parameters = {each["name"]: each for each in create_app(Settings()).openapi()["paths"][PATH]["get"]["parameters"]}
+    parameters = {each["name"]: each for each in openapi()["paths"][PATH]["get"]["parameters"]}
     closed = query.query_options()
     assert closed.keys() >= {"bvh_root", "root_bone", "in_place", "tpose_frame", "rest_pose", "placement", "mesh"}
     assert closed.keys() <= {each.name for each in fields(ExportOptions)}

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from marey.api.app import create_app
 from marey.core.characters import LINE_PATTERN, TEXT_PATTERN
-from marey.core.settings import Settings
 from marey.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
+from tests.support.document import openapi
 
 READ_BY_HAND = {
     "NewItemBody": {"prompt", "tags", "name", "model", "timeline", "constraints"},  # marey.items.item
@@ -41,7 +40,7 @@ def unchecked(schema: dict[str, Any], components: dict[str, Any], path: str) -> 
 
 
 def test_no_operation_takes_text_that_nobody_checks() -> None:
-    document = create_app(Settings()).openapi()
+    document = openapi()
     components = document["components"]["schemas"]
     found: list[str] = []
     for path, operations in document["paths"].items():
