@@ -78,6 +78,9 @@ class TextSpec(_Frozen):
     in_order: bool = False
     """Ours: a prompt of several actions is read as its actions in order ("before bowing, she walks" as "she walks, and
     then a person is bowing")."""
+    plain_action: bool = False
+    """Ours: the one action that a prompt asks for is said first in plain words ("just a normal walk" is read as "a person
+    walks, just a normal walk")."""
     split_actions: bool = True
     """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
 
@@ -89,6 +92,8 @@ class TextSpec(_Frozen):
     def _serialize(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave fields out that have the usual value: earlier releases refuse a field that they do not know."""
         values: dict[str, Any] = handler(self)
+        if not self.plain_action:
+            values.pop("plain_action", None)
         if self.split_actions:
             values.pop("split_actions", None)
         if self.wording == "caption":

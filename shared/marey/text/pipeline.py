@@ -26,6 +26,7 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
+from marey.text.plain_action import with_plain_action
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.words import EDGE_PUNCTUATION
@@ -107,20 +108,23 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        graphs = [graph for graph, _ in self._read([rewrite.text for rewrite in rewritten])]
+        worded = self._worded(rewritten)
+        graphs = [graph for graph, _ in self._read(worded)]
         return [
-            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, rewrite, graph), self._warnings(graph))
-            for prompt, rewrite, graph in zip(checked, rewritten, graphs, strict=True)
+            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, rewrite, text, graph), self._warnings(graph))
+            for prompt, rewrite, text, graph in zip(checked, rewritten, worded, graphs, strict=True)
         ]
 
-    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, graph: SemanticGraph) -> str | None:
+    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, worded: str, graph: SemanticGraph) -> str | None:
         """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
         if rewrite.text != prompt:
             reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
         if rewrite.refused is not None:
             reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {rewrite.refused}")
-        if graph.text != rewrite.text:
+        if worded != rewrite.text:
+            reasons.append("the model knows the action by the plain words that are put first")
+        if graph.text != worded:
             reasons.append("the model reads several actions as one sentence each, in the order of time")
         return "; ".join(reasons) or None
 
@@ -172,11 +176,15 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        read = self._read([rewrite.text for rewrite in rewritten])
+        read = self._read(self._worded(rewritten))
         return [
             replace(self._features(prompt, graph, actions), not_rewritten=rewrite.refused, seconds=rewrite.seconds)
             for prompt, rewrite, (graph, actions) in zip(checked, rewritten, read, strict=True)
         ]
+
+    def _worded(self, rewritten: Sequence[Rewrite]) -> list[str]:
+        """Return the texts that are read: with `TextSpec.plain_action`, behind their action in plain words."""
+        return [with_plain_action(each.text) if self.spec.plain_action else each.text for each in rewritten]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of

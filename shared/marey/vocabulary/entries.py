@@ -21,7 +21,7 @@ _FILE = Path(__file__).with_name("vocabulary.toml")
 FLIGHT_SECONDS = 0.3
 """Longest flight of an action that states none."""
 
-_FIELDS = {"definition", "verbs", "nouns", "near", "implies", "kind_of", "support", "sided", "flight_s", "in_place"}
+_FIELDS = {"definition", "verbs", "nouns", "near", "implies", "kind_of", "support", "sided", "flight_s", "in_place", "plain"}
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Action:
         id: its name, in kebab-case.
         definition: what the body does, precise enough for an independent author to write a checker from.
         verbs: verb phrases in their base form; their first word is inflected.
+        plain: the verb phrase by which models know it best, in its base form.
         nouns: noun phrases in the singular; their last word is inflected.
         near: verbs and nouns that are read as this action though its definition does not promise them.
         support: part of the body that carries it.
@@ -45,6 +46,7 @@ class Action:
     id: str
     definition: str
     verbs: tuple[str, ...]
+    plain: str
     nouns: tuple[str, ...]
     near: tuple[str, ...] = ()
     support: Support = "feet"
@@ -140,6 +142,7 @@ def _action(name: str, value: object, where: str) -> Action:
         id=name,
         definition=definition,
         verbs=verbs,
+        plain=str(table.get("plain", verbs[0])),
         nouns=_words(table, "nouns", place),
         near=_words(table, "near", place),
         support=cast("Support", _one_of(table, "support", "feet", get_args(Support), place)),

@@ -50,7 +50,7 @@ def assemble(
     statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
     condition = config.condition
     caps = {"max_actions": condition.max_actions, "max_specifics": condition.max_specifics}
-    text = gathered.text.model_copy(update={"in_order": config.in_order, **caps})
+    text = gathered.text.model_copy(update={"in_order": config.in_order, "plain_action": config.plain_action, **caps})
     return write_generator(
         bundle, MODEL, config, states, statistics, text=text, card=card, overwrite=overwrite, **gathered.manifest,
     )  # fmt: skip

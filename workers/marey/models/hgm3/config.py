@@ -128,6 +128,9 @@ class HGM3Config(ModelConfig):
     predictor: TransformerConfig = TransformerConfig()
     residual: TransformerConfig = TransformerConfig()
     in_order: bool = False  # ours: prompts of several actions are read in the order of time (`TextSpec.in_order`)
+    plain_action: bool = field(default=False, metadata=ADDED)
+    """Ours: the action that a prompt asks for is said first in plain words (`TextSpec.plain_action`); captions are learned as
+    they are."""
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     phases: Count = field(default=4, metadata=ADDED)
@@ -232,6 +235,7 @@ OPEN = replace(
     # 81 actions, most of them with one to five takes, must be known by heart: one token sequence for each clip.
     phases=1,
     speeds=False,
+    plain_action=True,
     # Captured walks last three seconds and more; prompts ask for two.
     crops=0.4,
     # Waves and claps must be in the first level: upper levels are drawn without regard to their neighbours.
