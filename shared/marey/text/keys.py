@@ -18,7 +18,7 @@ REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1, "tca": 1}
 ASKING = frozenset({"openai", "tca"})
 """Rewriters that ask a language model."""
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
-MEANING_VERSION = 2
+MEANING_VERSION = 3
 """Raise it when `marey.text.meaning` judges the same prompt otherwise for any reason but the vocabulary."""
 NO_LABELLER = "none"
 """A spec may say so: graphs are the motion node alone."""

@@ -36,7 +36,6 @@ _LEAST_WORDS = 4
 """Words of a prompt with an action that may be gibberish nevertheless ("lorem ipsum dolor sit amet")."""
 _TOGETHER = frozenset([("each", "other"), ("one", "another")])
 """Of people, unless parts of one are named before."""
-_NEGATIONS = frozenset([("rather", "than"), ("w", "o")])
 _ARM_IN_ARM = frozenset([("hand", "in", "hand"), ("arm", "in", "arm")])
 _SPEAKERS = frozenset(["i", "you", "we", "me"])
 """Those who ask for a motion, and are asked: "I need a guard"."""
@@ -55,6 +54,13 @@ _PARTICLES = frozenset(["up", "down", "away", "off", "out", "back"])
 """Between a verb and its object: "picks up a gauntlet"."""
 _DOERS = re.compile(r"(?:[^aeiou]er|or|ist|ian|eer|ess|man|men|woman|women|boy|girl|lady)s?$")
 """Endings of nouns that name people by what they do."""
+_MAX_OBJECT = 3
+"""Words of an object: "the red fire extinguisher"."""
+_OWNING = frozenset(["his", "her", "its", "their", "my", "your"])
+_ORDINALS = frozenset(["another", "second", "third", "fourth", "fifth"])
+"""Before an action's noun, or "time", they count it: "does a second cartwheel"."""
+_SETS = frozenset(["pair", "duo", "trio"])
+"""With "of" before an action's noun."""
 _ANGLES = range(45, 100, 15)
 """Degrees that a turn may have: "turns 90"."""
 _MAX_SUBJECT = 5
@@ -75,22 +81,27 @@ class Flagger:
         self._travels = travels
         self._handling = handling
         self._lists = lists
+        self._persons = lists.people | lists.plural_people | lists.groups | lists.companions
+        self._single_persons = (lists.people | lists.companions) - _PRONOUNS
         self._likened = lists.likened | {form for verb in lists.likened for form in verb_forms(verb)}
 
-    def details(self, words: list[Word], found: list[Match]) -> Iterator[Flag]:
-        """Yield the flags of a prompt whatever it names."""
-        lists = self._lists
-        texts = [word.text for word in words]
+    def details(self, words: list[Word], found: list[Match], *, negated: bool) -> Iterator[Flag]:
+        """Yield the flags of a prompt whatever it names.
+
+        Args:
+            found: phrases, also of what is not done.
+            negated: something is said to be not done.
+        """
         inside = {at for match in found for at in range(match.start, match.end)}  # "does nothing" is idle
         denied = (self._negates(words, at) for at in range(len(words)) if at not in inside)
-        if any(denied) or _NEGATIONS & {*pairwise(texts)}:
+        if negated or any(denied):
             yield "negation"
         named = (m.start for m in found if m.end - m.start == 1 or not all(meaning.noun for meaning in m.meanings))
         verbs = {*named}  # "bows deeply" has no bow
-        listed = any(word.base in lists.objects and at not in verbs for at, word in enumerate(words))
+        listed = any(at not in verbs and self._is_listed_object(words, at) for at in range(len(words)))
         if listed or any(self._handles(words, at) for at in range(len(words))):
             yield "objects"
-        if any(self._counts(words, at) for at in range(len(words))):
+        if self._repeats(words, found) or any(self._counts(words, at) for at in range(len(words))):
             yield "counts"
         if self._several(words):
             yield "several-people"
@@ -121,7 +132,29 @@ class Flagger:
         if text not in self._lists.ending:
             return True
         after = words[at + 1].text if at + 1 < len(words) else ""
-        return after == "to" or after.endswith("ing")
+        return after.endswith("ing") or (after == "to" and text not in ("stop", "stops"))  # "stops to wave"
+
+    def _is_listed_object(self, words: list[Word], at: int) -> bool:
+        """Return True for a noun of the list; a word for a part of the body, too, is one as the object of a verb that
+        the vocabulary has with objects: "opens the chest", not "close to the chest"."""
+        word, lists = words[at], self._lists
+        if word.base not in lists.objects:
+            return False
+        if word.text not in lists.parts:
+            return True
+        before = [each for each in words[max(at - _MAX_OBJECT, 0) : at] if not self._is_skipped(each)]
+        owned = at > 0 and words[at - 1].text in _OWNING
+        return not owned and bool(before) and before[-1].base in self._handling
+
+    def _repeats(self, words: list[Word], found: list[Match]) -> bool:
+        """Return True if an action is named a second time with "again": "jumps, then jumps again"."""
+        seen = set[str | None]()
+        for match in found:
+            actions = {each.action for each in match.meanings}
+            if seen & actions and [word.text for word in words[match.end : match.end + 1]] == ["again"]:
+                return True
+            seen |= actions - {None}
+        return False
 
     def _counts(self, words: list[Word], at: int) -> bool:
         text, lists = words[at].text, self._lists
@@ -139,9 +172,19 @@ class Flagger:
                 return False  # a number of a file ("Jump_2"), or an angle; "squats 10" and "jump x3" are counts
             if text.startswith("0") or len(text) > 2:
                 return False
+        elif text in _ORDINALS or text in _SETS:
+            behind = words[at + 1 + (text in _SETS) :][:1]
+            if text in _SETS and after.text != "of":
+                return False
+            return bool(behind) and (self._names_action(behind[0]) or behind[0].text == "time")
         elif text not in lists.counts:
             return False
         return after.base not in self._lists.uncounted and after.text.removesuffix("s") not in self._lists.uncounted
+
+    def _names_action(self, word: Word) -> bool:
+        """Return True for a noun of an action."""
+        node = self._lexicon.root.get(word.base)
+        return node is not None and any(each.noun for each in node.meanings)
 
     def _handles(self, words: list[Word], at: int) -> bool:
         """Return True if a verb, but one of travel, is followed by "a" and a noun that is in no list: "swings a
@@ -159,11 +202,38 @@ class Flagger:
         moves = rest[0].text in _INDEFINITE and verb.base not in self._handling  # "pushes a gurney" does, and handles
         if verb.base in _LIGHT or (moves and any(each.action in self._travels and not each.near for each in meanings)):
             return False
-        noun, after = [*(word.text for word in dropwhile(self._is_skipped, rest[1:])), "", ""][:2]
-        if len(noun) < 3 or not noun.isalpha() or self._is_english(noun) or self._is_english(_single(noun)):
+        phrase, after = self._noun_phrase(list(dropwhile(self._is_skipped, rest[1:])))
+        if not phrase or after == "of" or len(phrase) > _MAX_OBJECT:  # "a series of" names no object
             return False
-        lists = self._lists  # "a timid bow" and "a series of" name no object
-        return not after or (after != "of" and after in lists.breaks | lists.prepositions | lists.auxiliaries)
+        if any(word.text in self._lists.limbs or word.text in self._lists.body_parts for word in phrase):
+            return False  # "brings the feet underneath"
+        *modifiers, noun = phrase
+        if self._is_unlisted(noun.text):
+            return True
+        strange = any(self._is_unlisted(word.text) for word in modifiers)  # "the manhole cover", not "a timid bow"
+        return strange and verb.base in self._handling and self._may_be_object(noun)
+
+    def _noun_phrase(self, words: list[Word]) -> tuple[list[Word], str]:
+        """Return a noun with the words before it, and the word behind it."""
+        lists, phrase = self._lists, list[Word]()
+        for word in words:
+            ends = word.text in lists.breaks or word.text in lists.prepositions or word.text in lists.auxiliaries
+            if ends and not (word.text == "can" and phrase):  # "the trash can"
+                return phrase, word.text
+            if word.text.endswith("ly") or word.text in _PARTICLES:
+                return phrase, word.text
+            phrase.append(word)
+        return phrase, ""
+
+    def _is_unlisted(self, text: str) -> bool:
+        return len(text) > 2 and text.isalpha() and not self._is_english(text) and not self._is_english(_single(text))
+
+    def _may_be_object(self, noun: Word) -> bool:
+        """Return True for a listed noun that names no action, person or part of one, nor a place or time."""
+        lists = self._lists
+        if self._names_action(noun) or self._is_person(noun) or noun.text in lists.parts:
+            return False
+        return not noun.text.endswith(("ing", "ed")) and noun.text not in lists.sides | lists.units
 
     def _has_strange_subject(self, words: list[Word], found: list[Match]) -> bool:
         """Return True if a noun that is in no list, and has no ending of a doer, does the first action: "a mermaid
@@ -209,8 +279,7 @@ class Flagger:
         lists = self._lists
         if {word.text, word.base} & lists.body_parts or word.text in _SPEAKERS:
             return False
-        known = lists.people | lists.plural_people | lists.groups | lists.companions
-        return word.text in known or _single(word.text) in (lists.people | lists.companions) - _PRONOUNS
+        return word.text in self._persons or _single(word.text) in self._single_persons
 
     def _is_group(self, words: list[Word], at: int) -> bool:
         """Return True if a word such as "crowd" is no part of another: not "a couple of steps", "a crowd member"."""

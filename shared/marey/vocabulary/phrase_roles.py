@@ -17,6 +17,7 @@ _SIDED = {
     "foot": frozenset(["leg", "foot", "knee"]),
 }
 """Parts that do an action by its field `sided`."""
+_GOING_ON = frozenset(["carry", "go", "keep", "move"])
 _TRUNK = frozenset(["torso", "trunk"])
 _DEFINED = frozenset(["One", "Both", "A", "The"])
 _DEFINED_WORDS = 4
@@ -46,6 +47,7 @@ class PhraseRoles:
         self._travels = travels
         self._people = lists.people - lists.body_parts - _PRONOUNS - {"body", "someone", "somebody"}
         self._things = lists.objects | lists.not_people
+        self._lifeless = self._things - lists.people
         self._moved: dict[str, frozenset[str]] = {}
         self._named: dict[str, frozenset[str]] = {}
         for action in vocabulary.actions.values():
@@ -126,6 +128,7 @@ class PhraseRoles:
             self._is_part(words, match)
             or self._is_of_part(words, match)
             or self._performs_next(words, found, at)
+            or self._continues(words, match)
             or self._is_averted(words, match)
             or self._modifies_person(words, match)
             or self._says_how(words, found, at)
@@ -153,7 +156,7 @@ class PhraseRoles:
         if noun < 0:
             return False
         text = words[noun].text
-        if text not in lists.limbs and {text, words[noun].base}.isdisjoint(self._things - lists.people):
+        if text not in lists.limbs and {text, words[noun].base}.isdisjoint(self._lifeless):
             return False
         first = noun
         while first > 0 and (words[first - 1].text in lists.skipped or words[first - 1].text in ("and", *lists.limbs)):
@@ -188,6 +191,11 @@ class PhraseRoles:
         return len(between) <= _HEADS + 1 and not any(
             word.text in lists.breaks or word.text in lists.prepositions for word in between
         )
+
+    def _continues(self, words: list[Word], match: Match) -> bool:
+        """Return True for a verb that only goes on with the next one: "carries on running"."""
+        after = [word.text for word in words[match.start + 1 : match.start + 3]]
+        return words[match.start].base in _GOING_ON and after[:1] == ["on"] and after[-1].endswith("ing")
 
     def _is_averted(self, words: list[Word], match: Match) -> bool:
         """Return True for a noun that is done by another person: "ducks under a punch", "dodges the kick"."""

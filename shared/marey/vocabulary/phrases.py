@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from marey.vocabulary.inflection import noun_forms
@@ -78,6 +78,7 @@ class PhraseFinder:
         self._lexicon = lexicon
         self._lists = lists
         self._travels = travels
+        self._persons = lists.people | lists.plural_people
         self._adverbials: dict[str, list[tuple[str, ...]]] = {}
         for phrase in lists.adverbials:
             self._adverbials.setdefault(phrase[0], []).append(phrase)
@@ -98,12 +99,13 @@ class PhraseFinder:
     def find(self, words: list[Word]) -> list[Match]:
         """Return the phrases that name actions.
 
-        Verbs such as "go" count only where nothing else is named, and actions outside the vocabulary only where they
-        are done, not in "as if she were voting".
+        Actions outside the vocabulary count only where they are done, not in "as if she were voting".
         """
-        found = [match for match in self._matches(words) if not self._hypothetical(words, match)]
-        proper = [match for match in found if not self._is_manner(words, match)]
-        return proper or found
+        return [match for match in self._matches(words) if not self._hypothetical(words, match)]
+
+    def proper(self, words: list[Word], found: Sequence[Match]) -> list[Match]:
+        """Return the phrases without verbs such as "go", which count only where nothing else is named."""
+        return [match for match in found if not self._is_manner(words, match)] or list(found)
 
     def _is_manner(self, words: list[Word], match: Match) -> bool:
         """Return True for a verb that says how, alone or in a phrase that is only read as an action: "swings her
@@ -114,8 +116,7 @@ class PhraseFinder:
 
     def names_person(self, words: list[Word]) -> bool:
         """Return True if a person, or a part of one, is among the words."""
-        people = self._lists.people | self._lists.plural_people
-        return any(word.text in people or word.base in people for word in words)
+        return any(word.text in self._persons or word.base in self._persons for word in words)
 
     def may_be_things(self, words: list[Word], found: list[Match]) -> bool:
         """Return True if every phrase is a single noun ("a bow", "run of stairs"), and no person is named."""

@@ -15,6 +15,8 @@ from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.lexicon import Lexicon, Meaning, words_of
+from marey.vocabulary.movements import Movements
+from marey.vocabulary.negation import Negations, Span, denies
 from marey.vocabulary.phrase_roles import PhraseRoles
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
 from marey.vocabulary.word_lists import load_word_lists
@@ -35,6 +37,8 @@ MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
 _OFF_FEET = ("seat", "whole-body")
 """Supports from which the body rises by different actions."""
+_LEAST_SAID = 4
+"""Words beside a negation from which on something may be done as well."""
 _ORDER: dict[str, int] = {verdict: rank for rank, verdict in enumerate(get_args(Verdict))}
 
 
@@ -158,18 +162,25 @@ class ScopeMatcher:
             for verb, *objects in [words_of(phrase)]
             if objects and objects[0] in lists.objects
         )
+        self._movements = Movements(lists, vocabulary)
+        self._negations = Negations(lexicon, lists)
         self._flagger = Flagger(lexicon, lists, travels, handling)
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
         words = self._phrases.words(prompt)
-        found = self._roles.actions(words, self._phrases.find(words))
-        flags = list(self._flagger.details(words, found))
+        named = self._phrases.find(words)
+        denied = self._denied(words, named)
+        done = [match for match in named if not denies(denied, match.start)]
+        found = self._roles.actions(words, self._phrases.proper(words, done))
+        found = self._movements.read(words, found, denied)
+        said = sorted({*found, *(match for match in named if denies(denied, match.start))}, key=lambda each: each.start)
+        flags = list(self._flagger.details(words, said, negated=bool(denied)))
         if stated_length(prompt).is_partial:
             flags.append("length")
         foreign = self._flagger.foreign(words, found)
         if foreign is not None or not found:
-            left = "verb" if foreign is None and self._phrases.names_person(words) else None
+            left = "verb" if foreign is None and self._may_act(words, denied) else None
             return Scope((_nothing(prompt),), (*flags, foreign or "no-action"), left=left)
         if self._flagger.has_other_script(words):
             flags.append("other-language")
@@ -177,6 +188,24 @@ class ScopeMatcher:
         scope = Scope(named, tuple(flags))
         ambiguous = scope.verdict != "unknown" and self._phrases.may_be_things(words, found)
         return replace(scope, left="noun") if ambiguous else scope
+
+    def _may_act(self, words: list[Word], denied: Sequence[Span]) -> bool:
+        """Return True if a person is named, and more than what is not done: not "he never sits down"."""
+        said = [word for at, word in enumerate(words) if not denies(denied, at)]
+        return self._phrases.names_person(words) and (not denied or len(said) > _LEAST_SAID)
+
+    def _denied(self, words: list[Word], found: Sequence[Match]) -> list[Span]:
+        """Return the words of which no action is done; "does nothing" is one that is done. What ends as the prompt
+        begins ("stops running") is asked for only where nothing else is."""
+        denied = [
+            span
+            for span in self._negations.spans(words)
+            if not any(match.start < span[0] < match.end for match in found)
+        ]
+        ended = self._negations.ended(words)
+        if ended and any(not denies([*denied, *ended], match.start) for match in found):
+            denied += ended
+        return denied
 
     def read_as(self, prompt: str, action: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt in which the words name no action, read as this one."""

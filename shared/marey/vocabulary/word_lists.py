@@ -16,7 +16,8 @@ from marey.vocabulary.inflection import noun_forms
 class WordLists:
     """All lists; the file says what each is for. `skipped` may stand inside a phrase, `english` is all of them.
 
-    `limbs` maps both numbers of a part to the singular, `kinds` a noun to the one that stands for it in phrases.
+    `denying` are the negations that neither weaken nor end something. `limbs` maps both numbers of a part to the
+    singular, `kinds` a noun to the one that stands for it in phrases.
     """
 
     skipped: frozenset[str]
@@ -36,6 +37,13 @@ class WordLists:
     not_people: frozenset[str]
     objects: frozenset[str]
     negations: frozenset[str]
+    denying: frozenset[str]
+    weakening: frozenset[str]
+    not_denying: frozenset[tuple[str, ...]]
+    nearly: frozenset[str]
+    withheld: frozenset[str]
+    withheld_from: frozenset[str]
+    avoided: frozenset[str]
     ending: frozenset[str]
     counts: frozenset[str]
     uncounted: frozenset[str]
@@ -45,6 +53,7 @@ class WordLists:
     units: frozenset[str]
     light: frozenset[str]
     averting: frozenset[str]
+    loose: frozenset[str]
     of_things: frozenset[str]
     turning: frozenset[str]
     adverbials: tuple[tuple[str, ...], ...]
@@ -65,6 +74,7 @@ def load_word_lists() -> WordLists:
     sets["skipped"] = sets.pop("dropped") | sets.pop("adverbs") | sets["sides"]
     sets["people"] |= sets["body_parts"]
     sets["breaks"] |= frozenset(".,;:!?")
+    sets["denying"] = sets["negations"] - sets["weakening"] - sets["ending"]
     limbs = {form: word for word in sets.pop("limbs") for form in noun_forms(word)}
     del sets["other_verbs"]
     return WordLists(
@@ -73,6 +83,7 @@ def load_word_lists() -> WordLists:
         other_verbs=tuple(table["other_verbs"].split()),
         idioms=tuple(table["idioms"]),
         asides=tuple(table["asides"]),
+        not_denying=frozenset(tuple(phrase.split()) for phrase in table["not_denying"]),
         adverbials=tuple(tuple(phrase.split()) for phrase in table["adverbials"]),
         kinds={
             form: name for name, words in table["kinds"].items() for word in words.split() for form in noun_forms(word)

@@ -41,11 +41,11 @@ def test_known_prompts_are_counted_without_a_warning() -> None:
 
 
 def test_every_verdict_and_flag_has_its_sentence() -> None:
-    found = report_of("a person walks", "he kicks", "she sprints", "he does not run", "kicks twice").warnings()
+    found = report_of("a person walks", "he kicks", "she sprints", "he walks, not runs", "kicks twice").warnings()
     assert found == [
         "2 of 5 prompts, first number 2, 'he kicks' (kick): named actions are unreliable with this model",
         "1 of 5 prompts, first number 3, 'she sprints' (run): read as another action",
-        "1 of 5 prompts, first number 4, 'he does not run': what is not to be done may be done",
+        "1 of 5 prompts, first number 4, 'he walks, not runs': what is not to be done may be done",
         "1 of 5 prompts, first number 5, 'kicks twice': may be done another number of times",
     ]
 

@@ -53,9 +53,10 @@ def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
             prompt as one.
 
     Returns:
-        One step a sentence; None if a sentence negates, names no action, or names one that has no rule.
+        One step a sentence, none for a sentence that names only what is not done; None if a sentence names no action,
+        or one that has no rule.
     """
-    steps = [_step(sentence) for sentence in sentences]
+    steps = [step for step in map(_step, sentences) if step != ()]
     found = tuple(step for step in steps if step is not None)
     return found if found and len(found) == len(steps) else None
 
@@ -77,8 +78,8 @@ def wanted_by_meaning(scope: Mapping[str, Any] | None) -> tuple[Step, ...] | Non
 
 def _step(sentence: str) -> Step | None:
     scope = match_scope(sentence, _every())
-    if "negation" in scope.flags:
-        return None
+    if "negation" in scope.flags and "no-action" in scope.flags:
+        return ()
     named = [each.action for each in scope.actions if each.verdict == "known" and each.action in RULES]
     names = list(dict.fromkeys(name for name in named if name is not None))
     actions = load_vocabulary().actions
