@@ -85,6 +85,7 @@ def fetch_job(
     Raises:
         Conflict: a file exists with other content, or a format can neither be fetched nor made; nothing is fetched
             then, unless the file is one that was to be made.
+        MissingExtra: an extra that writes a format which is made here is not installed; nothing is fetched then.
         InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
     """
     observer = observer or FetchObserver()
@@ -95,6 +96,8 @@ def fetch_job(
     reviews = review if isinstance(review, str) or not review else [*review]
     pages = transport.pages(f"/v1/jobs/{job}/items", review=reviews or None, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
+    for recipe in dict.fromkeys(file.making for _, files in planned for file in files if file.making is not None):
+        recipe.check()
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
     make_folders(folder, (file.path for _, files in planned for file in files))

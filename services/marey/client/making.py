@@ -3,7 +3,7 @@ server where they need a rig of its."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from marey.client.rigs import Rigs
 from marey.core.errors import Conflict, InvalidInput, NotFound
@@ -76,6 +76,24 @@ def check_body(export: ExportOptions) -> None:
         except ImportError as error:
             raise needs_extra("motion", error) from error
         load_shape(export.body, export.rig_map)
+
+
+def check_formats(formats: Sequence[str] | None, export: ExportOptions) -> None:
+    """Validate, before a job is submitted, that this process can make the files that the server will not have.
+
+    Args:
+        formats: of the files that are to be fetched; None = those that the server has.
+        export: options of the files.
+
+    Raises:
+        MissingExtra: an extra that writes a format is not installed.
+        InvalidInput: a format needs an option that is not given.
+    """
+    stored = {name for name, exporter in exporters().items() if exporter.stored}
+    for name in formats or ():
+        recipe = None if asked_of(name, stored, export) is not None else making_of(name, stored, export)
+        if recipe is not None:
+            recipe.check()
 
 
 def check_rig(rigs: Rigs, export: ExportOptions) -> None:

@@ -8,6 +8,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 from marey.exporters.registry import (
     GROUP,
     check_options,
+    check_writers,
     exporter_for,
     exporter_named,
     exporter_of,
@@ -21,6 +22,7 @@ __all__ = [
     "Coordinates",
     "Exporter",
     "check_options",
+    "check_writers",
     "exporter_for",
     "exporter_named",
     "exporter_of",

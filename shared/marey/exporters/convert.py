@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.core.errors import Conflict, InvalidInput
 from marey.exporters.exporter import Coordinates, Exporter
-from marey.exporters.registry import check_options, exporter_for
+from marey.exporters.registry import check_writers, exporter_for
 from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions, RestPose
 from marey.motion.files import read_limited, write_atomically
@@ -44,6 +44,7 @@ def convert(
         Notes on oddities of a BVH source.
 
     Raises:
+        MissingExtra: an extra that writes the format of the result is not installed.
         InvalidInput: a format that is unknown or write-only, a rate out of bounds, an option that the format of the
             result does not have, or a skeleton without that rest pose.
         Conflict: the target exists.
@@ -51,7 +52,7 @@ def convert(
     """
     source, target = Path(source), Path(target)
     reader, writer = exporter_for(source), exporter_for(target)
-    check_options([writer], export)
+    check_writers([writer], export)
     if target.exists() and not overwrite:
         raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
     clip = _decode(reader, source, Coordinates(source_unit, source_up, rest_pose=source_rest_pose))

@@ -61,6 +61,8 @@ class Exporter(Generic[Decoded]):
             for the option `rig`. `root_bone`, `in_place`, `tpose_frame` and `placement` are in the motion already.
         decode: read the bytes of a file; the second argument names it in errors. None for a format that is only
             written. Raises `InvalidFile` if the file is broken or of another format.
+        check: raise `InvalidInput` if this process cannot write any file with these options, because an extra is not
+            installed or the format needs an option; it is called before motions are made or fetched.
     """
 
     format: str
@@ -72,6 +74,7 @@ class Exporter(Generic[Decoded]):
     options: frozenset[str] = frozenset()
     stored: bool = True
     encode_rigged: Callable[[RiggedMotion, Coordinates], bytes] | None = None
+    check: Callable[[ExportOptions], None] | None = None
 
     def __post_init__(self) -> None:
         """Check the names.

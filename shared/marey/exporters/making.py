@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
@@ -85,6 +86,23 @@ class FileRecipe:
             parts += [self.rig.sha256, self.rig.format, self.rig.map]
         text = json.dumps(parts, separators=(",", ":"), allow_nan=False, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    def check(self) -> None:
+        """Validate that this process can make the file, before its npz is made or fetched.
+
+        Raises:
+            MissingExtra: an extra that writes the format is not installed.
+            InvalidInput: the format needs an option that is not given.
+            NotFound, InvalidFile, TooLarge: the file of a rig that the format needs cannot be read.
+            PluginError: the format is not installed.
+        """
+        exporter = exporter_of(self.format)
+        try:
+            import_module("numpy")
+            if exporter.check is not None:
+                exporter.check(self.export)
+        except ImportError as error:
+            raise needs_extra("motion", error) from error
 
     def make(self, npz: bytes, where: str, rig: bytes = b"") -> bytes:
         """Return the content of the file; equal arguments give equal bytes.

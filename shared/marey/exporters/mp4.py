@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from marey.exporters.exporter import Coordinates, Exporter
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.export_options import ExportOptions
 
 
 def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     """Draw a clip.
 
     Raises:
-        InvalidInput: the extra `video` is not installed.
+        MissingExtra: PyAV is not installed.
     """
-    from marey.core.extras import needs_extra
     from marey.viz.video import mp4_bytes
 
+    check(coordinates)
+    return mp4_bytes(clip)
+
+
+def check(options: ExportOptions) -> None:
+    """Validate that PyAV is installed.
+
+    Raises:
+        MissingExtra: it is not.
+    """
+    from marey.core.extras import needs_extra
+
     try:
-        return mp4_bytes(clip)
+        import_module("av")
     except ImportError as error:
         raise needs_extra("video", error) from error
 
@@ -32,4 +45,5 @@ EXPORTER: Exporter[MotionClip] = Exporter(
     holds_prompt=False,
     encode=encode,
     stored=False,
+    check=check,
 )

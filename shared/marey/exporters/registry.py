@@ -119,3 +119,18 @@ def check_options(writers: Iterable[Exporter[Any]], options: ExportOptions) -> N
                 hint=f"Formats that have {name}: {', '.join(having)}.",
                 argument=name,
             )
+
+
+def check_writers(writers: Iterable[Exporter[Any]], options: ExportOptions) -> None:
+    """Validate, before motions are made, that this process can write them in these formats with these options.
+
+    Raises:
+        MissingExtra: an extra that writes a format is not installed.
+        InvalidInput: as `check_options`, or a format needs an option that is not given.
+        NotFound, InvalidFile, TooLarge: the file of a rig that a format needs cannot be read.
+    """
+    writers = list(writers)
+    check_options(writers, options)
+    for writer in writers:
+        if writer.check is not None:
+            writer.check(options)

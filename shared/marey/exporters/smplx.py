@@ -9,6 +9,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.export_options import ExportOptions
     from marey.motion.rigs.rigged import RiggedMotion
 
 
@@ -18,9 +19,28 @@ def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
     Raises:
         InvalidInput: always.
     """
-    raise InvalidInput(
+    raise _needs_model(clip.skeleton.name)
+
+
+def check(options: ExportOptions) -> None:
+    """Validate that the rig is an SMPL-X model.
+
+    Raises:
+        InvalidInput: there is no rig, or another one.
+        NotFound, InvalidFile, TooLarge: its file cannot be read.
+    """
+    if options.rig is None:
+        raise _needs_model("smplx")
+    from marey.motion.io.smplx_write import check_rig
+    from marey.motion.retarget import load_body
+
+    check_rig(load_body(options.rig, options.rig_map).rig)
+
+
+def _needs_model(where: str) -> InvalidInput:
+    return InvalidInput(
         "smplx files need the rest joints of the SMPL-X model, which Marey may not ship",
-        where=clip.skeleton.name,
+        where=where,
         hint="Get SMPLX_NEUTRAL.npz at https://smpl-x.is.tue.mpg.de, and name it as the rig: --rig SMPLX_NEUTRAL.npz.",
         argument="rig",
     )
@@ -46,4 +66,5 @@ EXPORTER: Exporter[MotionClip] = Exporter(
     options=frozenset({"in_place", "tpose_frame", "placement", "rig"}),
     encode_rigged=encode_rigged,
     stored=False,
+    check=check,
 )

@@ -9,6 +9,7 @@ from marey.exporters.prepare import with_body
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
+    from marey.motion.export_options import ExportOptions
     from marey.motion.rigs.rigged import RiggedMotion
 
 
@@ -35,6 +36,17 @@ def encode_rigged(motion: RiggedMotion, coordinates: Coordinates) -> bytes:
     return format_rigged_usd(motion)
 
 
+def check(options: ExportOptions) -> None:
+    """Validate that `usd-core` is installed.
+
+    Raises:
+        MissingExtra: it is not.
+    """
+    from marey.motion.io.usd_write import load_pxr
+
+    load_pxr()
+
+
 EXPORTER: Exporter[MotionClip] = Exporter(
     format="usd",
     media_type="model/vnd.usd",
@@ -46,4 +58,5 @@ EXPORTER: Exporter[MotionClip] = Exporter(
     ),
     encode_rigged=encode_rigged,
     stored=False,
+    check=check,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import itertools
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -199,3 +200,13 @@ def test_a_fetch_of_more_that_breaks_off_keeps_the_lines_of_what_was_there(
     assert len(rows) == 20
     assert {row["bvh"] for row in rows.values()} == {f"{name}.bvh" for name in rows}
     assert {bool(row["npz"]) for row in rows.values()} == {True, False}
+
+
+@pytest.mark.parametrize(("format", "hint"), [("usd", "pip install 'marey[usd]'"), ("smplx", "SMPLX_NEUTRAL.npz")])
+def test_formats_that_cannot_be_made_here_are_refused_before_anything_is_fetched(
+    marey: Command, job: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format: str, hint: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    ran = marey("fetch", job, "-o", tmp_path / "out", "--format", "npz", "--format", format)
+    assert (ran.code, hint in ran.err) == (2, True)
+    assert not (tmp_path / "out").exists()

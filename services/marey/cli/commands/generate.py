@@ -291,10 +291,12 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
     """Return the exporters of the formats, each once; by default all installed ones that are stored.
 
     Raises:
-        InvalidInput: there is none for a format, none of them has an option of the export, or an unknown rig.
+        MissingExtra: an extra that writes a format is not installed.
+        InvalidInput: there is none for a format, none of them has an option of the export, a format needs one that is
+            not given, or an unknown rig.
         NotFound, InvalidFile, TooLarge: the rig cannot be read.
     """
-    from marey.exporters import check_options, exporters
+    from marey.exporters import check_writers, exporters
 
     known = exporters()
     for name in formats or ():
@@ -304,7 +306,7 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
             )
     stored = [name for name, exporter in known.items() if exporter.stored]
     kinds = [known[name] for name in dict.fromkeys(formats or stored)]
-    check_options(kinds, export)
+    check_writers(kinds, export)
     if export.rig is not None:
         from marey.motion.retarget import load_body
 

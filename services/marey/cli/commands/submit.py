@@ -78,11 +78,11 @@ def submit(
     from marey.client.making import check_rig
 
     check_template(name_template)
+    export = _export_of(fetch, formats, body)
     if fetch is not None:
         from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
-    export = _export_of(fetch, body)
     defaults = row_defaults(
         sampling,
         model=model,
@@ -127,14 +127,15 @@ def submit(
                 _follow(client, job.id, fetch, formats, name_template, timeout, as_json, export)
 
 
-def _export_of(folder: Path | None, body: str | None) -> ExportOptions:
-    """Return the options of the files that `--fetch` writes; the file of a body is read before anything is enqueued.
+def _export_of(folder: Path | None, formats: list[str] | None, body: str | None) -> ExportOptions:
+    """Return the options of the files that `--fetch` writes; the file of a body is read, and formats that are made here
+    are checked, before anything is enqueued.
 
     Raises:
-        InvalidInput: a body without `--fetch`, or a file that is none.
+        InvalidInput: a body without `--fetch`, a file that is none, or a format that cannot be made here.
         NotFound, InvalidFile: of the file.
     """
-    from marey.client.making import check_body
+    from marey.client.making import check_body, check_formats
 
     if body is not None and folder is None:
         raise InvalidInput(
@@ -144,6 +145,8 @@ def _export_of(folder: Path | None, body: str | None) -> ExportOptions:
         )
     export = ExportOptions(body=body)
     check_body(export)
+    if folder is not None:
+        check_formats(formats, export)
     return export
 
 

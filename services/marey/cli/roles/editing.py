@@ -47,7 +47,7 @@ def edit_files(
     """
     try:
         from marey.editing.judge import judged
-        from marey.exporters import Coordinates, check_options
+        from marey.exporters import Coordinates, check_writers
         from marey.motion.edits.editing import edit
         from marey.motion.files import write_atomically
     except ImportError as error:
@@ -55,7 +55,7 @@ def edit_files(
     writer, is_file = _writer(output, file_format)
     if is_file and len(sources) > 1:
         raise InvalidInput(f"is one file for {len(sources)} motions", where=str(output), hint="Name a folder with -o.")
-    check_options([writer], export)
+    check_writers([writer], export)
     made: list[tuple[Path, Path, MotionClip]] = []
     for source in sources:
         try:

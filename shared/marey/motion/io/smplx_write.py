@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.io.rig_smplx import JOINTS, SOURCE
+from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
 from marey.motion.rotations import conjugate, multiply, rotate, to_rotvec
 from marey.motion.units import Z_TO_Y
@@ -33,13 +34,7 @@ def format_smplx(motion: RiggedMotion) -> bytes:
         InvalidInput: on another rig, or numbers that are not finite.
     """
     rig = motion.rig
-    if rig.source != SOURCE:
-        raise InvalidInput(
-            "smplx files need the rest joints of the SMPL-X model",
-            where=rig.name,
-            hint="Name the model's file, such as SMPLX_NEUTRAL.npz, as the rig.",
-            argument="rig",
-        )
+    check_rig(rig)
     order = [rig.index(name) for name in JOINTS]
     rotations, up = motion.rotations[:, order].copy(), conjugate(Z_TO_Y)
     rotations[:, 0] = multiply(up, rotations[:, 0])
@@ -51,6 +46,21 @@ def format_smplx(motion: RiggedMotion) -> bytes:
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **_arrays(poses, trans, motion.fps))
     return buffer.getvalue()
+
+
+def check_rig(rig: Rig) -> None:
+    """Validate that a rig is an SMPL-X model.
+
+    Raises:
+        InvalidInput: it is not.
+    """
+    if rig.source != SOURCE:
+        raise InvalidInput(
+            "smplx files need the rest joints of the SMPL-X model",
+            where=rig.name,
+            hint="Name the model's file, such as SMPLX_NEUTRAL.npz, as the rig.",
+            argument="rig",
+        )
 
 
 def _arrays(poses: NDArray[Any], trans: NDArray[Any], fps: float) -> dict[str, NDArray[Any]]:

@@ -36,7 +36,7 @@ def format_usd(
         InvalidInput: `usd-core` is not installed, bones change their length, or numbers are not finite.
     """
     posed = arrange(clip, options)
-    poses, pxr = poses_of(posed, unit, up), _pxr()
+    poses, pxr = poses_of(posed, unit, up), load_pxr()
     stage = _stage(pxr, poses)
     if mesh is not None:
         _add_mesh(pxr, stage, poses, mesh, len(posed.skeleton) - len(clip.skeleton), unit, up)
@@ -45,7 +45,7 @@ def format_usd(
 
 def format_rigged_usd(motion: RiggedMotion) -> bytes:
     """Return the bytes of a USD file of a motion on a rig, in centimetres, Y up. See `format_usd`."""
-    return _text(_stage(_pxr(), rigged_poses(motion, "usd")))
+    return _text(_stage(load_pxr(), rigged_poses(motion, "usd")))
 
 
 def _text(stage: Any) -> bytes:
@@ -71,11 +71,11 @@ def joint_paths(names: tuple[str, ...], parents: tuple[int, ...], legal: Any) ->
     return paths
 
 
-def _pxr() -> Any:
+def load_pxr() -> Any:
     """Return the modules of `usd-core`.
 
     Raises:
-        InvalidInput: it is not installed.
+        MissingExtra: it is not installed.
     """
     try:
         return SimpleNamespace(**{name: importlib.import_module(f"pxr.{name}") for name in MODULES})
