@@ -36,6 +36,8 @@ from marey.core.errors import MareyError
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
+VALUE_ERROR = "Value error, "
+"""How pydantic, which reads the options, begins a message that it did not write."""
 
 HELP = """Text in, 3D human motion out.
 
@@ -56,6 +58,9 @@ class Commands(TyperGroup):
         """Run the chosen command."""
         try:
             return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = error.message.removeprefix(VALUE_ERROR)
+            raise
         except MareyError as error:
             if isinstance(ctx.obj, tracing.Span):
                 ctx.obj.fail(error)

@@ -103,6 +103,24 @@ def test_errors_that_quote_an_argument_escape_it(arguments: list[str]) -> None:
     assert find_forbidden(done.output, LINES) is None
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["fetch", "j", "--review", "bogus"], "'--review': 'bogus' is not one of 'kept', 'rejected', 'rerolled'."),
+        (
+            ["review", "j", "--review", "bogus"],
+            "'--review': 'bogus' is not one of 'new', 'kept', 'rejected', 'rerolled'.",
+        ),
+        (["motions", "list", "--review", "bogus"], "'--review': 'bogus' is not one of 'new', 'kept', "),
+        (["generate", "x", "--scope", "bogus"], "'--scope': 'bogus' is not one of 'warn', 'refuse', 'ignore'."),
+    ],
+)
+def test_a_value_that_an_option_does_not_have_is_named_with_those_it_has(arguments: list[str], said: str) -> None:
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    assert f"Error: Invalid value for {said}" in done.output
+
+
 def test_the_traceback_of_a_bug_is_escaped() -> None:
     code = (
         "import sys; from marey.cli import main; main.app.command('bug')(lambda: 1 / len('') if 0 else "
