@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -11,6 +11,7 @@ import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
@@ -35,6 +36,8 @@ RETRY_AFTER = "2"
 LONGEST_VALUE = 80
 OF_THE_REQUEST = ("body", "prompts")
 """Prefixes of locations that a caller knows: they are part of the request."""
+UNKNOWN_FIELD = "extra_forbidden"
+"""Type of pydantic's error for a field that a model does not have."""
 SUBJECT = re.compile(r"^\w+ should")
 
 log = structlog.get_logger(__name__)
@@ -147,8 +150,8 @@ def install(app: FastAPI) -> None:
         return problem_response(error)
 
     @app.exception_handler(RequestValidationError)
-    def _invalid(_: Request, error: RequestValidationError) -> JSONResponse:
-        return _validation(error)
+    def _invalid(request: Request, error: RequestValidationError) -> JSONResponse:
+        return _validation(request, error)
 
     @app.exception_handler(HTTPException)
     def _http(request: Request, error: HTTPException) -> JSONResponse:
@@ -160,8 +163,9 @@ def install(app: FastAPI) -> None:
         return problem_response(MareyError("internal"))
 
 
-def _validation(error: RequestValidationError) -> JSONResponse:
-    problems = [_field_problem(e) for e in error.errors()]
+def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
+    body_model = _body_model(request)
+    problems = [_field_problem(e, body_model) for e in error.errors()]
     names = ", ".join(dict.fromkeys(p.field or "body" for p in problems))
     many = len(problems) > 1  # for a single one, `where` names the field
     body = ProblemBody(
@@ -193,13 +197,34 @@ def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     )
 
 
-def _field_problem(error: Mapping[str, Any]) -> FieldProblem:
+def _body_model(request: Request) -> Any:
+    """Return the model of the route's body; None if it has no body, or parses it itself."""
+    route = request.scope.get("route")
+    body = route.body_field if isinstance(route, APIRoute) else None
+    return None if body is None else body.field_info.annotation
+
+
+def unknown_field(body_model: Any, path: Sequence[object]) -> str:
+    """Return the message for a field that a body may not have, with those that it may have.
+
+    Args:
+        body_model: type of the body; fields of other types than models are not listed.
+        path: of the field in the body; those beside a nested one are not listed.
+    """
+    is_model = isinstance(body_model, type) and issubclass(body_model, BaseModel)
+    known = ", ".join(body_model.model_fields) if is_model and len(path) == 1 else ""
+    return "is not a known field" + (f"; known: {known}" if known else "")
+
+
+def _field_problem(error: Mapping[str, Any], body_model: Any) -> FieldProblem:
     """Convert one of pydantic's errors. `("query", "limit")` becomes `limit`: the prefix means nothing to a client."""
     place, *path = error["loc"]
     if error["type"] == "json_invalid":  # its path is a position
         return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
     field = ".".join(str(part) for part in path) or str(place)
-    return FieldProblem(field=_clean(field), message=_clean(_sentence(error)) or "")
+    unknown = error["type"] == UNKNOWN_FIELD
+    message = unknown_field(body_model, path) if unknown else _sentence(error)
+    return FieldProblem(field=_clean(field), message=_clean(message) or "")
 
 
 def _sentence(error: Mapping[str, Any]) -> str:

@@ -68,7 +68,7 @@ def test_streams_are_listed_newest_first_and_open_ones_alone_when_asked(http: ht
         ({"seconds": 601}, "seconds", "less than or equal to 600"),
         ({"model": "hgm3"}, "model", "cannot make motion frame by frame"),
         ({"model": "nobody"}, "model", "no model or bundle"),
-        ({"colour": "red"}, "colour", "Extra inputs"),
+        ({"colour": "red"}, "colour", "is not a known field; known: prompt, name, model, seed, seconds"),
     ],
 )
 def test_what_cannot_be_streamed_is_told(

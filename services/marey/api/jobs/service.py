@@ -13,10 +13,11 @@ from pydantic import BaseModel, ValidationError
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
 from marey.api.jobs.poses import NamedPoses, Poses, check_terms, posed
-from marey.api.jobs.schemas import JobFields
+from marey.api.jobs.schemas import JobFields, NewJobBody
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
+from marey.http.problems import UNKNOWN_FIELD, unknown_field
 from marey.items.item import Item, read_item, read_items, read_json
 from marey.items.problems import InvalidItems, Problem
 from marey.items.timeline import prompts_with_rows
@@ -149,7 +150,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
     fields = document.fields()
     if not document.has_list or next(document.elements(), None) is None:
         raise InvalidInput("is missing, empty or not a list", where="items", hint=hint)
-    return _checked(job_fields(fields), document.elements, catalogue)
+    return _checked(job_fields(fields, NewJobBody), document.elements, catalogue)
 
 
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
@@ -229,17 +230,26 @@ def _problem(error: MareyError, line: int | None, field: str) -> Problem:
     return Problem(line, place, error.on_a_line)
 
 
-def job_fields(values: Mapping[str, Any]) -> JobFields:
+def job_fields(values: Mapping[str, Any], whole: type[BaseModel] = JobFields) -> JobFields:
     """Validate the fields of the job as a whole.
+
+    Args:
+        values: by name.
+        whole: model of the whole body, whose fields the problem of an unknown one lists.
 
     Raises:
         InvalidItems: with the problems of each field.
     """
-    return read_fields(JobFields, values)
+    return read_fields(JobFields, values, whole)
 
 
-def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
+def read_fields(model: type[Fields], values: Mapping[str, Any], whole: type[BaseModel] | None = None) -> Fields:
     """Validate fields of a body that the route parses itself.
+
+    Args:
+        model: of these fields.
+        values: by name.
+        whole: model of the whole body, whose fields the problem of an unknown one lists; None = `model`.
 
     Raises:
         InvalidItems: with the problems of each field.
@@ -247,8 +257,13 @@ def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        problems = [Problem(None, ".".join(map(str, e["loc"])) or "body", e["msg"]) for e in error.errors()]
+        problems = [_field_problem(e, whole or model) for e in error.errors()]
         raise InvalidItems(problems) from error
+
+
+def _field_problem(error: Mapping[str, Any], model: type[BaseModel]) -> Problem:
+    message = unknown_field(model, error["loc"]) if error["type"] == UNKNOWN_FIELD else error["msg"]
+    return Problem(None, ".".join(map(str, error["loc"])) or "body", message)
 
 
 def request_sha256(query: str, body: BinaryIO) -> str:

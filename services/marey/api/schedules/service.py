@@ -11,7 +11,7 @@ from marey.api.context import Context
 from marey.api.evaluations.schemas import AskedFields
 from marey.api.evaluations.service import parse_evaluation, prompts_document, stored
 from marey.api.jobs.service import read_fields
-from marey.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
+from marey.api.schedules.schemas import NewScheduleBody, ScheduleFields, SchedulePatch, ScheduleView
 from marey.core.errors import InvalidInput
 
 HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
@@ -53,7 +53,7 @@ def change(shared: Context, key: tenants.ApiKey, schedule: UUID, body: BinaryIO)
     request = values.pop("request", None)
     if request is not None and not isinstance(request, dict):
         raise InvalidInput("is not an object", where="request", hint=HINT)
-    fields = read_fields(ScheduleFields, values)
+    fields = read_fields(ScheduleFields, values, SchedulePatch)
     asked = None if request is None else parse_evaluation(AskedFields, request, document)[1]
     plan = None if asked is None else asked.planned(shared.config)
     with db.transaction(shared.engine) as conn:
