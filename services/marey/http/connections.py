@@ -1,4 +1,4 @@
-"""HTTP connections with a time limit for the head of a request."""
+"""HTTP connections with a time limit for the head of a request, and with problems as answers to what is no request."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import asyncio
 from typing import Any
 
 import h11
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import STATUS_PHRASES, H11Protocol
 
-from marey.core.errors import TooSlow
+from marey.core.errors import MalformedRequest, MareyError, TooSlow
 from marey.core.settings import Settings
 from marey.http.problems import problem_response
 
 
 class PatientProtocol(H11Protocol):
     """uvicorn's HTTP/1.1 with a time limit for the head of a request: uvicorn closes only connections that idle after
-    an answer. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to begin one."""
+    an answer. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to begin one.
+
+    Requests that the parser refuses get a problem, as all others do."""
 
     head_timer: asyncio.TimerHandle | None = None
 
@@ -50,17 +52,20 @@ class PatientProtocol(H11Protocol):
         if self.transport.is_closing() or self.conn.their_state is not h11.IDLE:
             return
         if self.conn.trailing_data[0]:  # no answer without a request: browsers connect ahead
-            self._say_late()
+            late = f"the head of the request did not come within {self.timeout_keep_alive:g} s"
+            self._answer(TooSlow(late, hint="Send it again."))
         self.transport.close()
 
-    def _say_late(self) -> None:
-        error = TooSlow(
-            f"the head of the request did not come within {self.timeout_keep_alive:g} s", hint="Send it again."
-        )
+    def send_400_response(self, msg: str) -> None:
+        """Answer a request that the parser refuses; `msg` is uvicorn's."""
+        self._answer(MalformedRequest("the request is not valid HTTP/1.1", hint="Look at its first line and headers."))
+        self.transport.close()
+
+    def _answer(self, error: MareyError) -> None:
         answer = problem_response(error)
         headers = [*answer.raw_headers, (b"connection", b"close")]
         for event in (
-            h11.Response(status_code=answer.status_code, headers=headers, reason=b"Request Timeout"),
+            h11.Response(status_code=answer.status_code, headers=headers, reason=STATUS_PHRASES[answer.status_code]),
             h11.Data(data=bytes(answer.body)),
             h11.EndOfMessage(),
         ):

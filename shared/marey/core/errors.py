@@ -57,6 +57,13 @@ class TooLarge(InvalidInput):
     problem_type = "too-large"
 
 
+class MalformedRequest(InvalidInput):
+    """The bytes that came are no HTTP request."""
+
+    status = 400
+    problem_type = "malformed-request"
+
+
 class UpgradeMissing(InvalidInput):
     """A WebSocket handshake that arrived as an ordinary request: a proxy did not forward `Upgrade`."""
 
