@@ -7,6 +7,7 @@ earlier.
 
 from __future__ import annotations
 
+import re
 import socket
 from collections.abc import Sequence
 
@@ -16,6 +17,10 @@ from marey.core.addresses import Allowed, parse_address
 from marey.core.errors import InvalidInput, Refused
 
 MAX_URL = 2000  # characters
+MAX_HOST = 253
+"""Characters of the name of a host (RFC 1035)."""
+LABEL = re.compile(r"[a-z0-9]([a-z0-9_-]{0,61}[a-z0-9])?")
+"""One part of the name of a host (RFC 1123); within it also the underscores of names in private networks."""
 HINT = "Allow it with MAREY_WEBHOOK_ALLOW."
 
 
@@ -59,9 +64,26 @@ def check_url(text: str, allowed: Allowed) -> str:
             choose_address([literal], url.scheme, allowed)
         except Refused as error:
             raise _wrong(error.message, hint=error.hint) from error
-    elif url.scheme == "http" and not allowed.networks:
-        raise _wrong("is not https", hint=HINT)
+    else:
+        _check_name(url.raw_host.decode("ascii"))
+        if url.scheme == "http" and not allowed.networks:
+            raise _wrong("is not https", hint=HINT)
     return str(url)
+
+
+def _check_name(host: str) -> None:
+    """Validate the syntax of a host name; whether it resolves is found out at each delivery.
+
+    Raises:
+        InvalidInput: no host can have this name.
+    """
+    name = host.removesuffix(".")
+    labels = name.split(".")
+    if len(name) > MAX_HOST or not all(LABEL.fullmatch(label) for label in labels):
+        hint = "The parts between its dots are letters, digits and hyphens, 1 to 63, all together at most 253."
+        raise _wrong(f"{host[:80]!r} cannot be the name of a host", hint=hint)
+    if labels[-1].isdigit():  # the root has no such domain, and browsers read it as an address
+        raise _wrong(f"{host[:80]!r} ends in a number, but is no IPv4 address", hint="Write it as 203.0.113.7.")
 
 
 def _literal(host: str) -> str | None:

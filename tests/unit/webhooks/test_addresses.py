@@ -79,6 +79,39 @@ def test_what_is_no_address_of_a_receiver_is_refused_at_the_door(url: str) -> No
     assert refused.value.where == "url"
 
 
+@pytest.mark.parametrize(
+    "host",
+    [
+        *("a..example", ".example", "a.example..", "-a.example", "a-.example", "_a.example", "a_.example", "a.b_"),
+        *(
+            "a,b.example",
+            "ex~ample.com",
+            "*.example",
+            "x" * 64 + ".example",
+            "a." * 127 + "a",
+            "render.123",
+            "1.2.3.4.5",
+        ),
+    ],
+)
+def test_a_host_that_cannot_exist_is_refused(host: str) -> None:
+    for url in (f"https://{host}/hook", f"https://{host}:8443/hook"):
+        with pytest.raises(InvalidInput, match=r"cannot be the name of a host|ends in a number") as refused:
+            check_url(url, DEFAULT)
+        assert (refused.value.where, bool(refused.value.hint)) == ("url", True)
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        *("farm", "render.example.", "my--site.example", "ab--cd.example", "render_farm.example", "7.example", "1a"),
+        *("xn--bcher-kva.example", "x" * 63 + ".example", ".".join(["a" * 49] * 5)),
+    ],
+)
+def test_a_host_that_may_be_made_later_is_kept(host: str) -> None:
+    assert check_url(f"https://{host}/hook", DEFAULT) == f"https://{host}/hook"
+
+
 def test_a_url_is_kept_in_its_normal_form() -> None:
     assert check_url("HTTPS://Studio.Example/a?b=ü", DEFAULT) == "https://studio.example/a?b=%C3%BC"
     assert check_url("http://render.local/hook", STUDIO) == "http://render.local/hook"
