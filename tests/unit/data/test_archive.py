@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import tarfile
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,14 @@ def test_a_path_that_climbs_out_of_the_archive_is_only_a_name_and_writes_nothing
 def test_links_are_passed_over(tmp_path):
     path = tar(tmp_path / "a.tar.xz", {"a.bvh": b"x"}, links={"b.bvh": "/etc/passwd"})
     assert [name for name, _ in bvh_files(path)] == ["a"]
+
+
+def test_members_without_motion_are_counted_by_kind(tmp_path):
+    others = {"deep/a.TXT": b"1", "deep/b.txt": b"2", "README": b"3", "a.c3d": b"4"}
+    path = tar(tmp_path / "a.tar.xz", {"deep/a.bvh": b"x", **others}, links={"b.bvh": "/etc/passwd"})
+    passed_over = Counter({".txt": 1})
+    assert [name for name, _ in bvh_files(path, passed_over)] == ["a"]
+    assert passed_over == {".txt": 3, "without an ending": 1, ".c3d": 1, "links and devices": 1}
 
 
 def test_a_folder_is_read_as_an_archive_is(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -182,3 +184,17 @@ def test_a_level_floor_and_a_slope_that_is_walked_on_are_left_as_they_are() -> N
     uphill = walk.copy()
     uphill[..., 1] += 0.1 * walk[..., 2]
     assert levelled(uphill) is uphill
+
+
+def test_members_of_an_archive_that_are_no_bvh_are_counted(folder: Path) -> None:
+    for name in ("a.c3d", "b.c3d", "notes.txt"):
+        (folder / "takes" / name).write_bytes(b"x")
+    with tarfile.open(folder / "takes.tar.xz", "w:xz") as out:
+        out.add(folder / "takes")
+    notes: list[str] = []
+    own = CaptureSet.own(folder)
+    pack_set(own, processes=1, note=notes.append)
+    assert notes == []  # a folder holds its own description too
+    pack_set(replace(own, path=folder / "takes.tar.xz"), processes=1, note=notes.append)
+    (said,) = notes
+    assert said.endswith("3 members that are not BVH files were passed over (2 .c3d, 1 .txt).")

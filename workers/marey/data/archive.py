@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import lzma
 import tarfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
@@ -12,12 +13,18 @@ from marey.core.errors import InvalidFile, NotFound, TooLarge
 MAX_FILE_BYTES = 64 * 2**20  # the largest file of the two archives has 11 MB
 MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB; stops decompression bombs
 MAX_FILES = 100_000
+BVH, NO_ENDING, SPECIAL = ".bvh", "without an ending", "links and devices"
+"""Kinds of members; files of other endings have theirs."""
 
 
-def bvh_files(path: Path) -> Iterator[tuple[str, bytes]]:
+def bvh_files(path: Path, passed_over: Counter[str] | None = None) -> Iterator[tuple[str, bytes]]:
     """Yield the BVH files of an archive or folder: stem of the name, and content.
 
-    Links, devices and other file types are skipped; only the last part of a path is used.
+    Links, devices and other file types are passed over; only the last part of a path is used.
+
+    Args:
+        path: the archive or folder.
+        passed_over: is increased by the number of members of an archive that are passed over, by kind, such as `.txt`.
 
     Raises:
         NotFound: the path does not exist.
@@ -27,7 +34,7 @@ def bvh_files(path: Path) -> Iterator[tuple[str, bytes]]:
     if path.is_dir():
         members = _folder(path)
     elif path.is_file():
-        members = _archive(path)
+        members = _archive(path, Counter() if passed_over is None else passed_over)
     else:
         raise NotFound("no such archive or folder", where=str(path))
     seen: set[str] = set()
@@ -50,17 +57,21 @@ def bvh_files(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _folder(path: Path) -> Iterator[tuple[str, bytes]]:
     for file in sorted(path.rglob("*")):
-        if file.suffix.lower() == ".bvh" and file.is_file() and not file.is_symlink():
+        if file.suffix.lower() == BVH and file.is_file() and not file.is_symlink():
             _check_size(file.stat().st_size, str(file))
             yield file.stem, file.read_bytes()
 
 
-def _archive(path: Path) -> Iterator[tuple[str, bytes]]:
+def _archive(path: Path, passed_over: Counter[str]) -> Iterator[tuple[str, bytes]]:
     try:
         with tarfile.open(path, "r|*") as tar:
             for member in tar:
                 name = PurePosixPath(member.name)
-                if not member.isreg() or name.suffix.lower() != ".bvh":
+                if member.isdir():
+                    continue
+                kind = (name.suffix.lower() or NO_ENDING) if member.isreg() else SPECIAL
+                if kind != BVH:
+                    passed_over[kind] += 1
                     continue
                 _check_size(member.size, f"{path}: {member.name}")
                 file = tar.extractfile(member)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -25,6 +25,8 @@ from marey.motion.io.bvh import parse_bvh
 
 Progress = Callable[[int, int | None], None]
 """Called with the number of finished files and the total, or None if unknown."""
+MOST_KINDS = 5
+"""Kinds of members without clips that are named."""
 LEAST_FRAMES = 4
 LEAST_RISE = 0.001
 """Metres by which hips rise and fall at least in a file that holds their height."""
@@ -77,13 +79,20 @@ class CaptureSet:
         return cls(folder, dataset, rows, read_caption_files(folder, rows))
 
 
-def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | None = None) -> JointsPack:
+def pack_set(
+    captures: CaptureSet,
+    *,
+    processes: int = 2,
+    progress: Progress | None = None,
+    note: Callable[[str], None] | None = None,
+) -> JointsPack:
     """Retarget every clip of a set.
 
     Args:
         captures: the set to read.
         processes: number of worker processes.
         progress: called for each file.
+        note: called with a sentence on the members of an archive that were passed over, if there are any.
 
     Raises:
         NotFound, InvalidFile, TooLarge: the source cannot be read; the message names the file.
@@ -99,7 +108,8 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
             rows[row.stem].append(row)
     clips: list[tuple[PackClip, NDArray[np.float32]]] = []
     done = set[str]()
-    files = ((name, data) for name, data in bvh_files(captures.path) if name in rows)
+    passed_over = Counter[str]()
+    files = ((name, data) for name, data in bvh_files(captures.path, passed_over) if name in rows)
     for name, joints in _retarget_all(files, dataset, processes):
         done.add(name)
         for row in rows[name]:
@@ -110,6 +120,8 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
                 clips.append((_clip(row, captures), piece))
         if progress:
             progress(len(done), len(rows))
+    if note and passed_over:
+        note(f"{captures.path}: {_counted(passed_over)}.")
     if missing := sorted(rows.keys() - done):
         raise InvalidFile(
             f"holds no {missing[0]}.bvh, which the index lists" + (f" ({len(missing)} missing)" if missing[1:] else ""),
@@ -123,6 +135,14 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
         left_out,
         {f"{dataset.name}/{file.name}": file.sha256 for file in captures.caption_files},
     )
+
+
+def _counted(passed_over: Counter[str]) -> str:
+    """Say how many members were passed over, and of which kinds, the most frequent first."""
+    kinds = [f"{count:,} {kind}" for kind, count in passed_over.most_common(MOST_KINDS)]
+    if others := passed_over.total() - sum(count for _, count in passed_over.most_common(MOST_KINDS)):
+        kinds.append(f"{others:,} others")
+    return f"{passed_over.total():,} members that are not BVH files were passed over ({', '.join(kinds)})"
 
 
 def _clip(row: Row, captures: CaptureSet) -> PackClip:

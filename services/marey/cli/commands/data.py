@@ -39,7 +39,7 @@ def pack(
     """Retarget archives only: small files to carry to the machine that prepares and trains."""
     from marey.cli.roles import data
 
-    sources = data.CaptureSources(_named(pairs), processes)
+    sources = data.CaptureSources(_named(pairs), processes, console.say)
     with _progress() as progress:
         paths = data.pack_data(sources, output, progress)
     for path in paths:
@@ -65,7 +65,7 @@ def prepare(
     over a set that is published as features."""
     from marey.cli.roles import data
 
-    sources = data.CaptureSources(_named(pairs), processes)
+    sources = data.CaptureSources(_named(pairs), processes, console.say)
     with _progress() as progress:
         manifest = data.prepare_data(sources, output, speed, progress)
     console.say(f"{output}: {manifest}")

@@ -31,10 +31,12 @@ class CaptureSources:
     Attributes:
         named: source and its archive, folder or file: a known set, `own` (a folder that describes itself) or `pack`.
         processes: how many retarget at once.
+        note: called with a sentence on the members of an archive that were passed over.
     """
 
     named: Sequence[tuple[str, Path]]
-    processes: int = 2
+    processes: int
+    note: Callable[[str], None]
 
 
 def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | None], None]) -> list[JointsPack]:
@@ -66,7 +68,7 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
         else:
             captures = CaptureSet.own(path) if name == OWN else CaptureSet.known(name, path)
             report = partial(progress, captures.dataset.name)
-            packs.append(pack_set(captures, processes=sources.processes, progress=report))
+            packs.append(pack_set(captures, processes=sources.processes, progress=report, note=sources.note))
     return packs
 
 
