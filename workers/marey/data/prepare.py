@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.core.children import end_with_parent
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.archive import bvh_files
 from marey.data.caption_files import CaptionFile, read_caption_files
@@ -181,7 +182,7 @@ def _retarget_all(
         yield from (retarget_file(name, data, dataset) for name, data in files)
         return
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    with ProcessPoolExecutor(processes) as pool:
+    with ProcessPoolExecutor(processes, initializer=end_with_parent) as pool:
         while batch := list(islice(files, 64)):
             names, contents = zip(*batch, strict=True)
             yield from pool.map(retarget_file, names, contents, [dataset] * len(batch), chunksize=8)

@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from marey.bundles import TextSpec
 from marey.core.arrays import check_array, read_npz, text_of
+from marey.core.children import end_with_parent
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
@@ -321,6 +322,7 @@ _loaded: list[TextPipeline] = []  # in a process of the pool: its own pipeline
 
 
 def _load(spec: TextSpec, encoder_path: Path | None) -> None:
+    end_with_parent()
     _loaded.append(TextPipeline.load(spec, encoder_path=encoder_path))
 
 
