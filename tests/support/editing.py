@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from marey.editing.handler import EditHandler
 from marey.motion.clip import MotionClip, parse_npz
 from tests.support.live_api import LiveApi
+from tests.support.repeating import repeating
 from tests.support.runtime import Loop
 from tests.support.walker import walker
 
@@ -35,19 +35,11 @@ def work_edits(api: LiveApi) -> None:
 @contextmanager
 def working_editor(api: LiveApi) -> Iterator[None]:
     """Work off the queue `edit` until the end of the block."""
-    loop, over = Loop(api.engine, api.store, EditHandler()), threading.Event()
-
-    def work() -> None:
-        while not over.wait(0.05):
-            loop.run()
-
-    thread = threading.Thread(target=work)
-    thread.start()
+    loop = Loop(api.engine, api.store, EditHandler())
     try:
-        yield
+        with repeating(loop.run):
+            yield
     finally:
-        over.set()
-        thread.join(60)
         loop.close()
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import threading
-from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +19,7 @@ from marey.motion.io.bvh import read_bvh
 from marey.motion.skeleton import HUMANML3D
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
+from tests.support.repeating import repeating
 from tests.support.walker import walker
 from tests.unit.motion.test_body_files import CHILD, shaped, write
 
@@ -48,22 +47,9 @@ def job(api: LiveApi) -> str:
     return job
 
 
-@contextmanager
-def working(api: LiveApi) -> Generator[None]:
+def working(api: LiveApi) -> AbstractContextManager[None]:
     """Have a worker at the queue, which makes `CLIP` of every prompt."""
-    ended = threading.Event()
-
-    def work() -> None:
-        while not ended.wait(0.2):
-            api.work(CLIP.to_npz())
-
-    worker = threading.Thread(target=work)
-    worker.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        worker.join()
+    return repeating(lambda: api.work(CLIP.to_npz()), 0.2)
 
 
 def test_fetched_files_are_on_the_body(
