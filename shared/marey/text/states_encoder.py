@@ -1,4 +1,4 @@
-"""What the text encoders of `transformers` share: CLIP, and T5 and DistilBERT, whose token states stay unchanged."""
+"""Text encoders of `transformers` share this: CLIP, and T5 and DistilBERT, whose token states stay unchanged."""
 
 from __future__ import annotations
 
