@@ -16,6 +16,30 @@ from marey.viz.body import Part
 
 Colour = tuple[int, int, int]
 
+NO_LETTER = "\uffff"
+"""A code point that no font draws: its picture is that of a missing letter."""
+PLAIN = {
+    "–": "-",
+    "—": "-",
+    "−": "-",
+    "×": "x",
+    "ß": "ss",
+    "æ": "ae",
+    "Æ": "AE",
+    "œ": "oe",
+    "Œ": "OE",
+    "ø": "o",
+    "Ø": "O",
+    "ł": "l",
+    "Ł": "L",
+    "đ": "d",
+    "Đ": "D",
+    "ð": "d",
+    "þ": "th",
+    "ı": "i",
+}
+"""What stands for letters that the font does not have and that are no letter with an accent."""  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Theme:
@@ -84,6 +108,30 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)  # Aileron, part of Pillow: the same sheet on every machine
 
 
+@lru_cache(maxsize=4096)
+def _drawable(text: str) -> str:
+    """Return a text in the letters of the font, which has no accents: "café" becomes "cafe". Letters that have no such
+    form stay, and are drawn as boxes."""
+    return "".join(c if c.isascii() or _has_glyph(c) else _plain(c) for c in text)
+
+
+def _plain(letter: str) -> str:
+    likeness = PLAIN.get(letter) or unicodedata.normalize("NFKD", letter)
+    marked = "".join(c for c in likeness if not unicodedata.combining(c))
+    return marked if all(map(_has_glyph, marked)) else letter
+
+
+def _has_glyph(letter: str) -> bool:
+    return _picture(letter) != _picture(NO_LETTER)
+
+
+@lru_cache(maxsize=1024)
+def _picture(letter: str) -> bytes:
+    image = Image.new("L", (40, 40))
+    ImageDraw.Draw(image).text((0, 0), letter, fill=255, font=_font(20))
+    return image.tobytes()
+
+
 @dataclass(frozen=True)
 class Paper:
     """An image to draw text and shapes on."""
@@ -101,11 +149,11 @@ class Paper:
     ) -> None:
         """Draw one line; `at` is the left end, centre or right end of its top."""
         anchor = {"left": "la", "centre": "ma", "right": "ra"}[align]
-        ImageDraw.Draw(self.image).text(at, text, fill=colour, font=_font(size), anchor=anchor)
+        ImageDraw.Draw(self.image).text(at, _drawable(text), fill=colour, font=_font(size), anchor=anchor)
 
     def length(self, text: str, size: int) -> float:
         """Return the width of a line in pixels."""
-        return ImageDraw.Draw(self.image).textlength(text, font=_font(size))
+        return ImageDraw.Draw(self.image).textlength(_drawable(text), font=_font(size))
 
     def wrap(self, text: str, size: int, width: float, *, lines: int) -> list[str]:
         """Break text at words into at most `lines` lines; a longer text ends in an ellipsis."""

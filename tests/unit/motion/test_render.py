@@ -321,3 +321,19 @@ def test_wrapping_keeps_to_the_width_and_says_what_it_cut():
 
 def test_control_characters_become_spaces():
     assert one_line(" a\tb\r\nc\x00d\u2028e ") == "a b c d e"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [("vorwärts, s’il vous plaît", "vorwarts, s’il vous plait"), ("Straße — 2 × Ågård", "Strasse - 2 x Agard")],
+)
+def test_letters_with_accents_are_drawn_without_them(text: str, shown: str) -> None:
+    def line(of: str) -> NDArray[np.uint8]:
+        paper = Paper(Image.new("RGB", (400, 40), (255, 255, 255)), THEMES["light"])
+        paper.text((0, 0), of, 20, (0, 0, 0))
+        return np.asarray(paper.image)
+
+    assert (line(text) == line(shown)).all(), "no boxes for letters that the font does not have"
+    assert Paper(Image.new("RGB", (1, 1)), THEMES["light"]).length(text, 20) == pytest.approx(
+        Paper(Image.new("RGB", (1, 1)), THEMES["light"]).length(shown, 20)
+    )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
     from marey.cli.drawing import Drawers
-    from marey.client import Client, Motion
+    from marey.client import Client, Motion, Selection
     from marey.viz.gallery import Card, EditNote
 
 ENDINGS = (".html", ".htm", ".png")
@@ -77,7 +77,8 @@ def review(
     with Client() as client:
         ids = list(dict.fromkeys(find(client, "job", job).id for job in jobs))
         found, more = _motions(client, ids, reviews, tags, skip, limit)
-        name = " and ".join(client.jobs.get(job).name or f"Job {job}" for job in ids)
+        names = {job: client.jobs.get(job).name or f"Job {console.short_id(job)}" for job in ids}
+        name = " and ".join(names.values())
         per_page = max(per_page // len(ids), 1) * len(ids)  # a page holds all motions of its last prompt
         pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]
         paths = _paths(output, len(pages))
@@ -90,11 +91,14 @@ def review(
                 count = f"{first + 1} to {first + len(page)} of {skip + len(found)}{' and more' if more else ''}"
                 with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
                     files = client.motions.fetch_all(page, folder)
+                    facts = _facts(page, names)
                     if output.suffix.lower() == ".png":
-                        _sheet(page, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task))
+                        _sheet(
+                            page, facts, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task)
+                        )
                     else:
                         beside = [None, *(path.name for path in paths), None]
-                        cards = _cards(client, page, files, sources)
+                        cards = _cards(client, page, facts, files, sources)
                         _page(cards, drafts[number], (name, count), beside[number : number + 3 : 2], len(ids))
                         bar.advance(task, len(page))
     for path in paths:
@@ -201,6 +205,7 @@ def _has_source(motion: Motion, shown: Mapping[str, Motion]) -> bool:
 
 def _sheet(
     motions: Sequence[Motion],
+    facts: Sequence[str],
     files: Sequence[Path],
     path: Path,
     title: str,
@@ -213,7 +218,7 @@ def _sheet(
     from marey.viz.render import COLUMNS, save_png, stack_rows
 
     columns = COLUMNS if len(motions) <= ROWS else None
-    captions = [f"{facts}  ·  {motion.prompt}" for facts, motion in zip(_facts(motions), motions, strict=True)]
+    captions = [_caption(*each) for each in zip(facts, motions, strict=True)]
     drawings = [Drawing(file, caption, columns) for file, caption in zip(files, captions, strict=True)]
 
     def images() -> Iterator[Image]:
@@ -228,15 +233,21 @@ def _sheet(
     save_png(sheet, path)
 
 
-def _cards(client: Client, motions: Sequence[Motion], files: Sequence[Path], sources: dict[str, str]) -> list[Card]:
+def _cards(
+    client: Client,
+    motions: Sequence[Motion],
+    facts: Sequence[str],
+    files: Sequence[Path],
+    sources: dict[str, str],
+) -> list[Card]:
     from marey.motion.clip import load_npz
     from marey.viz.gallery import Card
 
     cards: list[Card] = []
-    for motion, file, facts in zip(motions, files, _facts(motions), strict=True):
+    for motion, file, fact in zip(motions, files, facts, strict=True):
         clip, flags = load_npz(file), motion.quality.flags if motion.quality else ()
         edit = _edit_note(client, motion, clip.manifest, sources)
-        cards.append(Card(motion.id, clip, motion.prompt, facts, motion.tags, _review_text(motion), flags, edit))
+        cards.append(Card(motion.id, clip, motion.prompt, fact, motion.tags, _review_text(motion), flags, edit))
     return cards
 
 
@@ -287,23 +298,44 @@ def _page(
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later, columns=columns)
 
 
-def _facts(motions: Sequence[Motion]) -> list[str]:
-    """Describe each motion in a line, with its bundle where they are of several."""
+def _facts(motions: Sequence[Motion], jobs: Mapping[str, str]) -> list[str]:
+    """Describe each motion in a line, with its job and its bundle where they are of several.
+
+    Args:
+        jobs: names of all jobs that are drawn, by their ids.
+    """
     several = len({motion.bundle for motion in motions}) > 1
-    return [_fact(motion, motion.bundle.partition("@")[0] if several else None) for motion in motions]
+    return [
+        _fact(
+            motion,
+            ([jobs[motion.job]] if len(jobs) > 1 else []) + ([motion.bundle.partition("@")[0]] if several else []),
+        )
+        for motion in motions
+    ]
 
 
-def _fact(motion: Motion, bundle: str | None) -> str:
+def _fact(motion: Motion, made_by: Sequence[str]) -> str:
     take = ["take of another"] if motion.replaces else []
     edit = [f"edit of {console.short_id(motion.edited_from[0])}"] if motion.edited_from else []
     name = [motion.name] if motion.name else []
     match = motion.quality.match if motion.quality else None
     shown = [f"match {match.value:g}"] if match and match.value is not None else []
-    chosen = motion.selection
-    of = [f"candidate {chosen.chosen} of {len(chosen.candidates)}"] if chosen else []
-    made_by = [bundle] if bundle else []
+    of = [_choice(motion.selection)] if motion.selection else []
     place = [f"{motion.index:05}", *name, *made_by, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
     return "  ·  ".join([*place, *of, *shown, *take, *edit])
+
+
+def _caption(facts: str, motion: Motion) -> str:
+    """Return the line over the poses of a motion on a contact sheet, which has no badges."""
+    flags = motion.quality.flags if motion.quality else ()
+    return "  ·  ".join([facts, *([", ".join(flags)] if flags else []), motion.prompt])
+
+
+def _choice(selection: Selection) -> str:
+    """Return the place of the chosen candidate, from 1: of those with constraints only the fitted ones are recorded, so
+    its index may exceed their number."""
+    drawn = [candidate.index for candidate in selection.candidates]
+    return f"candidate {drawn.index(selection.chosen) + 1} of {len(drawn)}"
 
 
 def _verdict(motion: Motion) -> str:
