@@ -12,6 +12,8 @@ from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope, sco
 
 MAX_EXAMPLES = 3
 """Of each verdict and flag."""
+MAX_NUMBERS = 10
+"""Places of prompts that a warning names."""
 MAX_SHOWN = 60
 """Characters of a prompt in a message."""
 MAX_NAMED = 20
@@ -30,9 +32,12 @@ NOTES = {
     "length": "a stated length is not used: it is that of a part, or out of the model's range",
     "several-people": "one person is shown",
     "subject": "its subject is read as a person",
-    "other-language": "words in another language are not read",
+    "other-language": "words in another language are not read: write in English",
+    "other-subject": "a person is shown in place of its subject",
 }
 """Expectation for prompts of a verdict or with a flag; the flags that are not here come with `unknown`."""
+REASONS = frozenset({"other-language", "other-subject"})
+"""Flags that say why a prompt is `unknown`: they are told of beside it."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,9 @@ class ScopeReport:
     decided: Mapping[tuple[str, str], Scope] = field(default_factory=dict[tuple[str, str], Scope])
     left: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     _noted: Counter[str] = field(default_factory=Counter[str])
-    """Prompts with each flag that are not `unknown` anyway."""
+    """Prompts with each flag that warnings tell of: those of `unknown` prompts only where they are its reason."""
+    _numbers: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
+    """Places of the first prompts of each verdict and with each flag, from 1."""
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
 
     def judge(
@@ -134,7 +141,7 @@ class ScopeReport:
             self._add(verdict, index, *next(part for part in parts if part[1].verdict == verdict))
         for flag in scope.flags:
             self.flags[flag] += 1
-            if verdict != "unknown":
+            if verdict != "unknown" or flag in REASONS:
                 self._noted[flag] += 1
                 self._add(flag, index, *next(part for part in parts if flag in part[1].flags))
 
@@ -143,6 +150,9 @@ class ScopeReport:
             self.left.setdefault(bundle, []).append(prompt)
 
     def _add(self, kind: str, index: int, prompt: str, scope: Scope) -> None:
+        numbers = self._numbers.setdefault(kind, [])
+        if len(numbers) < MAX_NUMBERS:
+            numbers.append(index + 1)
         examples = self._examples.setdefault(kind, [])
         if len(examples) < MAX_EXAMPLES:
             named = (each for each in scope.actions if each.verdict == kind)
@@ -172,13 +182,17 @@ class ScopeReport:
         return found
 
     def _subject(self, kind: str) -> str:
-        """Return the prompts of a verdict or with a flag: the only one, or their number with the first."""
+        """Return the prompts of a verdict or with a flag: the only one, or their count, the places of the first ones
+        and the words of the first."""
         first = self._examples[kind][0]
         what = f" ({', '.join(first.actions)})" if first.actions else ""
         if self.total == 1:
             return f"{first.prompt!r}{what}"
         count = self.counts[kind] or self._noted[kind]
-        return f"{count} of {self.total} prompts, first number {first.index + 1}, {first.prompt!r}{what}"
+        if count == 1:
+            return f"1 of {self.total} prompts, number {first.index + 1}, {first.prompt!r}{what}"
+        numbers = ", ".join(map(str, self._numbers[kind])) + (", …" if count > MAX_NUMBERS else "")
+        return f"{count} of {self.total} prompts, numbers {numbers}, first {first.prompt!r}{what}"
 
 
 def with_length(scope: Scope, prompt: str, lengths: tuple[float, float]) -> Scope:
