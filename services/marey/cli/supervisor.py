@@ -94,6 +94,7 @@ class Supervisor:
             for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
                 signal.signal(number, self._on_signal)
             try:
+                console.say("Starting the database, the queue and the API …")
                 self._start()
                 self._watch()
             finally:

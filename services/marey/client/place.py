@@ -89,6 +89,12 @@ def read_server(folder: Path) -> Server | None:
 
 def _local_server() -> Server:
     server = read_server(home())
+    if server is None and _is_starting(home()):
+        raise Unreachable(
+            "the server here is starting, or stopping",
+            where=str(home()),
+            hint="Try again once `marey serve` says `Marey answers at`.",
+        )
     if server is None:
         raise Unreachable(
             "no server is running here",
@@ -96,6 +102,18 @@ def _local_server() -> Server:
             hint="Start one with `marey serve`, or name one with MAREY_SERVER and MAREY_KEY.",
         )
     return server
+
+
+def _is_starting(folder: Path) -> bool:
+    """Return True if a process is alive that `marey serve` of this home wrote into its lock."""
+    try:
+        pid = int(read_json(folder / "lock", limit=MAX_BYTES, hint=HINT)["pid"])
+        os.kill(pid, 0)
+    except (NotFound, InvalidFile, KeyError, TypeError, ValueError, ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True  # it is another user's
+    return True
 
 
 def _key() -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from marey.client.place import Server, find_server
-from marey.core.errors import InvalidFile, Unauthenticated
+from marey.core.errors import InvalidFile, Unauthenticated, Unreachable
 
 URL = "https://marey.example.com"
 
@@ -45,3 +49,22 @@ def test_no_key_at_all_is_told_with_what_to_set(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("MAREY_KEY_FILE", str(tmp_path / "key"))
     with pytest.raises(Unauthenticated, match="the file of MAREY_KEY_FILE is empty"):
         find_server()
+
+
+def test_a_server_that_is_starting_is_told_from_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MAREY_SERVER")
+    monkeypatch.setenv("MAREY_HOME", str(tmp_path))
+
+    def told() -> str:
+        with pytest.raises(Unreachable) as raised:
+            find_server()
+        return str(raised.value)
+
+    assert "no server is running here" in told()
+    (tmp_path / "lock").write_text(json.dumps({"pid": os.getpid()}))
+    assert "the server here is starting, or stopping" in told()
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    for left in (json.dumps({"pid": ended.pid}), "", "[]", '{"pid": "x"}'):
+        (tmp_path / "lock").write_text(left)
+        assert "no server is running here" in told()
