@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from marey.core.errors import MareyError, TimedOut
 
 OPTIONS = {
+    "best_of": "--best-of",
     "body": "--body",
     "bundle": "--bundle",
     "bvh_root": "--bvh-root",
@@ -23,6 +24,7 @@ OPTIONS = {
     "name_template": "--name-template",
     "overwrite": "--overwrite",
     "placement": "--placement",
+    "redraws": "--redraws",
     "rest_pose": "--rest-pose",
     "rig": "--rig",
     "rig_map": "--map",

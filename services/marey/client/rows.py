@@ -158,7 +158,7 @@ def defaults_of(
         ("seed", "seed", seed),
         ("variants", "variants", variants),
         ("variety", "variety", variety),
-        ("settings" if settings else next(iter(named), "settings"), "settings", {**(settings or {}), **named} or None),
+        ("settings", "settings", {**(settings or {}), **named} or None),
         ("tags", "tags", tags or None),
     )
     found: dict[str, object] = {}
@@ -168,7 +168,9 @@ def defaults_of(
         try:
             found[field] = CHECKS[field](value)
         except InvalidInput as error:
-            raise InvalidInput(error.message, where=argument, hint=error.hint, argument=argument) from None
+            name, _, fault = error.message.partition(": ")  # a setting is named by its message
+            at, message = (name, fault) if field == "settings" and name in named else (argument, error.message)
+            raise InvalidInput(message, where=at, hint=error.hint, argument=at) from None
     return found
 
 

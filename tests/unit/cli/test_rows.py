@@ -250,3 +250,18 @@ def test_a_file_of_an_evaluation_that_cannot_be_used_says_why(tmp_path: Path, co
     with pytest.raises(InvalidInput) as caught:
         read_evaluation_prompts(write(tmp_path, "p.csv", content))[0]
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "where", "message"),
+    [
+        ({"best_of": 9, "redraws": 1}, "best_of", "9 is outside 1 to 8"),
+        ({"best_of": 2, "redraws": 7}, "redraws", "7 is outside 0 to 2"),
+        ({"fps": 0.5, "settings": {"guidance": 4.0}}, "fps", "0.5 is outside 1 to 240"),
+        ({"fps": 30, "settings": {"redraws": 7}}, "settings", "redraws: 7 is outside 0 to 2"),
+    ],
+)
+def test_an_argument_that_is_a_setting_is_named_once(given: dict[str, Any], where: str, message: str) -> None:
+    with pytest.raises(InvalidInput) as told:
+        defaults_of(**given)
+    assert (told.value.where, told.value.argument, told.value.message) == (where, where, message)
