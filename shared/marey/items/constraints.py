@@ -119,7 +119,7 @@ def _constraint(value: object, where: str) -> Constraint:
     for name in given:
         if name != "type" and name not in allowed:
             raise InvalidInput(
-                f"unknown field of a {kind}; known: {', '.join(allowed)}", where=f"{where}.{ascii(name)[1:-1][:40]}"
+                f"unknown field of {kind!r}; known: {', '.join(allowed)}", where=f"{where}.{ascii(name)[1:-1][:40]}"
             )
     return {"type": kind, **read({name: each for name, each in given.items() if each is not None}, where)}
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from marey.cli.commands.edit import _report
 from marey.cli.main import app
 from marey.cli.operations import with_operations
 from marey.cli.roles.editing import loop
@@ -192,3 +193,14 @@ def test_a_prompt_that_the_model_does_not_know_is_refused_before_anything_is_gen
     said = run(walk, "-o", out, *edits, "--scope", "refuse", code=2)
     assert "names an action that the model does not know: 'asdf qwer" in said
     assert not out.exists()
+
+
+def test_flags_are_told_with_the_file_as_it_was_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    flags = ["self-contact", "skating", "off-prompt"]
+    _report({"file": str(tmp_path / "e4.npz"), "quality": {"flags": flags}})
+    assert capsys.readouterr().err == "e4.npz: the motion has the flags self-contact, skating.\n"
+    _report({"file": str(tmp_path / "e4.npz"), "quality": {"flags": ["off-prompt"]}})
+    assert capsys.readouterr().err == ""

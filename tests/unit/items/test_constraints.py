@@ -170,3 +170,10 @@ def test_last_frame() -> None:
     assert last_frame(read, 30.0, kind="root_path") == 75
     assert last_frame(read, 4.0) == 20
     assert last_frame([], 30.0) is None
+
+
+def test_an_unknown_field_is_told_with_the_type_and_the_known_ones() -> None:
+    with pytest.raises(InvalidInput) as told:
+        read_constraints([{**HAND, "colour": 1}])
+    assert told.value.where == "constraints.0.colour"
+    assert told.value.message.startswith("unknown field of 'effector_target'; known: joint, frames")

@@ -85,7 +85,7 @@ def basis_of(row: Estimate) -> str:
         for speed in row.speeds
     ]
     workers = [
-        f"{count} {name} workers" if count else f"no live {name} worker: one assumed"
+        f"{count} {name} worker{'s' if count > 1 else ''}" if count else f"no live {name} worker: one assumed"
         for name, count in row.workers.items()
     ]
     return "; ".join((*parts, *workers))

@@ -58,4 +58,4 @@ def edit(
 def _report(line: dict[str, Any]) -> None:
     faults = [] if line["quality"] is None else [flag for flag in line["quality"]["flags"] if flag != "off-prompt"]
     if faults:
-        console.say(f"{line['file']}: the motion is {', '.join(faults)}.")
+        console.say(f"{console.home_relative(Path(line['file']))}: the motion has the flags {', '.join(faults)}.")

@@ -152,7 +152,7 @@ def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
         return
     about = f"{line['prompt']!r}, seed {line['seed']}"
     if faults := [flag for flag in quality["flags"] if flag not in SAID_APART]:
-        console.say(f"{about}: the motion is {', '.join(faults)}.")
+        console.say(f"{about}: the motion has the flags {', '.join(faults)}.")
     if POSTURE_JUMP in quality["flags"]:
         from marey.quality.postures import posture_jumps
 
