@@ -61,7 +61,7 @@ class StatedLength:
 def stated_length(prompt: str) -> StatedLength:
     """Return the length that a prompt states.
 
-    Several lengths are summed where every action in order has one: "walks for two seconds, then waves for three" has
+    Several lengths are summed where every action in order has one: "walks for two seconds, then waves for 3 s" has
     five. "walks, then waves for three seconds" states that of a part.
     """
     text = " ".join(prompt.lower().split())
