@@ -25,7 +25,7 @@ import httpx2
 
 from benchmarks.bench_text import LONG
 from benchmarks.platform import marey
-from marey.client.place import Server, read_server
+from marey.client.server_address import Server, read_server
 from marey.client.transport import Transport
 from marey.core.errors import MareyError
 from tests.support.marey import REPOSITORY, Marey

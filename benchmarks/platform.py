@@ -14,7 +14,7 @@ from pathlib import Path
 
 import psutil
 
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.db import transaction

@@ -18,7 +18,7 @@ from marey.db.sql import CLOCK, among
 from marey.items.constraints import named_motions, read_constraints
 from marey.items.timeline import read_timeline
 from marey.jobs import tables
-from marey.jobs.leases import AssetDigest
+from marey.jobs.lease_types import AssetDigest
 from marey.jobs.states import ENDED, ItemStage, JobControl, JobKind, Review
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, Edits
 from marey.motion.provenance import check_manifest

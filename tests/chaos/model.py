@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from marey.jobs import ClaimedItem
-from marey.runtime.exports import Export
+from marey.runtime.export_types import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Outcome
 from tests.support.toy import ToyHandler
 

@@ -12,7 +12,7 @@ import pytest
 from fastapi import FastAPI
 
 from marey.api.app import create_app
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.spool import IN_MEMORY
 from marey.db import create_engine, transaction

@@ -34,7 +34,7 @@ from marey.jobs import (
     waiting_batches,
     waiting_items,
 )
-from marey.jobs.leases import Claim, ItemFailure
+from marey.jobs.lease_types import Claim, ItemFailure
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from marey.core.errors import Unreachable
 from marey.db import transaction
 from marey.jobs import Policy, asset_key, begin_assets, cancel, commit_motions, get_motion, sweep
-from marey.jobs.leases import Claim, NewMotion
+from marey.jobs.lease_types import Claim, NewMotion
 from marey.storage import AssetStore, FolderStore
 from marey.takes import GarbageReport, collect_garbage, delete, gc, list_motions, remove_stale_assets
 from tests.servers.jobs import claim_some, let_expire, motion_of, parse_texts, submit_items

@@ -33,7 +33,7 @@ from marey.jobs import (
     release,
     sweep,
 )
-from marey.jobs.leases import PromptScope
+from marey.jobs.lease_types import PromptScope
 from marey.jobs.types import JsonObject
 from marey.takes import erase
 from tests.servers.audit import audit

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 
 from marey.api import rates
 from marey.api.rates import RateLimiter
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy
 from marey.core.settings import Settings

@@ -31,7 +31,7 @@ from marey.evaluations import (
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, ClaimedItem, tables
 from marey.measures.scores import SCHEMA, VERSION, MotionScore
-from marey.runtime.exports import ExportedFile
+from marey.runtime.export_types import ExportedFile
 from marey.runtime.handler import Batch, BatchControl, Outcome, Scored, TextDone
 from marey.runtime.scoring import ScoreInput
 from marey.scheduler.evaluations import EvaluationScheduler

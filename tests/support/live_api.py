@@ -21,7 +21,7 @@ from pydantic import SecretStr
 
 from marey.api.app import create_app, protocol_options
 from marey.bundles import BundleWriter, TextSpec
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.db import create_engine, transaction

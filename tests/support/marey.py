@@ -17,7 +17,7 @@ from typing import Any
 import psutil
 from websockets.sync.client import ClientConnection, connect
 
-from marey.client.place import read_server
+from marey.client.server_address import read_server
 from marey.client.transport import Transport
 from marey.core import defaults
 from marey.registry import model_names

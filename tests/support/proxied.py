@@ -8,8 +8,8 @@ from pathlib import Path
 
 from marey.client.fetching import download_all
 from marey.client.file_to_fetch import FileToFetch
-from marey.client.link import Link
-from marey.client.place import Server
+from marey.client.server_address import Server
+from marey.client.stream_socket import Link
 from marey.client.transport import Transport
 from marey.core.hashing import sha256_of
 from tests.support.live_api import LiveApi

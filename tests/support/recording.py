@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
-from marey.training.recorded import tensors_of
+from marey.training.cuda_graphs import tensors_of
 from marey.training.stages import RecordableStage, StepContext
 
 META = torch.device("meta")

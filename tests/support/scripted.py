@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 
 

@@ -13,7 +13,7 @@ from enum import StrEnum
 
 from marey.core.errors import InvalidInput, NotFound, Unreachable
 from marey.jobs import ClaimedItem
-from marey.runtime.exports import Export, ExportedFile
+from marey.runtime.export_types import Export, ExportedFile
 from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome, TextDone
 
 QUEUE = "toy"

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from marey.bundles.manifest import parse_manifest
-from marey.client.place import read_server
+from marey.client.server_address import read_server
 from marey.core.arrays import check_array, map_npy, parse_npz, parse_safetensors, read_npy
 from marey.core.documents import MAX_DEPTH, parse_json, read_bytes, read_json
 from marey.core.errors import InvalidFile, MareyError, NotFound, TooLarge

@@ -17,7 +17,7 @@ from marey.cli.children import ends_with_parent, marey
 from marey.cli.watching import watch_job
 from marey.client.health import is_healthy
 from marey.client.manifest import flags_of
-from marey.client.place import find_server
+from marey.client.server_address import find_server
 from marey.core.errors import MareyError, NotFound, TimedOut, Unreachable
 
 if TYPE_CHECKING:

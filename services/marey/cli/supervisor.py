@@ -18,7 +18,7 @@ from marey.cli.children import SupervisedProcess, marey, metrics_port, stop_all
 from marey.cli.ports import try_port
 from marey.cli.roles.serving import PLATFORM, check_device, live_models, role_of, threads_of
 from marey.client.health import is_healthy
-from marey.client.place import Server, read_server, write_server
+from marey.client.server_address import Server, read_server, write_server
 from marey.core.errors import Conflict, InvalidInput, MareyError
 from marey.core.private_home import make_private, open_private
 from marey.core.settings import Settings

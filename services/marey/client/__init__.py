@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from marey.client.frames import Frame
     from marey.client.job_requests import Defaults, JobChanges
     from marey.client.job_results import FetchedItem, Progress
-    from marey.client.place import Server
     from marey.client.results import Result
     from marey.client.schedules import ScheduleChanges
+    from marey.client.server_address import Server
     from marey.client.streams import FramesMissing, LiveStream, StreamChanged, StreamProblem
     from marey.client.types.common import ErrorDetail, File
     from marey.client.types.evaluations import (
@@ -119,7 +119,7 @@ __getattr__ = lazy_names(
         "marey.client.frames": "Frame",
         "marey.client.job_requests": "Defaults JobChanges",
         "marey.client.job_results": "FetchedItem Progress",
-        "marey.client.place": "Server",
+        "marey.client.server_address": "Server",
         "marey.client.results": "Result",
         "marey.client.schedules": "ScheduleChanges",
         "marey.client.streams": "FramesMissing LiveStream StreamChanged StreamProblem",

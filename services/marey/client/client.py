@@ -10,11 +10,11 @@ from marey.client.evaluations import Evaluations
 from marey.client.jobs import Jobs
 from marey.client.models import Models
 from marey.client.motions import Motions
-from marey.client.place import Server, find_server, server_at
 from marey.client.references import References
 from marey.client.resources import identifier
 from marey.client.rigs import Rigs
 from marey.client.schedules import Schedules
+from marey.client.server_address import Server, find_server, server_at
 from marey.client.streams import Streams
 from marey.client.transport import Transport
 from marey.client.types.jobs import CheckedEdit, SubmittedJob

@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from marey.client.file_requests import made_file
 from marey.client.file_to_fetch import FORMAT, FileToFetch
-from marey.client.made import made_file
 from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug

@@ -5,7 +5,7 @@ from __future__ import annotations
 import urllib.error
 import urllib.request
 
-from marey.client.foreign import NoAnswer
+from marey.client.foreign_answers import NoAnswer
 from marey.core.errors import Unreachable
 
 OK = 200

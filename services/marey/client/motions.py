@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from marey.client.fetching import check_folder, download_all
+from marey.client.file_requests import format_of, made_file
 from marey.client.file_to_fetch import FORMAT, FileToFetch
-from marey.client.made import format_of, made_file
 from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.resources import Resource, identifier, identifiers
 from marey.client.rigs import Rigs

@@ -11,10 +11,10 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from marey.client.frames import Frame, read_frame
-from marey.client.link import Link, Message
 from marey.client.recording import Recording
 from marey.client.resources import Resource, identifier
 from marey.client.results import HINT
+from marey.client.stream_socket import Link, Message
 from marey.client.transport import NOT_OURS, Transport, error_of_problem
 from marey.client.types.streams import Stream, StreamDetail
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, Unreachable

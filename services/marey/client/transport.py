@@ -12,9 +12,9 @@ from uuid import uuid4
 
 import httpx2
 
-from marey.client.foreign import NoAnswer, connection_failure, foreign_answer
+from marey.client.foreign_answers import NoAnswer, connection_failure, foreign_answer
 from marey.client.lines import Lines
-from marey.client.place import Server, ca_file
+from marey.client.server_address import Server, ca_file
 from marey.core import tracing
 from marey.core.errors import (
     Busy,

@@ -20,8 +20,8 @@ from marey.db import check_listening, create_engine, outages, transaction
 from marey.evaluations import remove_unused_prompts
 from marey.jobs import FailureReason, make_due, record_scheduler_heartbeat, retire, sweep
 from marey.runtime.app import create_app
-from marey.runtime.exposition import expose
 from marey.runtime.logs import configure_logging, logger
+from marey.runtime.metrics_endpoint import expose
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import StatusReporter

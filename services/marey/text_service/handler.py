@@ -12,7 +12,7 @@ from marey.core.errors import InvalidBundle, MareyError
 from marey.items.problems import UnknownAction
 from marey.items.timeline import prompts_with_rows
 from marey.jobs import TEXT_QUEUE, ClaimedItem
-from marey.jobs.leases import PromptScope
+from marey.jobs.lease_types import PromptScope
 from marey.jobs.types import named_prompts, prompts_of_ops
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served, scope_key

@@ -10,7 +10,7 @@ from uuid import UUID
 
 from marey.db.ids import new_id
 from marey.evaluations.states import EvaluationState
-from marey.jobs.leases import AssetDigest
+from marey.jobs.lease_types import AssetDigest
 from marey.jobs.states import ItemState, JobState
 from marey.jobs.types import FailureReason
 

@@ -23,7 +23,7 @@ from marey.jobs.figures import (
     server_version,
 )
 from marey.jobs.files import asset_key
-from marey.jobs.leases import (
+from marey.jobs.lease_types import (
     AssetDigest,
     Claim,
     ClaimedItem,

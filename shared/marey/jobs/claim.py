@@ -13,7 +13,7 @@ from marey.db.sql import CLOCK, interval
 from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import LockedJob, lock_job, record
-from marey.jobs.leases import Claim, ClaimedItem, HeartbeatReply
+from marey.jobs.lease_types import Claim, ClaimedItem, HeartbeatReply
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import ItemStage, ItemState, JobControl
 from marey.jobs.types import Edits

@@ -7,7 +7,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from marey.db.sql import CLOCK, interval
 from marey.jobs import tables
-from marey.jobs.leases import SchedulerRow, WorkerHeartbeat, WorkerRow
+from marey.jobs.lease_types import SchedulerRow, WorkerHeartbeat, WorkerRow
 from marey.jobs.policy import Policy, policy
 
 SCHEDULER = "scheduler"

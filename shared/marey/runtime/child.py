@@ -20,12 +20,12 @@ from marey.db import HEARTBEAT, create_engine, transaction
 from marey.jobs import HeartbeatReply, WorkerHeartbeat, beat, heartbeat, leased_items, retire
 from marey.registry import resolve
 from marey.runtime.committer import Committer
-from marey.runtime.exposition import expose, measure_gpu
 from marey.runtime.faults import retry_unreachable
 from marey.runtime.handler import Handler, HandlerFactory, Role
 from marey.runtime.lease import Heartbeat
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.loop import Drain, end_child
+from marey.runtime.metrics_endpoint import expose, measure_gpu
 from marey.runtime.status import WorkerStatus, status_file, write_status
 from marey.storage import open_store
 

@@ -30,7 +30,7 @@ from marey.jobs import (
     fail_items,
     release,
 )
-from marey.runtime.exports import Export, ExportedFile
+from marey.runtime.export_types import Export, ExportedFile
 from marey.runtime.faults import as_problem, retry_unreachable
 from marey.runtime.handler import Done, Failed, Outcome, Scored, TextDone
 from marey.runtime.lease import Heartbeat, HeldLease

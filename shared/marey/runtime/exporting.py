@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from marey.exporters import Coordinates, exporters
 from marey.motion.clip import MotionClip
-from marey.runtime.exports import Export, ExportedFile
+from marey.runtime.export_types import Export, ExportedFile
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:

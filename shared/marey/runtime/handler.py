@@ -22,9 +22,9 @@ from typing import Protocol, TypeAlias
 from uuid import UUID
 
 from marey.core.errors import MareyError
-from marey.jobs.leases import Claim, ClaimedItem, PromptScope
+from marey.jobs.lease_types import Claim, ClaimedItem, PromptScope
 from marey.runtime.editing import EditInput
-from marey.runtime.exports import Export, ExportedFile
+from marey.runtime.export_types import Export, ExportedFile
 from marey.runtime.scoring import ScoreInput
 
 

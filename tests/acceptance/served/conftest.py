@@ -55,7 +55,7 @@ def marey(served: tuple[Marey, Serving]) -> Marey:
 @pytest.fixture
 def elsewhere(marey: Marey, tmp_path: Path) -> Marey:
     """The command line of another machine: it knows the server by URL and key alone."""
-    from marey.client.place import read_server
+    from marey.client.server_address import read_server
 
     server = read_server(marey.home)
     assert server is not None

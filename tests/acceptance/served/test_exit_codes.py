@@ -13,7 +13,7 @@ from uuid import uuid4
 import psutil
 import pytest
 
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import NotFound, Unauthenticated
 from tests.servers.ports import free_ports

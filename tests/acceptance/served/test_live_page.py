@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.client.place import read_server
+from marey.client.server_address import read_server
 from tests.support import chromium
 from tests.support.marey import Marey
 from tests.support.tab import open_tab

@@ -13,7 +13,7 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer

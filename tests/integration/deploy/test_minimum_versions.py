@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.cli import checkup_backing as backing
-from marey.client.place import Server
+from marey.cli import doctor_servers as backing
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.versions import POSTGRES, REDIS
 from marey.db import create_engine, downgrade, transaction, upgrade

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 import redis
 
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.embedded import EmbeddedServer

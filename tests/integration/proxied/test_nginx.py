@@ -11,8 +11,8 @@ import httpx2
 import pytest
 
 from marey.client import transport
-from marey.client.link import Link
-from marey.client.place import Server
+from marey.client.server_address import Server
+from marey.client.stream_socket import Link
 from marey.client.transport import Transport
 from marey.core.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
 from tests.servers.nginx import PROGRAM, Nginx

@@ -9,8 +9,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from marey.client.link import Link
-from marey.client.place import Server
+from marey.client.server_address import Server
+from marey.client.stream_socket import Link
 from marey.client.transport import Transport
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings

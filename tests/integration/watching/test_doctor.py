@@ -15,10 +15,10 @@ import sqlalchemy as sa
 from pydantic import SecretStr
 
 from marey.api.health.metrics import render
-from marey.cli import checkup
-from marey.cli import checkup_backing as backing
-from marey.cli.checkup import models
-from marey.cli.findings import Finding
+from marey.cli import doctor
+from marey.cli import doctor_servers as backing
+from marey.cli.doctor import models
+from marey.cli.doctor_findings import Finding
 from marey.core.settings import Settings
 from marey.db import downgrade, transaction
 from marey.jobs import WorkerHeartbeat, beat, record_scheduler_heartbeat
@@ -90,14 +90,14 @@ def test_a_scheduler_that_stalls_is_told_with_its_last_progress(engine: sa.Engin
 
 
 def test_a_server_that_hangs_is_told_apart_from_one_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checkup, "ANSWER_SECONDS", 0.3)
-    monkeypatch.setattr(checkup, "LIVE_SECONDS", 0.3)
+    monkeypatch.setattr(doctor, "ANSWER_SECONDS", 0.3)
+    monkeypatch.setattr(doctor, "LIVE_SECONDS", 0.3)
     with socket.create_server(("127.0.0.1", 0), backlog=16) as silent:
         address = f"http://127.0.0.1:{silent.getsockname()[1]}"
         monkeypatch.setenv("MAREY_SERVER", address)
         monkeypatch.setenv("MAREY_KEY", "k")
-        bad(checkup._server(), "accepts connections", "restart")
-    bad(checkup._server(), "does not answer", "marey serve")
+        bad(doctor._server(), "accepts connections", "restart")
+    bad(doctor._server(), "does not answer", "marey serve")
 
 
 class HangingListings(BaseHTTPRequestHandler):
@@ -115,13 +115,13 @@ class HangingListings(BaseHTTPRequestHandler):
 
 
 def test_a_server_whose_listings_hang_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checkup, "ANSWER_SECONDS", 0.3)
+    monkeypatch.setattr(doctor, "ANSWER_SECONDS", 0.3)
     server = ThreadingHTTPServer(("127.0.0.1", 0), HangingListings)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     monkeypatch.setenv("MAREY_SERVER", f"http://127.0.0.1:{server.server_port}")
     monkeypatch.setenv("MAREY_KEY", "k")
     try:
-        bad(checkup._server(), "answers /livez, but not /v1/jobs", "restart")
+        bad(doctor._server(), "answers /livez, but not /v1/jobs", "restart")
     finally:
         server.shutdown()
         server.server_close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import sqlalchemy as sa
 
-from marey.cli import checkup_backing as backing
+from marey.cli import doctor_servers as backing
 from marey.core import versions
 from marey.core.errors import Conflict
 from marey.db import check_revision, upgrade

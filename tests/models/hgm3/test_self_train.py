@@ -27,7 +27,7 @@ from marey.motion.clip import MotionClip
 from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.selector.matching import Step, WantedAction
 from marey.training.budget import Budget
-from marey.training.drawn import FILE, Drawn, DrawnMotion, load_drawn
+from marey.training.generated_clips import FILE, Drawn, DrawnMotion, load_drawn
 from marey.training.motions import MotionData, TokenData
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts

@@ -19,7 +19,7 @@ from marey.client.fetching import download_all
 from marey.client.file_to_fetch import FileToFetch
 from marey.client.lines import Lines
 from marey.client.manifest import COLUMNS, write_manifest
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import MareyError
 from marey.core.hashing import sha256_of

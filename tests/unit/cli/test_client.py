@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from marey.client import transport
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
 from marey.items.problems import InvalidItems

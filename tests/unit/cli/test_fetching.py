@@ -12,7 +12,7 @@ import pytest
 
 from marey.client.fetching import ATTEMPTS, BLOCK, download_all, plan
 from marey.client.file_to_fetch import FileToFetch
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 

@@ -30,7 +30,7 @@ def test_the_client_needs_nothing_but_its_own_packages() -> None:
 
 CLI = Path(__file__).resolve().parents[3] / "services" / "marey" / "cli"
 HTTP = (
-    *("marey.client.transport", "marey.client.link", "httpx", "httpx2", "requests", "websockets"),
+    *("marey.client.transport", "marey.client.stream_socket", "httpx", "httpx2", "requests", "websockets"),
     *("http.client", "urllib.request", "urllib3"),
 )
 """Modules that send requests."""

@@ -11,9 +11,9 @@ import pytest
 
 from marey.cli.live.pace import Pace
 from marey.cli.live.steering import Command, command_of
-from marey.client import link as link_module
-from marey.client.link import Link
-from marey.client.place import Server
+from marey.client import stream_socket
+from marey.client.server_address import Server
+from marey.client.stream_socket import Link
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 from tests.support.stream_server import KEY, STREAM, Plan, StreamServer
 
@@ -148,7 +148,7 @@ def test_a_server_that_will_not_have_us_is_not_asked_again(code: int, error: typ
 
 
 def test_a_server_that_stays_away_is_unreachable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "LONGEST_PAUSE", 0.1)
+    monkeypatch.setattr(stream_socket, "LONGEST_PAUSE", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     with pytest.raises(Unreachable, match=r"out of reach for 1 s.*refused"):
@@ -156,7 +156,7 @@ def test_a_server_that_stays_away_is_unreachable(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_server_that_only_ever_closes_is_unreachable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "LONGEST_PAUSE", 0.1)
+    monkeypatch.setattr(stream_socket, "LONGEST_PAUSE", 0.1)
     with StreamServer(Plan(closes=[(1013, "the database is away")] * 1000)) as server:
         server.begin({"prompt": "a person walks"})
         with pytest.raises(Unreachable, match="the database is away"):
@@ -179,7 +179,7 @@ def test_an_address_with_tls_gives_a_socket_with_tls(monkeypatch: pytest.MonkeyP
         seen.append(address)
         raise OSError("no")
 
-    monkeypatch.setattr(link_module, "connect", connect)
+    monkeypatch.setattr(stream_socket, "connect", connect)
     with Link(Server("https://marey.example.com/motion", KEY), STREAM) as link:
         assert link.receive(0.01) == []
     assert seen == [f"wss://marey.example.com/motion/v1/streams/{STREAM}?from=0&slow=skip"]

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from marey.client.fetching import download_all, plan
-from marey.client.place import Server
+from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import Conflict
 from marey.exporters import Coordinates, exporter_of

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from marey.client import link as link_module
-from marey.client import transport
-from marey.client.link import Link
-from marey.client.place import Server
+from marey.client import stream_socket, transport
+from marey.client.server_address import Server
+from marey.client.stream_socket import Link
 from marey.client.transport import ATTEMPTS, Transport
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
 from tests.servers.receiver import Authority
@@ -146,7 +145,7 @@ def test_a_websocket_that_lost_its_upgrade_is_told_at_once(start: Start, status:
 
 @pytest.mark.parametrize("status", [429, 502, 503, 504])
 def test_a_proxy_without_an_api_is_tried_again(start: Start, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(stream_socket, "FIRST_PAUSE", 0.01)
     proxy = start(status)
     with Link(proxy.server, "s", patience=0.5) as link, pytest.raises(Unreachable, match="out of reach"):
         receive_until_refused(link)

@@ -25,7 +25,7 @@ from marey.quality.limits import assess, expected_by_prompts
 from marey.quality.record import read_quality
 from marey.quality.selection import read_selection
 from marey.registry import get_model, model_names, resolve
-from marey.runtime.exports import Export
+from marey.runtime.export_types import Export
 from marey.runtime.handler import Batch, Done, Failed, Outcome
 from marey.selector.records import match_of
 from marey.text.features import TextFeatures

@@ -13,8 +13,8 @@ from marey.motion.clip import parse_npz
 from marey.motion.edits.editing import EditSource, FrameModel, edit
 from marey.motion.edits.licences import strictest
 from marey.runtime.editing import EditInput
+from marey.runtime.export_types import Export
 from marey.runtime.exporting import export_clip
-from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Handler, Outcome
 
 

@@ -16,7 +16,7 @@ from marey.evaluator.reference import RealClips
 from marey.evaluator.report import headline, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
 from marey.jobs import EVALUATOR_QUEUE, ClaimedItem
-from marey.runtime.exports import ExportedFile
+from marey.runtime.export_types import ExportedFile
 from marey.runtime.handler import Batch, BatchControl, Failed, Handler, Outcome, Scored
 from marey.runtime.scoring import ScoreInput
 

@@ -13,11 +13,11 @@ from torch import Tensor, nn
 
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.data.sampling import author_table, draw_captions, sampling_weights
+from marey.evaluator.caption_retrieval import EmbeddedSplit, retrieval_scores
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.losses import divergences, info_nce, latent_distance, reconstruction
 from marey.evaluator.model import TMR, Gaussian
-from marey.evaluator.scores import EmbeddedSplit, retrieval_scores
 from marey.evaluator.sentences import CaptionStates
 from marey.nn.convolution import frame_mask
 from marey.text.encoders import TextEncoder

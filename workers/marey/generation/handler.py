@@ -24,8 +24,8 @@ from marey.generation.shots.editor import EditModel
 from marey.jobs import ClaimedItem
 from marey.motion.edits.licences import LICENCE
 from marey.runtime.editing import EditInput
+from marey.runtime.export_types import Export
 from marey.runtime.exporting import export_clip
-from marey.runtime.exports import Export
 from marey.runtime.handler import Batch, BatchControl, Done, Failed, Outcome
 from marey.streams.recording import StreamRecording
 from marey.text.features import TextFeatures

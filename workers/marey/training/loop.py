@@ -30,7 +30,7 @@ from marey.nn.devices import fast_bf16
 from marey.nn.ema import WeightAverage
 from marey.training.budget import Budget, learning_rate
 from marey.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
-from marey.training.recorded import RecordedSteps, StepResult
+from marey.training.cuda_graphs import RecordedSteps, StepResult
 from marey.training.stages import RecordableStage, SplitStage, StepContext, TrainingStage
 
 log = structlog.get_logger()

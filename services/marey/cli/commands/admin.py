@@ -95,7 +95,7 @@ def doctor(as_json: console.Json = False) -> None:
 
     What is installed, home and disk, server, database, clock, workers, scheduler, queue, store, models, texts, device.
     """
-    from marey.cli.checkup import check_all
+    from marey.cli.doctor import check_all
 
     bad = False
     for check in check_all():

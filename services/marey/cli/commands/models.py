@@ -113,7 +113,7 @@ def import_bundle(
 def _server_named() -> bool:
     import os
 
-    from marey.client.place import home
+    from marey.client.server_address import home
 
     return bool(os.environ.get("MAREY_SERVER")) or (home() / "server.json").exists()
 

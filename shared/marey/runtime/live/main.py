@@ -14,11 +14,11 @@ from marey.db import create_engine
 from marey.jobs import WorkerHeartbeat
 from marey.registry import resolve
 from marey.runtime.child import wait_for_database
-from marey.runtime.exposition import expose
 from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import LiveModelFactory
 from marey.runtime.live.supervisor import StreamSupervisor
 from marey.runtime.logs import configure_logging, logger
+from marey.runtime.metrics_endpoint import expose
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import StatusReporter

@@ -17,13 +17,13 @@ from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.db import transaction
 from marey.items.constraints import POSE_KEYFRAME
 from marey.jobs import FailureReason, NewItem, WorkerHeartbeat, beat, retire
-from marey.runtime.exposition import measure_gpu
 from marey.runtime.faults import as_problem, retry_unreachable
 from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.loop import LiveLoop, StreamFinished
 from marey.runtime.live.parsing import PromptParsing, StartingStream
 from marey.runtime.live.port import Parse, SessionPool
 from marey.runtime.logs import logger
+from marey.runtime.metrics_endpoint import measure_gpu
 from marey.streams import StreamPast, StreamRow, StreamState, add_chunk, end_stream, open_streams, take_stream
 from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.notifier import StreamNotifier

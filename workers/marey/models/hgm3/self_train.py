@@ -28,7 +28,7 @@ from marey.selector.matching import Step, WantedAction, side_of
 from marey.selector.records import match_steps
 from marey.selector.rules import RULES
 from marey.text.pipeline import TextPipeline
-from marey.training.drawn import Drawn, DrawnMotion
+from marey.training.generated_clips import Drawn, DrawnMotion
 from marey.vocabulary.entries import load_vocabulary
 
 ACTS = {1: 0.6, 2: 0.3, 3: 0.1}

@@ -14,7 +14,7 @@ from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.stage_residual import ResidualStage, length_stage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.nn.devices import choose_device
-from marey.training.drawn import load_drawn
+from marey.training.generated_clips import load_drawn
 from marey.training.loop import start_process_group
 from marey.training.motions import MotionData, check_layout, load_tokens
 from marey.training.staging import TrainOptions, finish, fit_micro_batch, train_all, use_threads

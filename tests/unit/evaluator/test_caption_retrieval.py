@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.evaluator.scores import EmbeddedSplit, retrieval_scores
+from marey.evaluator.caption_retrieval import EmbeddedSplit, retrieval_scores
 
 
 def split(clips: int, labels: np.ndarray, seed: int = 0, noise: float = 0.0) -> EmbeddedSplit:

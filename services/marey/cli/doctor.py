@@ -10,13 +10,13 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from marey.cli.findings import Finding, broken, free_space
+from marey.cli.doctor_findings import Finding, broken, free_space
 from marey.core.errors import MareyError
 from marey.core.private_home import FOLDER_MODE, is_open
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
-    from marey.client.place import Server
+    from marey.client.server_address import Server
     from marey.core.settings import Settings
 
 ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
@@ -41,7 +41,7 @@ def check_all() -> Iterator[Finding]:
             yield broken("settings", error)
             return  # all that follows needs them
     if _installed("fastapi"):
-        from marey.cli.checkup_backing import check_backing
+        from marey.cli.doctor_servers import check_backing
 
         yield from check_backing()
     if _installed("pydantic_settings") and _installed("safetensors"):
@@ -65,7 +65,7 @@ def _extra(name: str, package: str, commands: str) -> Finding:
 
 def _home() -> Finding:
     from marey.client.fetching import check_folder
-    from marey.client.place import home
+    from marey.client.server_address import home
 
     folder = home()
     with contextlib.suppress(OSError):  # the check reports the reason
@@ -82,8 +82,8 @@ def _home() -> Finding:
 
 def _server() -> Finding:
     from marey.client import Client
-    from marey.client.foreign import NoAnswer
-    from marey.client.place import find_server
+    from marey.client.foreign_answers import NoAnswer
+    from marey.client.server_address import find_server
     from marey.core.errors import Unreachable
 
     try:
@@ -102,7 +102,7 @@ def _server() -> Finding:
 
 def _stalled(server: Server) -> Finding | None:
     """Name the part that stalls of a server that accepts connections and does not answer; None for another error."""
-    from marey.client.foreign import NoAnswer
+    from marey.client.foreign_answers import NoAnswer
     from marey.client.health import OK, health_status
     from marey.core.errors import Unreachable
 

@@ -12,9 +12,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from marey.training.budget import Budget
+from marey.training.cuda_graphs import tensors_of
 from marey.training.loop import RunOptions, train
 from marey.training.optimisation import StageConfig
-from marey.training.recorded import tensors_of
 from marey.training.stages import RecordableStage, StepContext
 
 

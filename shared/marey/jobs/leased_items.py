@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from marey.db.sql import CLOCK, among
 from marey.jobs import tables
 from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, returned
-from marey.jobs.leases import Committed
+from marey.jobs.lease_types import Committed
 from marey.jobs.states import Cause, ItemState
 from marey.jobs.types import FailureReason
 

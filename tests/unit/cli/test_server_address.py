@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.client.place import Server, find_server
+from marey.client.server_address import Server, find_server
 from marey.core.errors import InvalidFile, Unauthenticated, Unreachable
 
 URL = "https://marey.example.com"

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.cli.database import engine_of, settings_here
-from marey.cli.findings import Finding, broken, free_space
+from marey.cli.doctor_findings import Finding, broken, free_space
 from marey.cli.ports import try_port
-from marey.client.place import read_server
+from marey.client.server_address import read_server
 from marey.core.errors import MareyError, Unreachable
 
 if TYPE_CHECKING:
