@@ -79,8 +79,8 @@ class TextSpec(_Frozen):
     """Ours: a prompt of several actions is read as its actions in order ("before bowing, she walks" as "she walks, and
     then a person is bowing")."""
     plain_action: bool = False
-    """Ours: the one action that a prompt asks for is said first in plain words ("just a normal walk" is read as "a person
-    walks, just a normal walk")."""
+    """Ours: the one action that a prompt asks for is said first in plain words ("The waiter takes a bow" is read as
+    "a person bows, the waiter takes a bow")."""
     split_actions: bool = True
     """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
 

@@ -1,8 +1,8 @@
 """The action that a prompt asks for, said first in plain words (ours).
 
-A model that learned an action from a few takes knows few of the ways to ask for it: "just a normal walk please" and "the
-waiter takes a bow" are further from its captions than "a person walks" and "a person bows". What else the prompt says
-stays behind the plain words.
+A model that learned an action from a few takes knows few of the ways to ask for it: "two slow steps of a stroll" and
+"the waiter takes a bow" are further from its captions than "a person walks" and "a person bows". What else the prompt
+says stays behind the plain words.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from marey.vocabulary.scope import ActionLists, match_scope
 VERSION = 1
 """Raise it when the same prompt and vocabulary give other words."""
 MOST_WORDS = 20
-"""Longer prompts describe a movement part by part; the actions that they name are often none that the whole shows."""
-STANDING = "idle"
-"""Said beside most other actions: "stands and waves"."""
+"""Longer prompts tell a movement part by part: three of ten that name one action ask for another."""
+STANDING, TURNING = "idle", "turn"
+"""Said beside other actions: "stands and waves". A gait in a curve: "walks and turns the corner"."""
 
 
 def with_plain_action(prompt: str) -> str:
-    """Return the prompt behind its action in plain words: "a person walks, just a normal walk please".
+    """Return the prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
-    As written, where its words name no action, several, or one in doubt, deny something, or are more than `MOST_WORDS`.
+    As written, where its words name no action, several, or one in doubt, or are more than `MOST_WORDS`.
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -41,14 +41,16 @@ def _only_action(prompt: str) -> str | None:
     if len(prompt.split()) > MOST_WORDS:
         return None
     scope = match_scope(prompt, _every_action())
-    if scope.left is not None or "negation" in scope.flags:
+    if scope.left is not None:
         return None
     names = {each.action for each in scope.actions}
     if len(names) > 1:
         names.discard(STANDING)
-    implied = {implied for name in names if name for implied in load_vocabulary().need(name).implies}
-    left = names - implied
-    return left.pop() if len(left) == 1 else None
+    actions = [load_vocabulary().need(name) for name in names if name is not None]
+    names.difference_update(*(action.implies for action in actions))
+    if TURNING in names:
+        names.difference_update(action.id for action in actions if action.in_place and action.id != TURNING)
+    return names.pop() if len(names) == 1 else None
 
 
 def _lowered(prompt: str) -> str:

@@ -21,7 +21,19 @@ _FILE = Path(__file__).with_name("vocabulary.toml")
 FLIGHT_SECONDS = 0.3
 """Longest flight of an action that states none."""
 
-_FIELDS = {"definition", "verbs", "nouns", "near", "implies", "kind_of", "support", "sided", "flight_s", "in_place", "plain"}
+_FIELDS = {
+    "definition",
+    "verbs",
+    "nouns",
+    "near",
+    "implies",
+    "kind_of",
+    "support",
+    "sided",
+    "flight_s",
+    "in_place",
+    "plain",
+}
 
 
 @dataclass(frozen=True)

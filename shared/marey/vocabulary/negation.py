@@ -33,7 +33,7 @@ _WITHIN = 4
 _OF_VERBS = frozenset(["never", "neither", "nor", "almost", "nearly"])
 """Before these forms in -s are verbs, elsewhere plurals: "no jumps"."""
 _NEVER_ENDING = frozenset(["stop", "cease", "quit", "pause", "help", "finish", "end"])
-"""What is not ended goes on: "can't stop laughing"."""
+"""Not ended, an action goes on: "can't stop laughing"."""
 _EXCEPT = frozenset(["except", "excluding", "minus"])
 _SOUGHT = frozenset(["until", "till", "before"])
 """Behind these stands what comes first: "doesn't sit down until he has bowed" has both."""

@@ -1,4 +1,4 @@
-"""What an estimate is based on, in words."""
+"""Words for what an estimate is based on."""
 
 from __future__ import annotations
 

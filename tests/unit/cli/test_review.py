@@ -1,4 +1,4 @@
-"""What stands beside motions on the pages of `marey review`."""
+"""Texts beside motions on the pages of `marey review`."""
 
 from __future__ import annotations
 

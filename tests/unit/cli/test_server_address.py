@@ -55,16 +55,16 @@ def test_a_server_that_is_starting_is_told_from_none(tmp_path: Path, monkeypatch
     monkeypatch.delenv("MAREY_SERVER")
     monkeypatch.setenv("MAREY_HOME", str(tmp_path))
 
-    def told() -> str:
+    def message() -> str:
         with pytest.raises(Unreachable) as raised:
             find_server()
         return str(raised.value)
 
-    assert "no server is running here" in told()
+    assert "no server is running here" in message()
     (tmp_path / "lock").write_text(json.dumps({"pid": os.getpid()}))
-    assert "the server here is starting, or stopping" in told()
+    assert "the server here is starting, or stopping" in message()
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
     for left in (json.dumps({"pid": ended.pid}), "", "[]", '{"pid": "x"}'):
         (tmp_path / "lock").write_text(left)
-        assert "no server is running here" in told()
+        assert "no server is running here" in message()

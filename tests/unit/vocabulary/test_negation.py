@@ -1,4 +1,4 @@
-"""What prompts say is not done."""
+"""Reading of what prompts say is not done."""
 
 import pytest
 

@@ -129,8 +129,8 @@ class HGM3Config(ModelConfig):
     residual: TransformerConfig = TransformerConfig()
     in_order: bool = False  # ours: prompts of several actions are read in the order of time (`TextSpec.in_order`)
     plain_action: bool = field(default=False, metadata=ADDED)
-    """Ours: the action that a prompt asks for is said first in plain words (`TextSpec.plain_action`); captions are learned as
-    they are."""
+    """Ours: the action that a prompt asks for is said first in plain words (`TextSpec.plain_action`); captions are
+    learned as they are."""
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     phases: Count = field(default=4, metadata=ADDED)
