@@ -24,7 +24,8 @@ STANDING, TURNING = "idle", "turn"
 def with_plain_action(prompt: str) -> str:
     """Return the prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
-    As written, where its words name no action, several, or one in doubt, or are more than `MOST_WORDS`.
+    As written, where its words name no action, several, or one in doubt, are more than `MOST_WORDS`, or have the plain
+    ones.
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -33,7 +34,8 @@ def with_plain_action(prompt: str) -> str:
     if action is None:
         return prompt
     verb, *rest = load_vocabulary().need(action).plain.split()
-    return f"{' '.join(['a person', third_person(verb), *rest])}, {_lowered(prompt)}"
+    plain = " ".join(["a person", third_person(verb), *rest])
+    return prompt if plain in prompt.lower() else f"{plain}, {_lowered(prompt)}"
 
 
 def _only_action(prompt: str) -> str | None:

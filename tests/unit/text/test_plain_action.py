@@ -39,6 +39,7 @@ def test_it_comes_before_the_prompt(prompt: str, read: str) -> None:
 @pytest.mark.parametrize(
     "prompt",
     [
+        "A person bows twice",  # plain as it is
         "she bows and then waves",  # several
         "the dog barks",  # none
         "qwe rty",
