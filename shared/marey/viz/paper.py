@@ -38,7 +38,7 @@ PLAIN = {
     "þ": "th",
     "ı": "i",
 }
-"""What stands for letters that the font does not have and that are no letter with an accent."""  # fmt: skip
+"""Letters in place of those that the font does not have and that are no letter with an accent."""  # fmt: skip
 
 
 @dataclass(frozen=True)

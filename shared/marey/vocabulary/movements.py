@@ -55,7 +55,7 @@ class _Slot:
 
 @dataclass(frozen=True)
 class Movement:
-    """What the parts of the body do in an action, in its order.
+    """Movements of the parts of the body in an action, in its order.
 
     Attributes:
         needs: words of which the prompt has one; empty: none is needed.
