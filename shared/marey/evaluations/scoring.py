@@ -23,8 +23,8 @@ from marey.evaluations.types import (
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.jobs import tables as job_tables
 from marey.jobs.journal import NewEvent, record
+from marey.jobs.lease_rows import LeasedItems, document, drop_empty_lease, end_items, lock_lease
 from marey.jobs.lease_types import AssetDigest, Committed
-from marey.jobs.leased_items import LeasedItems, document, drop_empty_lease, end_items, lock_lease
 from marey.jobs.results import store_assets
 from marey.jobs.states import Cause, ItemState
 from marey.jobs.types import FailureReason

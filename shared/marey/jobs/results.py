@@ -15,8 +15,8 @@ from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among, interval
 from marey.jobs import tables
 from marey.jobs.journal import LaneChange, LockedJob, NewEvent, change_lanes, record, returned
+from marey.jobs.lease_rows import LeasedItem, document, drop_empty_lease, end_dead, end_items, give_back, lock_lease
 from marey.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
-from marey.jobs.leased_items import LeasedItem, document, drop_empty_lease, end_dead, end_items, give_back, lock_lease
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemStage, ItemState

@@ -12,8 +12,8 @@ from marey.db.deadlines import BULK
 from marey.db.sql import CLOCK, interval
 from marey.jobs import tables
 from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, record, returned
+from marey.jobs.lease_rows import drop_empty_lease, end_dead, give_back, lock_leased_items
 from marey.jobs.lease_types import SweepReport
-from marey.jobs.leased_items import drop_empty_lease, end_dead, give_back, lock_leased_items
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemState

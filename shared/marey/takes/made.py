@@ -16,7 +16,7 @@ from marey.db.deadlines import HEARTBEAT, MAINTENANCE
 from marey.db.sql import CLOCK, among, interval
 from marey.exporters.registry import CANONICAL
 from marey.jobs import tables
-from marey.jobs.leased_items import document
+from marey.jobs.lease_rows import document
 from marey.jobs.types import FailureReason, MotionFile
 from marey.takes.assets import ContentStore, keep_content, write_content
 from marey.takes.gc import ObjectStore, remove_assets

@@ -56,9 +56,10 @@ def _only_action(prompt: str) -> str | None:
 
 
 def _lowered(prompt: str) -> str:
-    """Return a prompt as it stands inside a sentence: "The waiter" with a small letter, "I" and "NPC" as they are."""
+    """Return a prompt as it stands inside a sentence: "The waiter" with a small letter, "I'm" and "NPC" as they are."""
     first = prompt.split(maxsplit=1)[0]
-    return prompt if first[1:2].isupper() or not first[1:2].isalpha() else prompt[:1].lower() + prompt[1:]
+    small = first == "A" or (first[1:2].isalpha() and not first[1:2].isupper())
+    return prompt[:1].lower() + prompt[1:] if small else prompt
 
 
 @lru_cache(maxsize=1)
