@@ -12,8 +12,7 @@ from marey.checks.scope_prompts import IN_SCOPE, Matcher, ScopeRate, ScopeSet, s
 from marey.text import meaning
 from marey.text.loading import load_encoder
 from marey.text.meaning import MeaningJudge
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 
 SETS: tuple[ScopeSet, ...] = ("development", "meaning", "test")
 LIMITS = (0.0, 0.4, 0.45, 0.5, 0.54, 0.57, 0.6, 0.64, 0.7)
@@ -45,7 +44,7 @@ def shares(rates: Sequence[ScopeRate]) -> tuple[float, float]:
 def report(which: ScopeSet, match: Matcher) -> None:
     """Print the tables of one set."""
     prompts = scope_prompts(which)
-    all_actions = ActionLists(tuple(load_vocabulary().actions))
+    all_actions = every_action()
     few = find_bundle("hgm3-starter", verify=False).manifest.actions
     assert few is not None
     print(f"{which}: {len(prompts)} prompts\n| class | prompts | words | encoder | starter, words | starter, encoder |")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from marey.quality.record import Flag, MotionQuality
 from marey.vocabulary.entries import FLIGHT_SECONDS, Support, load_vocabulary
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,8 +57,7 @@ def expected_of(actions: Iterable[str]) -> Expected:
 
 def expected_by_prompts(prompts: Iterable[str]) -> Expected:
     """Return what the actions promise that the words of prompts name."""
-    every = ActionLists(supported=tuple(load_vocabulary().actions))
-    named = (action.action for prompt in prompts for action in match_scope(prompt, every).actions)
+    named = (action.action for prompt in prompts for action in match_scope(prompt, every_action()).actions)
     return expected_of(name for name in named if name is not None)
 
 

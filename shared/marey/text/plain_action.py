@@ -7,11 +7,9 @@ says stays behind the plain words.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import third_person
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 
 VERSION = 1
 """Raise it when the same prompt and vocabulary give other words."""
@@ -42,7 +40,7 @@ def _only_action(prompt: str) -> str | None:
     """Return the id of the one action that a prompt asks for; None = none, several, or in doubt."""
     if len(prompt.split()) > MOST_WORDS:
         return None
-    scope = match_scope(prompt, _every_action())
+    scope = match_scope(prompt, every_action())
     if scope.left is not None:
         return None
     names = {each.action for each in scope.actions}
@@ -60,8 +58,3 @@ def _lowered(prompt: str) -> str:
     first = prompt.split(maxsplit=1)[0]
     small = first == "A" or (first[1:2].isalpha() and not first[1:2].isupper())
     return prompt[:1].lower() + prompt[1:] if small else prompt
-
-
-@lru_cache(maxsize=1)
-def _every_action() -> ActionLists:
-    return ActionLists(tuple(load_vocabulary().actions))

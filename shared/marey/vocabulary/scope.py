@@ -262,6 +262,12 @@ def _unique(named: Iterable[NamedAction]) -> Iterator[NamedAction]:
 
 
 @lru_cache(maxsize=1)
+def every_action() -> ActionLists:
+    """Return the lists of a bundle that supports all actions: what a prompt names, whatever a model knows."""
+    return ActionLists(supported=tuple(load_vocabulary().actions))
+
+
+@lru_cache(maxsize=1)
 def _matcher() -> ScopeMatcher:
     return ScopeMatcher(load_vocabulary())
 

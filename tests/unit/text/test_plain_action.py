@@ -10,10 +10,8 @@ from marey.text.pipeline import TextPipeline
 from marey.text.plain_action import MOST_WORDS, with_plain_action
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import third_person
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 from tests.support.texts import shared_pipeline
-
-EVERY = ActionLists(tuple(load_vocabulary().actions))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +53,7 @@ def test_other_prompts_stay_as_written(prompt: str) -> None:
 @pytest.mark.parametrize("action", load_vocabulary().actions)
 def test_the_plain_words_of_an_action_name_it(action: str) -> None:
     verb, *rest = load_vocabulary().need(action).plain.split()
-    scope = match_scope(" ".join(["a person", third_person(verb), *rest]), EVERY)
+    scope = match_scope(" ".join(["a person", third_person(verb), *rest]), every_action())
     assert [each.action for each in scope.actions] == [action]
 
 

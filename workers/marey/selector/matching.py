@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 from marey.selector.gaits import circle
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 
 LEAST_PART = 0.5
 """Seconds that each action of several needs."""
@@ -77,7 +76,7 @@ def wanted_by_meaning(scope: Mapping[str, Any] | None) -> tuple[Step, ...] | Non
 
 
 def _step(sentence: str) -> Step | None:
-    scope = match_scope(sentence, _every())
+    scope = match_scope(sentence, every_action())
     if "negation" in scope.flags and "no-action" in scope.flags:
         return ()
     named = [each.action for each in scope.actions if each.verdict == "known" and each.action in RULES]
@@ -107,11 +106,6 @@ def side_of(sentence: str) -> str:
     """Return the side that a sentence names (`left`, `right`, `both`); empty if it names none, or several."""
     sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
     return sides.pop() if len(sides) == 1 else ""
-
-
-@lru_cache(maxsize=1)
-def _every() -> ActionLists:
-    return ActionLists(supported=tuple(load_vocabulary().actions))
 
 
 def match(motion: Motion, steps: Sequence[Step]) -> float:

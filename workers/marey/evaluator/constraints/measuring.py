@@ -17,8 +17,7 @@ from marey.quality.record import read_quality
 from marey.referee import Body
 from marey.referee.rules import RULES
 from marey.referee.sequences import shows_in_order
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import every_action, match_scope
 
 MOST_SKATE, MOST_JERK, MOST_LOST = 1.2, 1.25, 5.0
 """Bars: skate and jerk beside those without constraints, and points of adherence that are lost."""
@@ -100,8 +99,7 @@ def _skate(clip: MotionClip) -> float:
 
 def judged_actions(prompt: str) -> list[str]:
     """Return the actions that a prompt names; none if one of them has no rule of the referee."""
-    every = ActionLists(supported=tuple(load_vocabulary().actions))
-    named = [action.action for action in match_scope(prompt, every).actions]
+    named = [action.action for action in match_scope(prompt, every_action()).actions]
     known = [name for name in named if name is not None and name in RULES]
     return known if len(known) == len(named) else []
 
