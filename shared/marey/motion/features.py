@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput, NotFound
 from marey.motion.filters import smooth
 from marey.motion.kinematics import across, facing, mirror_joints
+from marey.motion.mirrored_features import mirror_features
 from marey.motion.rig_features import SNAPMOGEN_296
 from marey.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
 from marey.motion.skeleton import HUMANML3D, KIT, Skeleton
@@ -77,6 +78,10 @@ class FeatureLayout(Protocol):
 
     def mirror_joints(self, joints: Array) -> Array:
         """Mirror a motion (..., J, 3): exchange left and right."""
+        ...
+
+    def mirror(self, features: Float32) -> Float32:
+        """Mirror features (..., Tf, D): exchange left and right."""
         ...
 
     def with_offsets(self, offsets: Array) -> FeatureLayout:
@@ -299,6 +304,10 @@ class HeadingLayout:
     def mirror_joints(self, joints: Array) -> Array:
         """See `mirror_joints`."""
         return mirror_joints(joints, self.skeleton)
+
+    def mirror(self, features: Float32) -> Float32:
+        """See `mirror_features`."""
+        return mirror_features(features, self.slices, self.skeleton)
 
 
 LEAST_ACROSS = 0.5  # of the line from left to right that lies in the floor plane

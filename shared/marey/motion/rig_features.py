@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.motion.filters import smooth
 from marey.motion.kinematics import UP, forward_kinematics, global_rotations, local_rotations, mirror_joints
+from marey.motion.mirrored_features import mirror_features
 from marey.motion.pose import solve_pose
 from marey.motion.rotations import (
     Array,
@@ -216,6 +217,10 @@ class RigLayout:
     def mirror_joints(self, joints: Array) -> Array:
         """See `mirror_joints`."""
         return mirror_joints(joints, self.skeleton)
+
+    def mirror(self, features: Float32) -> Float32:
+        """See `mirror_features`."""
+        return mirror_features(features, self.slices, self.skeleton)
 
 
 def _floor(heights: Array) -> float:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from marey.generation import candidates
 from marey.generation.candidates import DrawPlan, best_clips, candidate_seed, split_settings
 from marey.generation.port import Request
+from marey.generation.shots.windows import no_text
 from marey.items.values import MAX_SEED
 from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.quality.selection import read_selection
@@ -104,7 +105,7 @@ def choose(
 
     monkeypatch.setattr(candidates, "finish", finish)
     generator = FakeGenerator()
-    requests = [Request(None, seed) for seed in seeds]  # type: ignore[arg-type]
+    requests = [Request(no_text(4), seed) for seed in seeds]
     return best_clips(generator, requests, None, plan, control=control), generator  # type: ignore[arg-type]
 
 
@@ -167,5 +168,7 @@ def test_candidates_have_the_length_of_the_first(monkeypatch: pytest.MonkeyPatch
             return super().generate(requests, settings, control=control)
 
     monkeypatch.setattr(candidates, "finish", lambda *_, **__: FakeClip({}))
-    best_clips(Lengths(), [Request(None, 1), replace(Request(None, 2), frames=60)], None, DrawPlan(best_of=2))  # type: ignore[arg-type]
+    best_clips(
+        Lengths(), [Request(no_text(4), 1), replace(Request(no_text(4), 2), frames=60)], None, DrawPlan(best_of=2)
+    )  # type: ignore[arg-type]
     assert asked == [None, 60, 40, 60]

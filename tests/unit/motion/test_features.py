@@ -199,6 +199,14 @@ def test_features_of_the_mirrored_motion_turn_the_other_way():
     np.testing.assert_array_equal(b[:, 259:], a[:, [261, 262, 259, 260]])
 
 
+@pytest.mark.parametrize("each", HEADING, ids=lambda each: each.name)
+def test_mirrored_features_are_those_of_the_mirrored_motion(each: FeatureLayout):
+    joints = dance(each.skeleton, turns=0.5)
+    features = each.encode(joints)
+    np.testing.assert_allclose(each.mirror(features), each.encode(each.mirror_joints(joints)), rtol=1e-4, atol=1e-4)
+    np.testing.assert_array_equal(each.mirror(each.mirror(features)), features)
+
+
 def test_decode_takes_batches():
     batch = np.stack([HUMANML3D_263.encode(dance(seed=s)) for s in range(3)])
     together = HUMANML3D_263.decode(batch)

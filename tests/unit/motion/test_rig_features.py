@@ -187,6 +187,13 @@ def test_the_mirrored_motion_turns_the_other_way():
     np.testing.assert_array_equal(b[:, 292:], a[:, [294, 295, 292, 293]])
 
 
+def test_mirrored_features_are_those_of_the_mirrored_motion():
+    pose = rigged(1, 50, 0.5)
+    features = SNAPMOGEN_296.encode_pose(*pose)
+    np.testing.assert_allclose(SNAPMOGEN_296.mirror(features), SNAPMOGEN_296.encode_pose(*mirrored(*pose)), atol=2e-2)
+    np.testing.assert_array_equal(SNAPMOGEN_296.mirror(SNAPMOGEN_296.mirror(features)), features)
+
+
 def test_joints_are_encoded_by_a_solved_pose():
     rotations, root = rigged(2, 40)
     rotations[:, [0, 15]] = [1, 0, 0, 0]  # no positions tell the root from the pelvis, which lies in the same place

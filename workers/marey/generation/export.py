@@ -7,6 +7,7 @@ from typing import Any
 
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
+from marey.generation.sides import MirroredMotion
 from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import QUALITY, MotionClip
@@ -69,7 +70,8 @@ def finish(
         clean: lock feet in contact.
     """
     body = body or standard_body(generator.layout.skeleton)
-    manifest = {**manifest_of(generator, request, settings), CLEANED: clean, "body": body.describe()}
+    mirrored = {"mirrored": True} if isinstance(generated, MirroredMotion) else {}
+    manifest = {**manifest_of(generator, request, settings), **mirrored, CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
     return judged(clip, request)
 

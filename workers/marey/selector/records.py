@@ -9,8 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from marey.motion.clip import MotionClip
-from marey.motion.skeleton import HUMANML3D
+from marey.motion.skeleton import HUMANML3D, Skeleton
 from marey.quality.record import PromptMatch
 from marey.selector.matching import Step, match, wanted_by_meaning, wanted_of
 from marey.selector.motion import SHORTEST, Motion
@@ -42,12 +45,20 @@ def match_of(
 def match_steps(clip: MotionClip, steps: Sequence[Step] | None, *, frames: slice = EVERY) -> PromptMatch:
     """Match a clip with actions in their order; the value is null without rules for them, on other skeletons than that
     of 22 joints, and under 8 frames."""
-    joints = clip.joints[frames]
-    if not steps or clip.skeleton.name != HUMANML3D.name or len(joints) < SHORTEST:
+    value = match_joints(clip.joints[frames], clip.skeleton, clip.fps, steps)
+    if not steps or value is None:
         return PromptMatch()
-    value = match(Motion(joints, clip.fps), steps)
     single = steps[0][0].action if len(steps) == 1 and len(steps[0]) == 1 else None
     return PromptMatch(value=value, percentile=None if single is None else percentile(single, value))
+
+
+def match_joints(
+    joints: NDArray[np.floating], skeleton: Skeleton, fps: float, steps: Sequence[Step] | None
+) -> float | None:
+    """Match joints (T, J, 3), metres, with actions in their order, 0 to 1; None as of `match_steps`."""
+    if not steps or skeleton.name != HUMANML3D.name or len(joints) < SHORTEST:
+        return None
+    return match(Motion(joints, fps), steps)
 
 
 def percentile(action: str, value: float) -> int | None:

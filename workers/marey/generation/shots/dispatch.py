@@ -9,6 +9,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.timelines import check_timelines, generate_timelines
+from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText
 from marey.items.timeline import TimelineRow
 from marey.text.features import TextFeatures
@@ -73,7 +74,7 @@ def generate_any(
     """
     timed = [row for row, request in enumerate(requests) if request.timeline is not None]
     if not timed:
-        return list(generator.generate(requests, settings, control=control))
+        return generate_sided(generator, requests, settings, control=control)
     plain = [row for row, request in enumerate(requests) if request.timeline is None]
     made: list[MotionFeatures | None] = [None] * len(requests)
 
@@ -85,7 +86,7 @@ def generate_any(
         return PassControl(control or NoControl(), rows, before, len(requests))
 
     if plain:
-        keep(plain, generator.generate([requests[row] for row in plain], settings, control=watched(plain, 0)))
+        keep(plain, generate_sided(generator, [requests[row] for row in plain], settings, control=watched(plain, 0)))
     several = [requests[row] for row in timed]
     keep(timed, generate_timelines(generator, several, settings, control=watched(timed, len(plain))))
     return made

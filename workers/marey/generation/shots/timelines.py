@@ -19,6 +19,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
+from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.text.features import TextFeatures
@@ -285,7 +286,7 @@ class _Windows:
         self._done = 0
 
         def first(rows: Sequence[_Row], watched: GenerationControl) -> list[Window | None]:
-            made = generator.generate([row.request() for row in rows], settings, control=watched)
+            made = generate_sided(generator, [row.request() for row in rows], settings, control=watched)
             return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
 
         def following(strands: Sequence[_Row | _Transition], watched: GenerationControl) -> list[Window | None]:
