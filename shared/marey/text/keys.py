@@ -8,6 +8,7 @@ import json
 from marey.bundles import TextSpec, find_bundle
 from marey.core.errors import InvalidBundle
 from marey.core.settings import Settings, settings
+from marey.text.action_reader import reader_sha256
 from marey.text.plain_action import VERSION as PLAIN_ACTION_VERSION
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import VERSION, ActionLists
@@ -48,7 +49,7 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
         [spec.max_actions, spec.max_specifics, spec.in_order],
     ]
     if spec.plain_action:
-        parts.append(["plain_action", PLAIN_ACTION_VERSION, load_vocabulary().sha256])
+        parts.append(["plain_action", PLAIN_ACTION_VERSION, load_vocabulary().sha256, reader_sha256()])
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
+from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
@@ -26,7 +27,7 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.plain_action import with_plain_action
+from marey.text.plain_action import only_action, with_plain_action
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.words import EDGE_PUNCTUATION
@@ -108,7 +109,7 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        worded = self._worded(rewritten)
+        worded = self._worded([each.text for each in rewritten])
         graphs = [graph for graph, _ in self._read(worded)]
         return [
             ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, rewrite, text, graph), self._warnings(graph))
@@ -176,15 +177,24 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        read = self._read(self._worded(rewritten))
+        read = self._read(self._worded([each.text for each in rewritten]))
         return [
             replace(self._features(prompt, graph, actions), not_rewritten=rewrite.refused, seconds=rewrite.seconds)
             for prompt, rewrite, (graph, actions) in zip(checked, rewritten, read, strict=True)
         ]
 
-    def _worded(self, rewritten: Sequence[Rewrite]) -> list[str]:
+    def _worded(self, texts: Sequence[str]) -> list[str]:
         """Return the texts that are read: with `TextSpec.plain_action`, behind their action in plain words."""
-        return [with_plain_action(each.text) if self.spec.plain_action else each.text for each in rewritten]
+        if not self.spec.plain_action:
+            return list(texts)
+        return [with_plain_action(text, action) for text, action in zip(texts, self._asked(texts), strict=True)]
+
+    def _asked(self, texts: Sequence[str]) -> list[str | None]:
+        """Return the one action that each text asks for: by the reader of the encoder, or else by the words."""
+        reader = action_reader()
+        if reader.encoder_sha256 != self.encoder.sha256:
+            return [only_action(text) for text in texts]
+        return [reader.read(text, vector).action for text, vector in zip(texts, self.pooled(texts), strict=True)]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of

@@ -8,36 +8,34 @@ says stays behind the plain words.
 from __future__ import annotations
 
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import every_action, match_scope
 
-VERSION = 1
-"""Raise it when the same prompt and vocabulary give other words."""
+VERSION = 2
+"""Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
-"""Longer prompts tell a movement part by part: three of ten that name one action ask for another."""
+"""Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
 STANDING, TURNING = "idle", "turn"
 """Said beside other actions: "stands and waves". A gait in a curve: "walks and turns the corner"."""
 
 
-def with_plain_action(prompt: str) -> str:
-    """Return the prompt behind its action in plain words: "a person bows, the waiter takes a bow".
+def with_plain_action(prompt: str, action: str | None) -> str:
+    """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
-    As written, where its words name no action, several, or one in doubt, are more than `MOST_WORDS`, or have the plain
-    ones.
+    As written where it has the plain words, or no action is known that it asks for.
 
     Args:
         prompt: as `check_prompt` returns it.
+        action: id of the one action that it asks for; None = several, none, or in doubt.
     """
-    action = _only_action(prompt)
     if action is None:
         return prompt
-    verb, *rest = load_vocabulary().need(action).plain.split()
-    plain = " ".join(["a person", third_person(verb), *rest])
+    plain = load_vocabulary().need(action).plain_words
     return prompt if plain in prompt.lower() else f"{plain}, {_lowered(prompt)}"
 
 
-def _only_action(prompt: str) -> str | None:
-    """Return the id of the one action that a prompt asks for; None = none, several, or in doubt."""
+def only_action(prompt: str) -> str | None:
+    """Return the id of the one action that the words of a prompt ask for; None = several, none, or in doubt. For
+    encoders that `marey.text.action_reader` does not read."""
     if len(prompt.split()) > MOST_WORDS:
         return None
     scope = match_scope(prompt, every_action())

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from marey.core.errors import InvalidFile, NotFound
+from marey.vocabulary.inflection import third_person
 
 Support = Literal["feet", "seat", "hands", "whole-body", "raised", "none"]
 """Part of the body that rests on something; `raised`: on something over the floor, `none`: on nothing."""
@@ -68,6 +69,12 @@ class Action:
     kind_of: str = ""
     sided: Sided = ""
 
+    @property
+    def plain_words(self) -> str:
+        """Return the plain phrase as a sentence: "a person waves a hand"."""
+        verb, *rest = self.plain.split()
+        return " ".join(["a person", third_person(verb), *rest])
+
 
 @dataclass(frozen=True)
 class Vocabulary:
@@ -86,6 +93,15 @@ class Vocabulary:
         if action is None:
             raise NotFound(f"unknown action {name!r}", hint=f"Known: {', '.join(self.actions)}.")
         return action
+
+    def said_first(self, text: str) -> str | None:
+        """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
+        words, comma, _ = text.partition(", ")
+        return self._plain.get(words.lower()) if comma else None
+
+    @cached_property
+    def _plain(self) -> dict[str, str]:
+        return {action.plain_words: action.id for action in self.actions.values()}
 
     @cached_property
     def _implied(self) -> dict[str, frozenset[str]]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from marey.bundles import TextSpec
+from marey.text.action_reader import action_reader
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
-from marey.text.plain_action import MOST_WORDS, with_plain_action
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.inflection import third_person
-from marey.vocabulary.scope import every_action, match_scope
+from marey.text.plain_action import MOST_WORDS, only_action, with_plain_action
+from marey.vocabulary.entries import Action, load_vocabulary
 from tests.support.texts import shared_pipeline
 
 
@@ -20,41 +19,45 @@ def pipeline() -> TextPipeline:
 
 
 @pytest.mark.parametrize(
-    ("prompt", "read"),
+    ("prompt", "action", "read"),
     [
-        ("The waiter takes a bow.", "a person bows, the waiter takes a bow."),
-        ("jog", "a person runs, jog"),
-        ("NPC waves twice with the left hand", "a person waves a hand, NPC waves twice with the left hand"),
-        ("A yogi stands in tree pose", "a person balances on one leg, a yogi stands in tree pose"),
-        ("I bow", "a person bows, I bow"),
-        ("he walks and turns a corner", "a person turns, he walks and turns a corner"),
-        ("He walks slowly, no running", "a person walks, he walks slowly, no running"),
+        ("The waiter takes a bow.", "bow", "a person bows, the waiter takes a bow."),
+        ("jog", "run", "a person runs, jog"),
+        ("NPC kicks twice", "kick", "a person kicks, NPC kicks twice"),
+        ("A goblin hunkers low", "crouch", "a person crouches, a goblin hunkers low"),
+        ("I bow", "bow", "a person bows, I bow"),
+        ("A person bows twice", "bow", "A person bows twice"),  # plain as it is
+        ("she bows and then waves", None, "she bows and then waves"),
     ],
 )
-def test_it_comes_before_the_prompt(prompt: str, read: str) -> None:
-    assert with_plain_action(prompt) == read
+def test_it_comes_before_the_prompt(prompt: str, action: str | None, read: str) -> None:
+    assert with_plain_action(prompt, action) == read
 
 
 @pytest.mark.parametrize(
-    "prompt",
+    ("prompt", "action"),
     [
-        "A person bows twice",  # plain as it is
-        "she bows and then waves",  # several
-        "the dog barks",  # none
-        "qwe rty",
-        "he doesn't run",  # not to be done
-        "walk " + "very " * MOST_WORDS + "slowly",  # long
+        ("The waiter takes a bow.", "bow"),
+        ("A yogi stands in tree pose", "balance"),
+        ("he walks and turns a corner", "turn"),
+        ("He walks slowly, no running", "walk"),
+        ("she bows and then waves", None),  # several
+        ("the dog barks", None),  # none
+        ("qwe rty", None),
+        ("he doesn't run", None),  # not to be done
+        ("walk " + "very " * MOST_WORDS + "slowly", None),  # long
     ],
 )
-def test_other_prompts_stay_as_written(prompt: str) -> None:
-    assert with_plain_action(prompt) == prompt
+def test_words_alone_name_the_action_for_encoders_without_a_reader(prompt: str, action: str | None) -> None:
+    assert only_action(prompt) == action
 
 
-@pytest.mark.parametrize("action", load_vocabulary().actions)
-def test_the_plain_words_of_an_action_name_it(action: str) -> None:
-    verb, *rest = load_vocabulary().need(action).plain.split()
-    scope = match_scope(" ".join(["a person", third_person(verb), *rest]), every_action())
-    assert [each.action for each in scope.actions] == [action]
+@pytest.mark.parametrize("action", load_vocabulary().actions.values(), ids=lambda action: action.id)
+def test_the_plain_words_of_an_action_ask_for_it(action: Action, pipeline: TextPipeline) -> None:
+    words = action.plain_words
+    assert action_reader().read(words, pipeline.pooled([words])[0]).action == action.id
+    assert load_vocabulary().said_first(with_plain_action("do it like this", action.id)) == action.id
+    assert load_vocabulary().said_first(words) is None
 
 
 def test_a_bundle_says_whether_its_prompts_are_read_so(pipeline: TextPipeline) -> None:
@@ -72,3 +75,14 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(pipeline: TextPipeline) -
 def test_a_manifest_without_it_is_that_of_earlier_releases() -> None:
     assert "plain_action" not in TextSpec().model_dump()
     assert TextSpec(plain_action=True).model_dump()["plain_action"] is True
+
+
+def test_where_the_reader_knows_another_encoder_the_words_decide(
+    pipeline: TextPipeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prompts = ["The waiter takes a bow", "A young deer hunter hunkers low in the tall grass"]
+    spec = pipeline.spec.model_copy(update={"plain_action": True})
+    plain = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+    assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "a person crouches,"]
+    monkeypatch.setattr(action_reader(), "encoder_sha256", "0" * 64)
+    assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "A young deer hunte"]

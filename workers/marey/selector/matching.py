@@ -81,6 +81,9 @@ def _step(sentence: str) -> Step | None:
         return ()
     named = [each.action for each in scope.actions if each.verdict == "known" and each.action in RULES]
     names = list(dict.fromkeys(name for name in named if name is not None))
+    first = load_vocabulary().said_first(sentence)
+    if first is not None and first in RULES:
+        names = [first]
     actions = load_vocabulary().actions
     beside = {other for name in names for other in (*actions[name].implies, actions[name].kind_of)}
     if len(names) > 1:

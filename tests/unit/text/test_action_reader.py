@@ -1,0 +1,68 @@
+"""The reader of the action that a prompt asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.core.errors import InvalidFile
+from marey.referee.prompts import development_prompts
+from marey.text.action_reader import OUTSIDE, SEVERAL, SURE, ActionReader, ReadAction, action_reader
+from marey.vocabulary.entries import load_vocabulary
+from tests.support.texts import shared_encoder, shared_pipeline
+
+
+def read(prompts: Sequence[str]) -> list[ReadAction]:
+    vectors = shared_pipeline().pooled(prompts)
+    return [action_reader().read(prompt, vector) for prompt, vector in zip(prompts, vectors, strict=True)]
+
+
+def test_it_knows_every_action_and_the_shipped_encoder() -> None:
+    assert action_reader().classes == (*load_vocabulary().actions, SEVERAL, OUTSIDE)
+    assert action_reader().encoder_sha256 == shared_encoder().sha256
+
+
+@pytest.mark.parametrize(
+    ("prompt", "action"),
+    [
+        ("A young deer hunter hunkers low in the tall grass and stays there, watching.", "crouch"),
+        ("A patient therapist stands still and moves her head up and down to show she understands.", "nod"),
+        ("Bends over at the hips to loosen up the hamstrings", "bend-over"),
+    ],
+)
+def test_it_reads_what_no_list_of_words_has(prompt: str, action: str) -> None:
+    assert read([prompt])[0].action == action
+
+
+def test_nine_of_ten_prompts_of_one_action_are_read_right() -> None:
+    prompts = development_prompts()
+    found = read([prompt.text for prompt in prompts])
+    right = sum(each.name == prompt.actions[0] for each, prompt in zip(found, prompts, strict=True))
+    wrong = sum(each.action not in (None, *prompt.actions) for each, prompt in zip(found, prompts, strict=True))
+    assert right >= 0.9 * len(prompts)
+    assert wrong <= 0.03 * len(prompts)
+
+
+def test_few_others_are_read_as_one_action() -> None:
+    several = [each.action for each in read([text for text, _ in sequence_prompts()])]
+    outside = [each.action for each in read(outside_prompts())]
+    assert sum(action is not None for action in several) <= 0.2 * len(several)
+    assert sum(action is not None for action in outside) <= 0.1 * len(outside)
+
+
+def test_in_doubt_it_names_none() -> None:
+    assert ReadAction("walk", SURE).action == "walk"
+    assert ReadAction("walk", SURE - 0.01).action is None
+    assert ReadAction(SEVERAL, 0.99).action is None
+    assert ReadAction(OUTSIDE, 0.99).action is None
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    save_file({"hidden": np.zeros((1, 1), np.float32)}, tmp_path / "other.safetensors")
+    with pytest.raises(InvalidFile, match="no reader of actions"):
+        ActionReader.load(tmp_path / "other.safetensors")

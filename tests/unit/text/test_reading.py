@@ -1,0 +1,47 @@
+"""Training of the reader of actions."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.reading import train as training
+from marey.reading.texts import LabelledText, labelled_texts
+from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
+from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
+from marey.vocabulary.entries import load_vocabulary
+from tests.support.texts import shared_encoder
+
+
+@pytest.fixture(scope="module")
+def texts() -> list[LabelledText]:
+    return labelled_texts(0)
+
+
+def test_every_class_has_texts_and_none_is_a_prompt_for_measuring(texts: list[LabelledText]) -> None:
+    by_class = defaultdict[str, set[str]](set)
+    for each in texts:
+        by_class[each.asks].add(each.text.casefold())
+    assert set(by_class) == {*load_vocabulary().actions, SEVERAL, OUTSIDE}
+    assert min(map(len, by_class.values())) >= 60
+    asked = (*action_prompts(), *development_prompts(), *studio_prompts())
+    held_out = {prompt.text.casefold() for prompt in asked} | {text.casefold() for text, _ in sequence_prompts()}
+    assert not (held_out | {text.casefold() for text in outside_prompts()}) & set().union(*by_class.values())
+    assert labelled_texts(0) == texts
+    assert labelled_texts(1) != texts
+
+
+def test_a_reader_learns_its_texts(texts: list[LabelledText], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "MEMBERS", 1)
+    some = [each for each in texts if each.asks in ("walk", "wave", OUTSIDE)][::12]
+    encoder = shared_encoder()
+    classes, weights = training.train(some, encoder, 0)
+    assert classes == [*load_vocabulary().actions, SEVERAL, OUTSIDE]
+    halves = {name: part.astype(np.float16) for name, part in weights.items()}
+    reader = ActionReader(classes, encoder.sha256, "", halves)
+    vectors = encoder.pooled([training.without_punctuation(each.text) for each in some])
+    right = [reader.read(each.text, vector).name == each.asks for each, vector in zip(some, vectors, strict=True)]
+    assert np.mean(right) > 0.9

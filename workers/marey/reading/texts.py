@@ -1,0 +1,151 @@
+"""Texts that the reader of actions learns from: sentences that ask for one action, for several, and for none.
+
+One action: the sentences of `sayings.toml`, the vocabulary's own words, and the captions of known sets whose terms
+allow commercial use. Several: two and three of these, joined, and `several.toml`. None: `outside.toml`. The authors of
+the two files saw the definitions and no prompts.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.data.caption_files import read_caption_files
+from marey.data.captions import lower_first, seeded
+from marey.data.dataset import INDEX, SETS, known_set, known_sets
+from marey.data.index import read_index
+from marey.data.spoken import SUBJECTS, all_sayings
+from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
+from marey.text.action_reader import OUTSIDE, SEVERAL
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import third_person
+
+SEQUENCES = 4000
+"""Number of texts of several actions that are made of those of single ones."""
+WRITTEN = 8.0
+"""Weight of the texts of `several.toml` and `outside.toml`."""
+LONGEST = 45
+"""Most words of them."""
+_MARKED = re.compile(r"[~=]")  # patterns for matching, no words
+_OF_THREE, _OF_ONE_SUBJECT = 0.2, 0.6
+_JOINTS = (
+    "{a}, then {b}",
+    "{a} and then {b}",
+    "{a}. Then {b}",
+    "{a}, {b}",
+    "{a} and {b}",
+    "{a} and {b}",
+    "{a} -> {b}",
+    "first {a}, then {b}",
+    "{a}; after that {b}",
+    "{a} before {b}",
+    "after {a}, {b}",
+    "{a}, followed by {b}",
+    "{a} until {b}",
+    "{a} + {b}",
+)
+
+
+@dataclass(frozen=True)
+class LabelledText:
+    """A text with what it asks for: the id of an action, `SEVERAL` or `OUTSIDE`.
+
+    Attributes:
+        weight: of the text beside others of its class. Sentences that ask for an action are most like prompts.
+    """
+
+    text: str
+    asks: str
+    weight: float
+
+
+def labelled_texts(seed: int) -> list[LabelledText]:
+    """Return all texts but those of prompts that something is measured by; joined ones by a seed."""
+    single = list(dict.fromkeys((*_of_people(), *_of_clips(), *_of_vocabulary())))
+    several = [LabelledText(text, SEVERAL, 1.0) for text in _joined(single, seed)]
+    texts = [
+        *single,
+        *several,
+        *(LabelledText(text, SEVERAL, WRITTEN) for text in _written("several")),
+        *(LabelledText(text, OUTSIDE, WRITTEN) for text in _written("outside")),
+    ]
+    held_out = _held_out()
+    return [each for each in texts if each.text.casefold() not in held_out]
+
+
+def _held_out() -> set[str]:
+    """Return the prompts by which the reader, and the motions of what it reads, are measured."""
+    asked = (*action_prompts(), *studio_prompts(), *development_prompts())
+    others = (*outside_prompts(), *(text for text, _ in sequence_prompts()))
+    return {text.casefold() for text in (*(prompt.text for prompt in asked), *others)}
+
+
+def _written(kind: str) -> list[str]:
+    return tomllib.loads(Path(__file__).with_name(f"{kind}.toml").read_text("utf-8"))[kind]
+
+
+def _of_people() -> Iterator[LabelledText]:
+    for action, sentences in all_sayings().items():
+        yield from (LabelledText(text, action, 2.0) for text in sentences)
+
+
+def _of_clips() -> Iterator[LabelledText]:
+    """Yield the captions of clips of one action."""
+    known = load_vocabulary().actions
+    for name in known_sets():
+        dataset = known_set(name)
+        if dataset.tier != "commercial" or not (SETS / name / INDEX).is_file():
+            continue
+        rows = read_index(SETS / name / INDEX, dataset.model_copy(update={"columns": {}}))
+        actions = {row.id: row.action for row in rows if row.action in known}
+        for file in read_caption_files(SETS / name, rows):
+            for clip, captions in file.captions.items():
+                if clip in actions:
+                    yield from (LabelledText(text, actions[clip], 1.0) for text in captions)
+
+
+def _of_vocabulary() -> Iterator[LabelledText]:
+    for action in load_vocabulary().actions.values():
+        for phrase in action.verbs:
+            if not _MARKED.search(phrase):
+                yield LabelledText(phrase, action.id, 0.7)
+                yield LabelledText(f"a person {_inflected(phrase)}", action.id, 0.7)
+        yield from (LabelledText(noun, action.id, 0.7) for noun in action.nouns if not _MARKED.search(noun))
+
+
+def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
+    """Yield texts of two and three different actions: whole ones joined, or verb phrases of one subject."""
+    rng = seeded("joined", str(seed))
+    by_action = defaultdict[str, list[str]](list)
+    for each in single:
+        by_action[each.asks].append(each.text)
+    verbs = {
+        action.id: [phrase for phrase in action.verbs if not _MARKED.search(phrase)]
+        for action in load_vocabulary().actions.values()
+    }
+    subjects = (*SUBJECTS, "")
+    actions, made = list(by_action), 0
+    while made < SEQUENCES:
+        names = rng.sample(actions, 3 if rng.random() < _OF_THREE else 2)
+        if rng.random() < _OF_ONE_SUBJECT:
+            subject = rng.choice(subjects)
+            parts = [_inflected(rng.choice(verbs[name])) if subject else rng.choice(verbs[name]) for name in names]
+            parts[0] = f"{subject} {parts[0]}".lstrip()
+        else:
+            parts = [rng.choice(by_action[name]) for name in names]
+        text, *others = (part.rstrip(".") for part in parts)
+        for part in others:
+            text = rng.choice(_JOINTS).format(a=lower_first(text), b=lower_first(part))
+        if len(text.split()) <= LONGEST:
+            made += 1
+            yield text
+
+
+def _inflected(phrase: str) -> str:
+    verb, *rest = phrase.split()
+    return " ".join([third_person(verb), *rest])
