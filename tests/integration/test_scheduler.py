@@ -346,7 +346,8 @@ def test_scheduler_returns_lost_leases_and_stops_when_told(
 def run_alone(chosen: Settings, seconds: float, before: str = "pass") -> subprocess.Popen[str]:
     """A scheduler process that exits when a part makes no progress for `seconds`; `before`: what is run in it first."""
     code = (
-        "import marey.scheduler.main as main, marey.scheduler.components as parts, marey.core.settings as settings; "
+        "import marey.scheduler.main as main, marey.scheduler.components as parts, marey.scheduler.upkeep as upkeep, "
+        "marey.core.settings as settings; "
         f"parts.LOOK_SECONDS = {seconds / 4}; parts.STALL_SECONDS = {seconds}; main.BEAT_SECONDS = 0.2; "
         f"import sys, time; {before}; sys.exit(main.scheduler_main(settings.settings()))"
     )
@@ -368,7 +369,7 @@ def test_a_scheduler_whose_part_hangs_exits_with_a_line_in_the_log(
 ) -> None:
     """The sweeper hangs in something that no deadline ends; the relay goes on beside it."""
     chosen = Settings(home=tmp_path, database_url=SecretStr(database_url), queue_url=SecretStr(queue_url))
-    process = run_alone(chosen, seconds=4.0, before="main.sweep = lambda _engine: time.sleep(3600)")
+    process = run_alone(chosen, seconds=4.0, before="upkeep.sweep = lambda _engine: time.sleep(3600)")
     try:
         wait(lambda: bool(schedulers(engine)), 60.0)
         _, log = process.communicate(timeout=120.0)

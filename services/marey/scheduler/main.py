@@ -7,18 +7,15 @@ import os
 import socket
 import threading
 from collections.abc import Sequence
-from functools import partial
 
 import sqlalchemy as sa
 
-from marey.core import metrics
 from marey.core.addresses import Allowed
 from marey.core.errors import InvalidInput, Unreachable
 from marey.core.settings import Settings
 from marey.core.tls import trusting_context
-from marey.db import check_listening, create_engine, outages, transaction
-from marey.evaluations import remove_unused_prompts
-from marey.jobs import FailureReason, make_due, record_scheduler_heartbeat, retire, sweep
+from marey.db import check_listening, create_engine, transaction
+from marey.jobs import record_scheduler_heartbeat, retire
 from marey.runtime.app import create_app
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.metrics_endpoint import expose
@@ -27,25 +24,15 @@ from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import StatusReporter
 from marey.scheduler import components
 from marey.scheduler.components import EXIT_STALLED, SchedulerComponent, end_stalled, note_progress, watch
-from marey.scheduler.evaluations import EvaluationScheduler
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
 from marey.scheduler.sending import Sender
-from marey.scheduler.servers import CHECK_SECONDS, server_check
+from marey.scheduler.upkeep import upkeep
 from marey.scheduler.webhooks import Deliverer
-from marey.storage import open_store
-from marey.streams import abandoned_streams, end_stream
-from marey.takes import delete_expired, remove_expired_makings, remove_stale_assets, rewrite_files
 from marey.webhooks.vault import Vault
 
 log = logger(__name__)
 
-NO_WORKER = FailureReason(
-    "unreachable", "no worker served this stream for 15 minutes", hint="Check that a worker of its model runs."
-)
-STALE_ASSETS_SECONDS = 600.0  # assets of a dead worker wait an hour anyway
-ABANDONED_SECONDS = 900.0  # seconds that a stream waits for a worker, or for its worker's successor
-ABANDONED_EVERY = 30.0
 BEAT_SECONDS = 5.0
 STOP_SECONDS = 10.0
 
@@ -66,26 +53,12 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
         )
     alone = stopping is None
     if stopping is None:
-        configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
-        expose("scheduler", chosen)
-        stopping = threading.Event()
-        stop_on_signals(stopping)
-    database_url = chosen.database_url.get_secret_value()
-    queue_url = chosen.queue_url.get_secret_value()
-    listen_url = chosen.notifications_url or database_url
-    check_listening(listen_url)
-    engine = create_engine(database_url)
-    app = create_app(queue_url)
-    lists = redis_client(queue_url)
-    relay = Relay(engine, listen_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
-    periodic = _periodic(engine, chosen, stopping)
-    parts: list[SchedulerComponent] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
-    beats = create_engine(database_url, pool_size=1)
+        stopping = _set_up_process(chosen)
+    links = Connections(
+        chosen.database_url.get_secret_value(), chosen.queue_url.get_secret_value(), chosen.notifications_url
+    )
     name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
-    presence = Periodic("presence", Presence(beats, name, parts).renew, seconds=BEAT_SECONDS, stopping=stopping)
-    parts.append(presence)
-    note_progress(engine)
-    note_progress(beats)
+    parts = _components(links, name, chosen, stopping)
     for part in parts:
         part.start()
     log.info("started", parts=[part.name for part in parts])
@@ -101,12 +74,69 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
         part.join(STOP_SECONDS)
     if alone:
         reporter.join(STOP_SECONDS)
-    _retire(beats, name)
-    app.close()
-    lists.close()
-    beats.dispose()
-    engine.dispose()
+    _retire(links.beats, name)
+    links.close()
     return 0
+
+
+def _set_up_process(chosen: Settings) -> threading.Event:
+    """Configure logs, metrics and signals of a process that is only a scheduler; return what its signals set."""
+    configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
+    expose("scheduler", chosen)
+    stopping = threading.Event()
+    stop_on_signals(stopping)
+    return stopping
+
+
+class Connections:
+    """Database and queue, which the components share; each connects when it is used.
+
+    Attributes:
+        listen_url: for notifications of the database, which are tried once here.
+        engine: of all components; an answered statement is progress.
+        beats: one connection for the heartbeat, which waits for no other component.
+
+    Raises:
+        InvalidInput: the database does not forward notifications.
+    """
+
+    def __init__(self, database_url: str, queue_url: str, notifications_url: str | None) -> None:
+        self.queue_url = queue_url
+        self.listen_url = notifications_url or database_url
+        check_listening(self.listen_url)
+        self.engine = create_engine(database_url)
+        self.beats = create_engine(database_url, pool_size=1)
+        self.app = create_app(queue_url)
+        self.lists = redis_client(queue_url)
+        note_progress(self.engine)
+        note_progress(self.beats)
+
+    def close(self) -> None:
+        self.app.close()
+        self.lists.close()
+        self.beats.dispose()
+        self.engine.dispose()
+
+
+def _components(
+    links: Connections, name: str, chosen: Settings, stopping: threading.Event
+) -> Sequence[SchedulerComponent]:
+    """Return the components of the scheduler `name`, not started yet."""
+    relay = Relay(
+        links.engine,
+        links.listen_url,
+        links.lists,
+        publisher(links.app),
+        interval=chosen.relay_seconds,
+        stopping=stopping,
+    )
+    work: list[SchedulerComponent] = [
+        relay,
+        *upkeep(links.engine, links.queue_url, chosen, stopping),
+        *_webhooks(links.engine, chosen, stopping),
+    ]
+    presence = Presence(links.beats, name, work)
+    return [*work, Periodic("presence", presence.renew, seconds=BEAT_SECONDS, stopping=stopping)]
 
 
 class Presence:
@@ -146,71 +176,3 @@ def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
     vault = Vault.of(chosen)
     seconds = chosen.webhook_seconds
     return [Deliverer(engine, vault, sender, api=chosen.api_url, interval=seconds, stopping=stopping)]
-
-
-def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:
-    assert chosen.queue_url is not None  # validated by the caller
-    queue_url = chosen.queue_url.get_secret_value()
-    store = open_store(chosen)
-    evaluations = EvaluationScheduler(engine, chosen)
-
-    def probe() -> None:
-        with transaction(engine):
-            pass
-
-    def sweep_once() -> None:
-        report = sweep(engine)
-        metrics.LEASES_LOST.inc(report.leases_lost)
-        metrics.SWEPT.labels("ready").inc(report.items_returned)
-        metrics.SWEPT.labels("dead").inc(report.items_dead)
-        if report.leases_lost or report.items_dead:
-            log.warning("swept", leases_lost=report.leases_lost, returned=report.items_returned, dead=report.items_dead)
-
-    def remove_stale() -> None:
-        removed = remove_stale_assets(engine, store)
-        if removed:
-            log.info("stale_assets_removed", assets=removed)
-        remove_expired_makings(engine)
-        with transaction(engine) as conn:
-            unused = remove_unused_prompts(conn)
-        if unused:
-            log.info("unused_prompts_removed", sets=unused)
-
-    def end_abandoned() -> None:
-        with transaction(engine) as conn:
-            for stream in abandoned_streams(conn, ABANDONED_SECONDS):
-                end_stream(conn, stream, None, NO_WORKER.message, problem=NO_WORKER)
-                log.warning("stream_abandoned", stream=str(stream))
-
-    def retain() -> None:
-        deleted = delete_expired(engine, store)
-        rewritten = rewrite_files(engine, store)
-        if deleted or rewritten:
-            log.info("retained", jobs_deleted=deleted, files_rewritten=rewritten)
-
-    return [
-        # A lease that expired during an outage of the database is not its worker's fault: let heartbeats come first.
-        Periodic(
-            "sweeper",
-            sweep_once,
-            seconds=chosen.sweep_seconds,
-            stopping=stopping,
-            probe=probe,
-            grace=chosen.lease_seconds,
-            outages=partial(outages, engine),
-            meanwhile=partial(make_due, engine),
-        ),
-        Periodic("retention", retain, seconds=chosen.retention_seconds, stopping=stopping, probe=probe),
-        Periodic("stale_assets", remove_stale, seconds=STALE_ASSETS_SECONDS, stopping=stopping),
-        Periodic(
-            "streams",
-            end_abandoned,
-            seconds=ABANDONED_EVERY,
-            stopping=stopping,
-            probe=probe,
-            grace=ABANDONED_EVERY,
-            outages=partial(outages, engine),
-        ),
-        Periodic("servers", server_check(engine, queue_url), seconds=CHECK_SECONDS, stopping=stopping),
-        Periodic("evaluations", evaluations.round, seconds=chosen.evaluation_seconds, stopping=stopping),
-    ]
