@@ -58,6 +58,19 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
         silence: shared by all clients of one store.
         trust: TLS context for https; None = the default of urllib3.
     """
+    manager = urllib3.PoolManager(
+        maxsize=CONNECTIONS,
+        ssl_context=trust,
+        timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
+        retries=_retries(silence),
+        socket_options=_socket_options(),
+    )
+    manager.pool_classes_by_scheme = _pools(silence)
+    return manager
+
+
+def _pools(silence: Silence) -> dict[str, type[urllib3.HTTPConnectionPool]]:
+    """Return classes of pools by scheme; urllib3 takes classes, so each `silence` has its own."""
 
     class Deadlines:
         """Mixin for urllib3's connections."""
@@ -95,20 +108,18 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
     class TlsPool(urllib3.HTTPSConnectionPool):
         ConnectionCls = TlsConnection  # pyright: ignore[reportAssignmentType]
 
+    return {"http": Pool, "https": TlsPool}
+
+
+def _retries(silence: Silence) -> urllib3.Retry:
+    """Return the retries of a request, which record each missed deadline."""
+
     class Retries(urllib3.Retry):
         def increment(self, *args: Any, **options: Any) -> urllib3.Retry:
             silence.note(options.get("error"))
             return super().increment(*args, **options)
 
-    manager = urllib3.PoolManager(
-        maxsize=CONNECTIONS,
-        ssl_context=trust,
-        timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
-        retries=Retries(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504)),
-        socket_options=_socket_options(),
-    )
-    manager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
-    return manager
+    return Retries(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504))
 
 
 def _socket_options() -> list[tuple[int, int, int]]:

@@ -8,6 +8,9 @@ import threading
 import time
 from typing import cast
 
+import redis
+import sqlalchemy as sa
+
 from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.db import create_engine
@@ -15,7 +18,7 @@ from marey.jobs import WorkerHeartbeat
 from marey.registry import resolve
 from marey.runtime.child import wait_for_database
 from marey.runtime.live.loop import LiveLoop
-from marey.runtime.live.port import LiveModelFactory
+from marey.runtime.live.port import LiveModel, LiveModelFactory
 from marey.runtime.live.supervisor import StreamSupervisor
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.metrics_endpoint import expose
@@ -31,8 +34,8 @@ REDIS_SECONDS = 1.0
 """Deadline of a Redis call: frames stall for this long when a connection falls silent, and a lease lasts 1.5 s."""
 
 
-def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | None = None) -> int:
-    """Serve live streams until SIGTERM or SIGINT, or until `stopping` is set (then no signal handler is installed).
+def live_main(factory: str, chosen: Settings) -> int:
+    """Serve live streams until SIGTERM or SIGINT.
 
     Args:
         factory: `module:attribute` of a `LiveModelFactory`.
@@ -49,16 +52,26 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
             where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
             hint="Set both, or use `marey serve`, which brings its own.",
         )
-    alone = stopping is None
-    if stopping is None:
-        configure_logging("live", level=chosen.log_level, json=chosen.log_json)
-        expose("live", chosen)
-        stopping = threading.Event()
-        stop_on_signals(stopping)
+    configure_logging("live", level=chosen.log_level, json=chosen.log_json)
+    expose("live", chosen)
+    stopping = threading.Event()
+    stop_on_signals(stopping)
     wait_for_database(chosen)
     model = cast("LiveModelFactory", resolve(factory))()
     engine = create_engine(chosen.database_url.get_secret_value())
     client = redis_client(queue_url.get_secret_value(), timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS)
+    try:
+        _serve(model, engine, client, chosen, stopping)
+    finally:
+        client.close()
+        engine.dispose()
+    return 0
+
+
+def _serve(
+    model: LiveModel, engine: sa.Engine, client: redis.Redis, chosen: Settings, stopping: threading.Event
+) -> None:
+    """Run the loop of the model's sessions on this thread, with a supervisor beside it, until `stopping`."""
     name = f"live-{socket.gethostname()}-{os.getpid()}"
     supervisor: StreamSupervisor
     loop = LiveLoop(lambda: model.open_pool(chosen.live_slots), lambda over: supervisor.over(over))
@@ -69,16 +82,11 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     )  # fmt: skip
     supervisor.serve(loop)
     reporter = StatusReporter(chosen.home, name, lambda: time.monotonic() - loop.ticked, stopping)
-    if alone:
-        reporter.start()
+    reporter.start()
     log.info("ready", worker=name, bundle=loop.pool.bundle, slots=chosen.live_slots)
     try:
         loop.run(stopping)
     finally:
         stopping.set()
         supervisor.join(STOP_SECONDS)
-        if alone:
-            reporter.join(STOP_SECONDS)
-        client.close()
-        engine.dispose()
-    return 0
+        reporter.join(STOP_SECONDS)
