@@ -155,62 +155,92 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
-    generators: dict[str | None, GeneratorCapabilities] = {}
-    failed: dict[str | None, MareyError] = {}
-    """Models of a body by name; a missing one is looked up once, for any number of lines."""
-    default_model: set[Problem] = set()
-    named = NamedPoses()
-    line = 0
-
-    def counted() -> Iterator[tuple[int, object]]:
-        nonlocal line
-        for line, raw in raws():
-            yield line, raw
-        if not line:
-            raise InvalidInput("there are no prompts", where="body", hint='Write {"prompt": "…"}, one a line.')
-
-    def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
-        """Yield problems of an item that its model cannot handle."""
-        model = values.get("model")
-        if model not in failed:
-            if model not in generators and len(generators) + len(failed) == MAX_MODELS:
-                hint = "Submit them as several jobs."
-                raise TooLarge(f"names over {MAX_MODELS} models", where=f"line {line}", hint=hint)
-            try:
-                generators[model] = catalogue.capabilities(model)
-            except MareyError as error:
-                failed[model] = error
-        if (error := failed.get(model)) is not None:
-            problem = _problem(error, None if model is None else line, "model")  # the default model is named by no line
-            if problem not in default_model:
-                yield problem
-            if model is None:
-                default_model.add(problem)
-            return
-        generator = generators[model]
-        checks = (
-            ("seconds", generator.check_seconds),
-            ("settings", generator.check_settings),
-            ("variety", generator.check_variety),
-            ("timeline", generator.check_timeline),
-        )
-        for name, hold in checks:
-            try:
-                if name in values:
-                    hold(values[name])
-            except MareyError as error:
-                yield _problem(error, line, name)
-        if (constraints := values.get("constraints")) is not None:
-            yield from _beyond(generator, values, line)
-            yield from named.add(constraints, line, model)
-
-    for item in read_items(counted(), check=check):
-        bundle = generators[item.model].bundle
+    checks = _ModelChecks(catalogue)
+    for item in read_items(_some(raws()), check=checks.problems):
+        bundle = checks.generators[item.model].bundle
         by_bundle[bundle.manifest.model, bundle.reference] += item.variants
-    submission = Submission(fields, by_bundle.total(), by_bundle, raws, generators, named)
+    submission = Submission(fields, by_bundle.total(), by_bundle, raws, checks.generators, checks.named)
     if fields.scope == "refuse":
         refuse_unknown(submission.prompts())
     return submission
+
+
+def _some(raws: Iterator[tuple[int, object]]) -> Iterator[tuple[int, object]]:
+    """Yield items with their lines; that there are none is an error."""
+    line = 0
+    for line, raw in raws:
+        yield line, raw
+    if not line:
+        raise InvalidInput("there are no prompts", where="body", hint='Write {"prompt": "…"}, one a line.')
+
+
+class _ModelChecks:
+    """Checks of items against the models that they name; a model is looked up once, for any number of lines.
+
+    Attributes:
+        generators: the models found so far, by the name in the item; None = the default model.
+        named: frames of stored motions that constraints name.
+    """
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue = catalogue
+        self._failed: dict[str | None, MareyError] = {}
+        self._default_model: set[Problem] = set()
+        self.generators: dict[str | None, GeneratorCapabilities] = {}
+        self.named = NamedPoses()
+
+    def problems(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+        """Yield problems of an item that its model cannot handle.
+
+        Raises:
+            TooLarge: the items name over `MAX_MODELS` models.
+        """
+        model = values.get("model")
+        self._look_up(model, line)
+        if model in self._failed:
+            yield from self._of_model(model, line)
+            return
+        generator = self.generators[model]
+        yield from _beyond_fields(generator, values, line)
+        if (constraints := values.get("constraints")) is not None:
+            yield from _beyond(generator, values, line)
+            yield from self.named.add(constraints, line, model)
+
+    def _look_up(self, model: str | None, line: int | None) -> None:
+        """Add a model to those found or failed, where it is new."""
+        if model in self.generators or model in self._failed:
+            return
+        if len(self.generators) + len(self._failed) == MAX_MODELS:
+            hint = "Submit them as several jobs."
+            raise TooLarge(f"names over {MAX_MODELS} models", where=f"line {line}", hint=hint)
+        try:
+            self.generators[model] = self._catalogue.capabilities(model)
+        except MareyError as error:
+            self._failed[model] = error
+
+    def _of_model(self, model: str | None, line: int | None) -> Iterator[Problem]:
+        """Yield the problem of a model that failed; that of the default model, which no line names, only once."""
+        problem = _problem(self._failed[model], None if model is None else line, "model")
+        if problem not in self._default_model:
+            yield problem
+        if model is None:
+            self._default_model.add(problem)
+
+
+def _beyond_fields(generator: GeneratorCapabilities, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+    """Yield the problems of single fields that a model cannot handle."""
+    checks = (
+        ("seconds", generator.check_seconds),
+        ("settings", generator.check_settings),
+        ("variety", generator.check_variety),
+        ("timeline", generator.check_timeline),
+    )
+    for name, hold in checks:
+        try:
+            if name in values:
+                hold(values[name])
+        except MareyError as error:
+            yield _problem(error, line, name)
 
 
 def _beyond(generator: GeneratorCapabilities, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
