@@ -63,45 +63,40 @@ class ExportOptions:
 
     def __post_init__(self) -> None:
         if self.root_bone and self.bvh_root == "offset":
-            raise InvalidInput(
+            raise _contradiction(
+                "bvh_root",
                 "with a root bone, root and pelvis have position channels and OFFSET 0: neither has the height",
-                where="bvh_root",
                 hint="Leave out bvh_root, or the root bone.",
-                argument="bvh_root",
             )
         if self.tpose_frame and self.rest_pose == "a":
-            raise InvalidInput(
+            raise _contradiction(
+                "tpose_frame",
                 "frame 0 cannot be a T-pose in a file whose rest pose is an A-pose",
-                where="tpose_frame",
                 hint="Leave out tpose_frame, or rest_pose.",
-                argument="tpose_frame",
             )
         if self.in_place and self.placement == "keep":
-            raise InvalidInput(
+            raise _contradiction(
+                "placement",
                 "a motion in place stays at the origin, so it cannot keep its placement",
-                where="placement",
                 hint="Leave out placement, or in-place.",
-                argument="placement",
             )
+        if self.rig:
+            self._check_rig()
+        elif self.rig_map and not self.body:
+            raise _contradiction("rig_map", "a map of joints belongs to a rig", hint="Name the rig too.")
 
-        for name in ("mesh", "names", "rest_pose") if self.rig else ():
+    def _check_rig(self) -> None:
+        """Refuse options that the rig decides."""
+        for name in ("mesh", "names", "rest_pose"):
             if name in self.chosen:
-                raise InvalidInput(
+                raise _contradiction(
+                    name,
                     "a motion on a rig has the joints and the rest pose of the rig",
-                    where=name,
                     hint=f"Leave out {name}, or the rig.",
-                    argument=name,
                 )
-        if self.rig and self.body:
-            raise InvalidInput(
-                "a motion on a rig has the proportions of the rig",
-                where="body",
-                hint="Leave out body, or the rig.",
-                argument="body",
-            )
-        if self.rig_map and not (self.rig or self.body):
-            raise InvalidInput(
-                "a map of joints belongs to a rig", where="rig_map", hint="Name the rig too.", argument="rig_map"
+        if self.body:
+            raise _contradiction(
+                "body", "a motion on a rig has the proportions of the rig", hint="Leave out body, or the rig."
             )
 
     @property
@@ -126,6 +121,10 @@ class ExportOptions:
     def values(self) -> dict[str, Any]:
         """Values of the options that differ from the defaults, as keyword arguments."""
         return {name: getattr(self, name) for name in self.chosen}
+
+
+def _contradiction(option: str, message: str, *, hint: str) -> InvalidInput:
+    return InvalidInput(message, where=option, hint=hint, argument=option)
 
 
 PLAIN = ExportOptions()

@@ -20,6 +20,7 @@ from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import aim_bones, checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array, unroll
+from marey.motion.skeleton import Skeleton
 
 CLEANED = "feet_cleaned"
 """Key of a manifest: whether the feet were locked."""
@@ -55,16 +56,10 @@ def finish_motion(
     """
     if features.ndim != 2:
         raise InvalidInput(f"features have shape {features.shape}, not (Tf, {layout.dim})", where=layout.name)
+    need_feet(layout.skeleton)
     rate = float(fps or layout.fps)
-    training = layout.skeleton
-    need_feet(training)
-    body = body or standard_body(training)
-    skeleton = body.skeleton
-    decoded = checked_joints(layout.decode(features), training)
-    rotations, root = _pose(features, decoded, layout)
-    scale = travel_scale(training, skeleton)
-    root = scale * root
-    hands = scale * wrist_distance(decoded, training)
+    skeleton = (body or standard_body(layout.skeleton)).skeleton
+    rotations, root, hands = _pose_on(skeleton, features, layout)
     if rate != layout.fps:
         times = frame_times(len(root), layout.fps, rate)
         rotations, root = interpolate_rotations(rotations, times), interpolate(root, times)
@@ -76,8 +71,7 @@ def finish_motion(
         if isinstance(layout, PosedLayout):
             rotations, root = aim_bones(joints, rotations, skeleton), joints[:, 0]
         else:
-            pose = solve_pose(joints, skeleton, fps=rate, measure=False)
-            rotations, root = pose.rotations, pose.root
+            rotations, root = _solve(joints, skeleton, rate)
     else:
         contacts = find_contacts(joints, skeleton, rate)
     return MotionClip.of(
@@ -92,11 +86,25 @@ def finish_motion(
     )
 
 
+def _pose_on(skeleton: Skeleton, features: Array, layout: FeatureLayout) -> tuple[Array, Array, Array]:
+    """Return rotations (Tf, J, 4), root (Tf, 3) and distances of the wrists (Tf,) of features on the skeleton of a
+    body."""
+    decoded = checked_joints(layout.decode(features), layout.skeleton)
+    rotations, root = _pose(features, decoded, layout)
+    scale = travel_scale(layout.skeleton, skeleton)
+    return rotations, scale * root, scale * wrist_distance(decoded, layout.skeleton)
+
+
 def _pose(features: Array, decoded: Array, layout: FeatureLayout) -> tuple[Array, Array]:
     """Return rotations (Tf, J, 4) and root (Tf, 3) of features: the layout's own, or those that are solved from its
     joints (Tf, J, 3)."""
     if isinstance(layout, PosedLayout):
         rotations, root = layout.decode_pose(features)
         return unroll(rotations), root
-    pose = solve_pose(bone_fit(layout.skeleton).fit(decoded), layout.skeleton, fps=layout.fps, measure=False)
+    return _solve(bone_fit(layout.skeleton).fit(decoded), layout.skeleton, layout.fps)
+
+
+def _solve(joints: Array, skeleton: Skeleton, fps: float) -> tuple[Array, Array]:
+    """Return rotations (T, J, 4) and root (T, 3) of joints (T, J, 3) whose bones are the skeleton's."""
+    pose = solve_pose(joints, skeleton, fps=fps, measure=False)
     return pose.rotations, pose.root

@@ -100,37 +100,49 @@ def parse_bvh(
         message = f"{len(data) / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB"
         raise TooLarge(message, where=where)
     header = BvhHeader(data, where)
-    notes = header.notes
     values = _numbers(data, header, where)
-    joints, scale = header.joints, METRES[unit]
-    frames = len(values)
-    if header.frames != frames:
-        notes.append(f"line {header.frames_line}: the header says {header.frames} frames, the file holds {frames}")
-    rotations = np.empty((frames, len(joints), 4))
+    joints, notes = header.joints, header.notes
+    if header.frames != len(values):
+        notes.append(f"line {header.frames_line}: the header says {header.frames} frames, the file holds {len(values)}")
+    names = _unique([j.name for j in joints], notes)
+    rotations = _rotations(joints, values)
+    offsets, channels, given = _translations(joints, values)
+    tree = Skeleton("bvh", names, tuple(j.parent for j in joints), offsets.astype(np.float32), mirror_by_name(names))
+    add = _are_added(tree, rotations, channels, given, up) if translation == "auto" else translation == "add"
+    if add:
+        notes.append("positions are added to the OFFSETs")
+    moving = np.where(given, channels + offsets * add, offsets)
+    ends = np.array([j.end or (np.nan,) * 3 for j in joints])
+    offsets, moving, ends = (lengths * METRES[unit] for lengths in (offsets, moving, ends))
+    if up == "z":
+        offsets, moving, ends = (rotate(Z_TO_Y, a) for a in (offsets, moving, ends))
+        rotations = multiply(multiply(Z_TO_Y, rotations), Z_TO_Y * [1, -1, -1, -1])
+    clip = _clip(tree, rotations, offsets, moving, header.fps, ends, notes)
+    drop = rest_frame == "drop" or (rest_frame == "auto" and first_frame_stands_apart(clip))
+    return _without_first(clip) if drop and len(values) > 1 else clip
+
+
+def _clip(
+    tree: Skeleton, rotations: Array, offsets: Array, moving: Array, fps: float, ends: Array, notes: list[str]
+) -> BvhClip:
+    """Return the clip of a file in metres, Y up: with translations (T, J, 3) only if they are not constant."""
+    still = np.ptp(moving[:, 1:], axis=0).max(initial=0.0) < 1e-4  # metres: the rounding of a file
+    offsets = np.concatenate([np.zeros((1, 3)), moving[:, 1:].mean(axis=0) if still else offsets[1:]])
+    skeleton, positions = tree.with_offsets(offsets), None if still else moving
+    return BvhClip(skeleton, unroll(rotations), moving[:, 0], positions, fps, ends, None, tuple(notes))
+
+
+def _rotations(joints: list[Joint], values: Array) -> Array:
+    """Return local rotations (T, J, 4) of the motion's numbers (T, C); joints of one rotation order are converted
+    together."""
+    rotations = np.empty((len(values), len(joints), 4))
     by_order: dict[str, list[int]] = {}
     for j, joint in enumerate(joints):
         by_order.setdefault("".join(a for kind, a in joint.channels if kind == "r"), []).append(j)
     for order, members in by_order.items():
         columns = [[joints[j].first + c for c, (k, _) in enumerate(joints[j].channels) if k == "r"] for j in members]
         rotations[:, members] = from_euler(values[:, np.array(columns, np.intp).reshape(len(members), -1)], order)
-    names = _unique([j.name for j in joints], notes)
-    offsets, channels, given = _translations(joints, values)
-    tree = Skeleton("bvh", names, tuple(j.parent for j in joints), offsets.astype(np.float32), mirror_by_name(names))
-    add = _are_added(tree, rotations, channels, given, up) if translation == "auto" else translation == "add"
-    if add:
-        notes.append("positions are added to the OFFSETs")
-    moving = np.where(given, channels + offsets * add, offsets) * scale
-    offsets, root = offsets * scale, moving[:, 0]
-    ends = np.array([j.end or (np.nan,) * 3 for j in joints]) * scale
-    if up == "z":
-        offsets, moving, root, ends = (rotate(Z_TO_Y, a) for a in (offsets, moving, root, ends))
-        rotations = multiply(multiply(Z_TO_Y, rotations), Z_TO_Y * [1, -1, -1, -1])
-    still = np.ptp(moving[:, 1:], axis=0).max(initial=0.0) < 1e-4  # metres: the rounding of a file
-    offsets = np.concatenate([np.zeros((1, 3)), moving[:, 1:].mean(axis=0) if still else offsets[1:]])
-    skeleton = tree.with_offsets(offsets)
-    clip = BvhClip(skeleton, unroll(rotations), root, None if still else moving, header.fps, ends, None, tuple(notes))
-    drop = rest_frame == "drop" or (rest_frame == "auto" and first_frame_stands_apart(clip))
-    return _without_first(clip) if drop and frames > 1 else clip
+    return rotations
 
 
 def first_frame_stands_apart(clip: BvhClip) -> bool:

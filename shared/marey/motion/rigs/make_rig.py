@@ -71,21 +71,14 @@ def make_rig(
     if not any(node.bone for node in nodes):
         raise InvalidFile("holds no skeleton", where=where, hint="Export the character with its bones.")
     check_count(len(nodes), where)
-    longest = max((node.name for node in nodes), key=len)
-    if len(longest) > MAX_NAME:
-        message = f"the name {longest[:20]!r}… has {len(longest):,} characters, over the limit of {MAX_NAME}"
-        raise TooLarge(message, where=where)
+    _check_names(nodes, where)
     order = _parents_first(nodes, where)
     place = {node: joint for joint, node in enumerate(order)}
     matrices = np.array([nodes[node].matrix for node in order], np.float64)
     names, repeated = _unique([nodes[node].name for node in order])
     sizes, axes = _split(matrices, names, where)
     orientations, positions = from_matrix(axes), matrices[:, :3, 3] * unit
-    far = np.abs(positions).max(axis=1)
-    if not (far <= FARTHEST).all():
-        joint = int(np.argmax(~(far <= FARTHEST)))
-        message = f"the node {names[joint]!r} is {far[joint]:.3g} m from the origin, over the limit of {FARTHEST:g}"
-        raise TooLarge(message, where=where)
+    _check_near(positions, names, where)
     if up == "z":
         orientations, positions = multiply(Z_TO_Y, orientations), rotate(Z_TO_Y, positions)
     tips = np.array([nodes[node].tip or (np.nan,) * 3 for node in order], np.float64)
@@ -115,6 +108,22 @@ def check_count(joints: int, where: str) -> None:
     """
     if joints > MAX_JOINTS:
         raise TooLarge(f"{joints} joints, over the limit of {MAX_JOINTS}", where=where)
+
+
+def _check_names(nodes: Sequence[RigNode], where: str) -> None:
+    longest = max((node.name for node in nodes), key=len)
+    if len(longest) > MAX_NAME:
+        message = f"the name {longest[:20]!r}… has {len(longest):,} characters, over the limit of {MAX_NAME}"
+        raise TooLarge(message, where=where)
+
+
+def _check_near(positions: NDArray[np.float64], names: Sequence[str], where: str) -> None:
+    """Check that joints (J, 3) are within `FARTHEST`; an overflow, which is no number, is not."""
+    far = np.abs(positions).max(axis=1)
+    if not (far <= FARTHEST).all():
+        joint = int(np.argmax(~(far <= FARTHEST)))
+        message = f"the node {names[joint]!r} is {far[joint]:.3g} m from the origin, over the limit of {FARTHEST:g}"
+        raise TooLarge(message, where=where)
 
 
 def _parents_first(nodes: Sequence[RigNode], where: str) -> list[int]:
