@@ -89,19 +89,16 @@ def fetch_job(
         InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
     """
     observer = observer or FetchObserver()
-    known = exporters()
-    check_options((known[name] for name in formats or known if name in known), export)
-    check_body(export)
-    check_rig(Rigs(transport), export)
+    _check_export(transport, formats, export)
     reviews = review if isinstance(review, str) or not review else [*review]
     pages = transport.pages(f"/v1/jobs/{job}/items", review=reviews or None, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
-    for recipe in dict.fromkeys(file.making for _, files in planned for file in files if file.making is not None):
+    wanted = [file for _, files in planned for file in files]
+    for recipe in dict.fromkeys(file.making for file in wanted if file.making is not None):
         recipe.check()
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
-    make_folders(folder, (file.path for _, files in planned for file in files))
-    wanted = [file for _, files in planned for file in files]
+    make_folders(folder, (file.path for file in wanted))
     done: set[Path] = set()
 
     def note(download: FileToFetch) -> None:
@@ -122,6 +119,14 @@ def fetch_job(
     if left:
         observer.left_over(left, removed=prune)
     return planned
+
+
+def _check_export(transport: Transport, formats: Sequence[str] | None, export: ExportOptions) -> None:
+    """Check that the formats have the options, and that the body and the rig exist."""
+    known = exporters()
+    check_options((known[name] for name in formats or known if name in known), export)
+    check_body(export)
+    check_rig(Rigs(transport), export)
 
 
 def _write_part(

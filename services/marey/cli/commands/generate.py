@@ -120,13 +120,7 @@ def generate(
             result = loop_clip(clip, f"{wanted.prompt!r}, seed {wanted.seed}") if loop else clip
             line = _write(plan, result, elapsed, chosen, export, overwrite=overwrite)
             bar.advance(task)
-            _report_rewrite(clip)
-            _report_quality(line, clip)
-            if as_json:
-                console.result_json(line)
-            else:
-                for path in line["files"].values():
-                    console.result(console.home_relative(path))
+            _report(line, clip, as_json=as_json)
 
 
 def _body_of(bundle: Bundle, export: ExportOptions) -> NamedBody | None:
@@ -136,6 +130,17 @@ def _body_of(bundle: Bundle, export: ExportOptions) -> NamedBody | None:
     if export.body is None or export.body == STANDARD:
         return None
     return read_body_for(bundle.manifest, export.body, export.rig_map)
+
+
+def _report(line: dict[str, Any], clip: MotionClip, *, as_json: bool) -> None:
+    """Print the files of a motion, and say what is wrong with it."""
+    _report_rewrite(clip)
+    _report_quality(line, clip)
+    if as_json:
+        console.result_json(line)
+        return
+    for path in line["files"].values():
+        console.result(console.home_relative(path))
 
 
 def _report_rewrite(clip: MotionClip) -> None:

@@ -104,12 +104,16 @@ def review(
     for path in paths:
         console.result(console.home_relative(path))
     if more:
-        skipped = skip + len(found)
-        following = output.with_stem(f"{CONTINUED.sub('', output.stem)}-from-{skipped + 1}")
-        console.say(
-            f"There are more: `--skip {skipped} -o {console.home_relative(following)}` goes on; "
-            "--limit, --review and --tag choose."
-        )
+        _say_more(output, skip + len(found))
+
+
+def _say_more(output: Path, shown: int) -> None:
+    """Say how to go on after the first `shown` motions."""
+    following = output.with_stem(f"{CONTINUED.sub('', output.stem)}-from-{shown + 1}")
+    console.say(
+        f"There are more: `--skip {shown} -o {console.home_relative(following)}` goes on; "
+        "--limit, --review and --tag choose."
+    )
 
 
 def _paths(output: Path, pages: int) -> list[Path]:

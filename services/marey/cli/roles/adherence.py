@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, get_args
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
-from marey.registry import get_model, resolve
+from marey.registry import ModelSpec, get_model, resolve
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,7 @@ def judge_adherence(
         raise InvalidInput(f"there is no set {prompts!r}", where="--prompts", hint=f"Known: {', '.join(sets)}.")
     found = choose_bundle(bundle)
     spec = get_model(found.manifest.model, where=bundle)
-    if (steers or walks) and spec.live_adherence is None:
-        raise InvalidInput(f"the model {spec.name!r} has no live sessions", where="--steers, --walks")
+    judge_live = _live_judge(spec) if steers or walks else None
     values = check_settings(found, settings)
     asked = adherence.validation_prompts(captions) if captions else evaluation_prompts(prompts)
     generator = resolve(spec.load)(found, threads=threads)
@@ -75,14 +74,26 @@ def judge_adherence(
         generator, asked[::every], seeds=seeds, seconds=seconds, settings=values, progress=progress
     )
     document, markdown = dict(report.to_json()), report.markdown()
-    if (steers or walks) and spec.live_adherence is not None:
-        live = resolve(spec.live_adherence)(generator, evaluation_prompts(prompts), steers=steers, walks=walks)
-        markdown += "\n| live sessions | sessions | obeyed |\n|---|---|---|\n"
-        for title, sessions in live.items():
-            if sessions:
-                share = sum(each.passed for each in sessions) / len(sessions)
-                markdown += f"| {title} | {len(sessions)} | {share:.1%} |\n"
+    if judge_live is not None:
+        live = judge_live(generator, evaluation_prompts(prompts), steers=steers, walks=walks)
+        markdown += _live_table(live)
         document["live"] = {title: [asdict(each) for each in sessions] for title, sessions in live.items()}
     if output is not None:
         adherence.write_report(document, markdown, output)
     return Judged(markdown, document, adherence.failures_of(report))
+
+
+def _live_judge(spec: ModelSpec) -> Callable[..., Mapping[str, Sequence[Any]]]:
+    if spec.live_adherence is None:
+        raise InvalidInput(f"the model {spec.name!r} has no live sessions", where="--steers, --walks")
+    return resolve(spec.live_adherence)
+
+
+def _live_table(live: Mapping[str, Sequence[Any]]) -> str:
+    """Return a table of sessions, and of the share of them that did what they were told."""
+    lines = ["", "| live sessions | sessions | obeyed |", "|---|---|---|"]
+    for title, sessions in live.items():
+        if sessions:
+            share = sum(each.passed for each in sessions) / len(sessions)
+            lines.append(f"| {title} | {len(sessions)} | {share:.1%} |")
+    return "\n".join(lines) + "\n"
