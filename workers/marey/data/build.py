@@ -222,11 +222,7 @@ class FolderWriter(PreparedWriter):
         """Encode and append one clip; joints (T, 22, 3)."""
         placed = LAYOUT.canonicalize(joints)
         features = LAYOUT.encode(placed)
-        walked = actions[0].gait
-        told = _choose_texts(actions, name)
-        train_alone = len(actions) == 1 and part.source.split == "train"  # the people of two sentences differ
-        if told and train_alone and (asked := sayings(part.content, name)):
-            told += (asked,)
+        told = _authors(part, actions, name)
         self.append(
             features,
             placed,
@@ -243,22 +239,11 @@ class FolderWriter(PreparedWriter):
                 spliced=spliced,
                 acts=tuple(facts.action for facts in actions),
                 sides=tuple(facts.side for facts in actions),
-                measured=Measured(
-                    seconds=round(len(features) / FPS, 2),
-                    path=round(walked.path, 2),
-                    turn=round(walked.turn, 1),
-                    speed=round(walked.speed, 2),
-                    steps=walked.steps,
-                    side=actions[0].side,
-                ),
+                measured=_measured(actions[0], len(features)),
                 captions=tuple(chain(*told)) or captions(actions, name, phrasings(actions, spliced=bool(spliced))),
                 authors=tuple(map(len, told)),
                 seams=seams,
-                act_captions=tuple(
-                    facts.text[0][0] if facts.text else captions([facts], f"{name}/{k}", 1)[0]
-                    for k, facts in enumerate(actions)
-                    if len(actions) > 1
-                ),
+                act_captions=_act_captions(actions, name) if len(actions) > 1 else (),
             ),
         )
 
@@ -297,6 +282,34 @@ class FolderWriter(PreparedWriter):
             left_out=dict(sorted(left_out.items())),
             compositional_pairs=tuple(sorted(held_out_pairs(packs))),
         )
+
+
+def _measured(facts: Facts, frames: int) -> Measured:
+    walked = facts.gait
+    return Measured(
+        seconds=round(frames / FPS, 2),
+        path=round(walked.path, 2),
+        turn=round(walked.turn, 1),
+        speed=round(walked.speed, 2),
+        steps=walked.steps,
+        side=facts.side,
+    )
+
+
+def _act_captions(actions: Sequence[Facts], name: str) -> tuple[str, ...]:
+    """Return one caption of each action alone."""
+    return tuple(
+        facts.text[0][0] if facts.text else captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(actions)
+    )
+
+
+def _authors(part: Part, actions: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:
+    """Return the captions of each author; those of a training clip with one action get an author of sayings too."""
+    told = _choose_texts(actions, name)
+    train_alone = len(actions) == 1 and part.source.split == "train"  # the people of two sentences differ
+    if told and train_alone and (asked := sayings(part.content, name)):
+        told += (asked,)
+    return told
 
 
 def _choose_texts(actions: Sequence[Facts], name: str) -> tuple[tuple[str, ...], ...]:

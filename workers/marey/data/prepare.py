@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
@@ -99,14 +99,8 @@ def pack_set(
         NotFound, InvalidFile, TooLarge: the source cannot be read; the message names the file.
         InvalidInput: no clip is left.
     """
-    dataset, rows, left_out = captures.dataset, defaultdict[str, list[Row]](list), dict[str, str]()
-    for row in captures.rows:
-        if row.error_cm > dataset.largest_error_cm:
-            left_out[row.id] = f"off what was captured by more than {dataset.largest_error_cm:g} cm"
-        elif row.action == UNUSED:
-            left_out[row.id] = f"not to be used: {row.facts}" if row.facts else "not to be used"
-        else:
-            rows[row.stem].append(row)
+    dataset = captures.dataset
+    rows, left_out = _wanted(captures)
     clips: list[tuple[PackClip, NDArray[np.float32]]] = []
     done = set[str]()
     passed_over = Counter[str]()
@@ -123,11 +117,7 @@ def pack_set(
             progress(len(done), len(rows))
     if note and passed_over:
         note(f"{captures.path}: {_counted(passed_over)}.")
-    if missing := sorted(rows.keys() - done):
-        raise InvalidFile(
-            f"holds no {missing[0]}.bvh, which the index lists" + (f" ({len(missing)} missing)" if missing[1:] else ""),
-            where=str(captures.path),
-        )
+    _check_complete(captures, rows.keys() - done)
     if not clips:
         raise InvalidInput("no clip is left", where=str(captures.path))
     return JointsPack.of(
@@ -136,6 +126,25 @@ def pack_set(
         left_out,
         {f"{dataset.name}/{file.name}": file.sha256 for file in captures.caption_files},
     )
+
+
+def _wanted(captures: CaptureSet) -> tuple[dict[str, list[Row]], dict[str, str]]:
+    """Return the rows to convert, by file, and why each of the others is left out, by id."""
+    rows, left_out, largest = defaultdict[str, list[Row]](list), dict[str, str](), captures.dataset.largest_error_cm
+    for row in captures.rows:
+        if row.error_cm > largest:
+            left_out[row.id] = f"off what was captured by more than {largest:g} cm"
+        elif row.action == UNUSED:
+            left_out[row.id] = f"not to be used: {row.facts}" if row.facts else "not to be used"
+        else:
+            rows[row.stem].append(row)
+    return rows, left_out
+
+
+def _check_complete(captures: CaptureSet, missing: Collection[str]) -> None:
+    if missing:
+        more = f" ({len(missing)} missing)" if len(missing) > 1 else ""
+        raise InvalidFile(f"holds no {min(missing)}.bvh, which the index lists{more}", where=str(captures.path))
 
 
 def _counted(passed_over: Counter[str]) -> str:

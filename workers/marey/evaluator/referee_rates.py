@@ -144,8 +144,23 @@ def page(clips: Sequence[Verdicts], sets: Iterable[str]) -> str:
     """Return the page of rates."""
     found = rates(clips)
     halves = [{rate.action: rate for rate in rates([clip for clip in clips if clip.half == n])} for n in range(2)]
-    accepted = [rate.action for rate in found if rate.accepted]
     lines = [
+        *_introduction(sets),
+        "| clips | number | passed | falsely passed | without dances and karate |",
+        "|---|---|---|---|---|",
+        _totals("all", clips),
+        *(_totals(f"fold {n + 1}", [c for c in clips if c.fold == n]) for n in range(FOLDS)),
+        "",
+        *_how_to_read(found),
+        "| action | clips | passed | falsely passed | without dances and karate | halves | mostly of | accepted |",
+        "|---|---|---|---|---|---|---|---|",
+        *(_rule_row(rate, halves) for rate in found),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _introduction(sets: Iterable[str]) -> Sequence[str]:
+    return (
         "# The referee on real clips",
         "",
         "How far to trust the adherence of an action that model cards and `marey eval actions` state: how often its",
@@ -159,30 +174,31 @@ def page(clips: Sequence[Verdicts], sets: Iterable[str]) -> str:
         "implies the other. Labels name what a clip is for, not everything in it: a dance may hold a kick. So false",
         "passes are given without clips of dances and karate as well.",
         "",
-        "| clips | number | passed | falsely passed | without dances and karate |",
-        "|---|---|---|---|---|",
-        _totals("all", clips),
-        *(_totals(f"fold {n + 1}", [c for c in clips if c.fold == n]) for n in range(FOLDS)),
-        "",
+    )
+
+
+def _how_to_read(found: Sequence[RuleRate]) -> Sequence[str]:
+    """Return the paragraph between the rates of all rules together and those of each."""
+    accepted = sum(rate.accepted for rate in found)
+    return (
         "Folds are by source. Rules and thresholds were written with clips of all folds in view: the folds show how",
         "the rates vary, they are no test on unseen clips.",
-        f"{len(accepted)} of {len(found)} rules are accepted: they miss at most one clip or 5 %, but not all, and",
+        f"{accepted} of {len(found)} rules are accepted: they miss at most one clip or 5 %, but not all, and",
         "falsely pass at most 5 % without dances and karate. Figures of the other actions tell bundles apart, but are",
         "not precise. `halves` has clips passed, and false passes without dances and karate, for each half of the",
         "sources. Of an action with one or two clips, recall is hardly known.",
         "",
-        "| action | clips | passed | falsely passed | without dances and karate | halves | mostly of | accepted |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for rate in found:
-        of = ", ".join(f"{name} {count}" for name, count in rate.of)
-        verdict = "yes" if rate.accepted else "no clips" if not rate.clips else "no"
-        lines.append(
-            f"| {rate.action} | {rate.clips} | {_share(rate.passed, rate.clips)} "
-            f"| {_share(rate.falsely, rate.others)} | {_share(rate.single_falsely, rate.single_others)} "
-            f"| {_halves(halves, rate.action)} | {of} | {verdict} |"
-        )
-    return "\n".join(lines) + "\n"
+    )
+
+
+def _rule_row(rate: RuleRate, halves: Sequence[dict[str, RuleRate]]) -> str:
+    of = ", ".join(f"{name} {count}" for name, count in rate.of)
+    verdict = "yes" if rate.accepted else "no clips" if not rate.clips else "no"
+    return (
+        f"| {rate.action} | {rate.clips} | {_share(rate.passed, rate.clips)} "
+        f"| {_share(rate.falsely, rate.others)} | {_share(rate.single_falsely, rate.single_others)} "
+        f"| {_halves(halves, rate.action)} | {of} | {verdict} |"
+    )
 
 
 def accepted_list(clips: Sequence[Verdicts]) -> str:

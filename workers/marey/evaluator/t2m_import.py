@@ -57,16 +57,13 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
     download = Download(request.folder, inside=INSIDE)
     meta = download.find("Comp_v6_KLD005/meta", what="the folder of the evaluator's statistics")
     config = config or published_config(meta / "mean.npy")
-    motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
-    file = download.find("text_mot_match/model/finest.tar", what="the evaluator")
-    checkpoint = download.checkpoint(file)
-    checkpoint.section("movement_encoder").fill(motion.movement)
-    checkpoint.section("motion_encoder").fill(motion.motion)
-    checkpoint.section("text_encoder").fill(text)
+    motion, text = _read_encoders(download, config)
     mean, std = download.statistics(meta, config.features)
     words, vectors = _read_words(download, config)
     accounts = download.finish()
-    name = "KIT-ML" if config.layout == KIT.layout else "HumanML3D"
+    source = DataSource(
+        name="KIT-ML" if config.layout == KIT.layout else "HumanML3D", licence=request.licence, credit=CREDIT
+    )
     with BundleWriter(request.output, overwrite=request.overwrite) as writer:
         for name, network in (("motion", motion), ("text", text)):
             state = {k: v.numpy() for k, v in network.state_dict().items() if stored(k)}
@@ -85,16 +82,20 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
             skeleton=layout(config.layout).skeleton.name,
             layout=config.layout,
             fps=config.fps,
-            data=(
-                DataSource(
-                    name="KIT-ML" if config.layout == KIT.layout else "HumanML3D",
-                    licence=request.licence,
-                    credit=CREDIT,
-                ),
-            ),
+            data=(source,),
             licence=request.licence,
             training=provenance(request, accounts),
         )
+
+
+def _read_encoders(download: Download, config: T2MConfig) -> tuple[T2MMotionEncoder, T2MTextEncoder]:
+    """Return the encoders of motion and text with the weights of the download."""
+    motion, text = T2MMotionEncoder(config), T2MTextEncoder(config)
+    checkpoint = download.checkpoint(download.find("text_mot_match/model/finest.tar", what="the evaluator"))
+    checkpoint.section("movement_encoder").fill(motion.movement)
+    checkpoint.section("motion_encoder").fill(motion.motion)
+    checkpoint.section("text_encoder").fill(text)
+    return motion, text
 
 
 def published_config(mean: Path) -> T2MConfig:

@@ -110,16 +110,11 @@ def fit(
         network.load_state_dict(start.head)
     adapted = AdaptedMiniLM(minilm, config.rank, start.updates if start else None)
     weights = [*network.parameters(), *adapted.parameters()]
-    average = [weight.detach().clone() for weight in weights]
-    groups = [
-        {"params": list(network.parameters()), "weight_decay": config.weight_decay},
-        {"params": list(adapted.parameters()), "weight_decay": 0.0},
-    ]
-    optimizer = torch.optim.AdamW(groups, lr=config.learning_rate)
+    average = _Average(weights, config.average)
+    optimizer = _optimizer(network, adapted, config)
     allowed = torch.tensor(transition_scores(network_config.tags), dtype=torch.float32)
     for step in range(config.steps):
-        rates = (config.learning_rate, config.adapter_rate)
-        for parameters, rate in zip(optimizer.param_groups, rates, strict=True):
+        for parameters, rate in zip(optimizer.param_groups, (config.learning_rate, config.adapter_rate), strict=True):
             parameters["lr"] = rate * _schedule(step / config.steps)
         batch = collate(next(batches))
         states = adapted(batch.tokens, network_config.layers)
@@ -128,19 +123,44 @@ def fit(
         loss.backward()
         torch.nn.utils.clip_grad_norm_(weights, 1.0)
         optimizer.step()
-        decay = min(config.average, (2 + step) / (11 + step))
-        for mean, weight in zip(average, weights, strict=True):
-            mean.lerp_(weight.detach(), 1 - decay)
+        average.add(step)
         if progress:
             progress(step, float(loss.detach()))
-    with torch.no_grad():
-        for weight, mean in zip(weights, average, strict=True):
-            weight.copy_(mean)
+    average.set_weights()
     seen: list[Encoded] = []
     while len(seen) < SMOOTHING_SENTENCES:
         seen += next(batches)
     updates = adapted.updates([token_batch([item.tokens]) for item in seen])
     return Weights(network_config, network.eval().state_dict(), updates)
+
+
+def _optimizer(network: LightNetwork, adapted: AdaptedMiniLM, config: FitConfig) -> torch.optim.AdamW:
+    """Return an optimizer with two groups of parameters: the head, and the updates of MiniLM without weight decay."""
+    groups = [
+        {"params": list(network.parameters()), "weight_decay": config.weight_decay},
+        {"params": list(adapted.parameters()), "weight_decay": 0.0},
+    ]
+    return torch.optim.AdamW(groups, lr=config.learning_rate)
+
+
+class _Average:
+    """Exponential moving average of weights; its decay grows to `most` during the first steps."""
+
+    def __init__(self, weights: Sequence[Tensor], most: float) -> None:
+        self._weights, self._most = weights, most
+        self._means = [weight.detach().clone() for weight in weights]
+
+    def add(self, step: int) -> None:
+        """Take in the weights after a step."""
+        decay = min(self._most, (2 + step) / (11 + step))
+        for mean, weight in zip(self._means, self._weights, strict=True):
+            mean.lerp_(weight.detach(), 1 - decay)
+
+    def set_weights(self) -> None:
+        """Put the average in place of the weights."""
+        with torch.no_grad():
+            for weight, mean in zip(self._weights, self._means, strict=True):
+                weight.copy_(mean)
 
 
 def _schedule(done: float) -> float:
