@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import random
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture, respond
 from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, direction, envelope
 from marey.data.gesture_stances import glide, settle, step, turn_hips
+
+Array = NDArray[np.floating]
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _ARM = 0.52
@@ -19,7 +23,6 @@ _LONGEST = 9.6
 
 def draw_bow(rng: random.Random) -> Gesture:
     side = rng.choices(SIDES, (3, 2))[0]
-    draws = _OTHER[side]
     aside, up = rng.uniform(20, 74), rng.uniform(-7, 12)
     looses, nocks = rng.random() < 0.75, rng.random() < 0.5
     shots = 2 if looses and rng.random() < 0.25 else 1
@@ -28,17 +31,7 @@ def draw_bow(rng: random.Random) -> Gesture:
     draw, hold = rng.uniform(0.5, 1.3), rng.uniform(0.4, 2.6) / shots
     again, rest, fall = rng.uniform(0.9, 1.4), rng.uniform(0.3, 1.0), rng.uniform(0.5, 1.0)
     rise = start + lift + wait  # the bow arm is up and the draw begins
-    at, drawn, goes = [0.0, rise], [0.0, 0.0], rise
-    for shot in range(shots):
-        at += [goes + draw, goes + draw + hold]
-        drawn += [1.0, 1.0]
-        if looses:
-            at.append(at[-1] + 0.12)
-            drawn.append(1.0 + rng.uniform(0.25, 0.45))
-        if shot < shots - 1:
-            goes = at[-1] + again
-            at += [at[-1] + 0.2, goes]
-            drawn += [drawn[-1], 0.0]
+    at, drawn = _pulls(rng, rise, shots, (draw, hold, again), looses=looses)
     end = at[-1] + rest
     low = (rng.uniform(-0.02, 0.06), rng.uniform(-0.32, -0.2), rng.uniform(0.28, 0.36))
     cheek = (
@@ -46,7 +39,7 @@ def draw_bow(rng: random.Random) -> Gesture:
         rng.uniform(-0.13, -0.06),
         rng.uniform(-0.11, -0.02),
     )  # aside, up, toward the target
-    high = rng.uniform(0.08, 0.4)
+    string_hand = _StringHand(_OTHER[side], cheek, rng.uniform(0.08, 0.4))
     twist, hips = rng.uniform(0.4, 0.6) * (90 - aside), rng.uniform(6, 22)
     stride, turn, steps = rng.uniform(0.08, 0.22), rng.uniform(0, 25), rng.random() < 0.6
     sink, stands = rng.uniform(0.0, 0.03), -1.0 if rng.random() < 0.5 else max(start - 0.2, 0.0)
@@ -72,14 +65,7 @@ def draw_bow(rng: random.Random) -> Gesture:
             (1 - 0.8 * w * pull) * bone + 0.8 * w * pull * bow for bone in body.reach(side, bent, (0.3, -1.0, -0.4))
         ]
         body.move_arm(side, way, bones[0], bones[1], 0.04)
-        aim = np.array([-bow[0], bow[1], bow[2]])  # outward is the other way for the drawing hand
-        string = body.from_shoulder(draws, body.joints[:, ARMS[side][3]]) - 0.1 * aim
-        beside = np.array([aim[2], 0.0, -aim[0]])
-        string += 0.08 * beside
-        face = body.from_shoulder(draws, body.joints[:, _HEAD]) + cheek[0] * beside + [0.0, cheek[1], 0.0]
-        u = pulled[:, None]
-        pole = (1 - u) * (0.8 * beside - [0.0, 0.7, 0.0]) + u * [-0.9 * aim[0], high, -0.9 * aim[2]]
-        body.move_arm(draws, way, *body.reach(draws, (1 - u) * string + u * (face + cheek[2] * aim), pole), 0.04)
+        string_hand.move(body, way, pulled[:, None], bow)
 
     kinds = ["draw-bow", "draw-bow-loose" if looses else "draw-bow-hold", "draw-bow-hand"]
     if shots > 1:
@@ -88,3 +74,64 @@ def draw_bow(rng: random.Random) -> Gesture:
         kinds.append("draw-bow-aim")
     seconds = end + fall + rng.uniform(0.2, 0.8)
     return Gesture(min(seconds, _LONGEST), tuple(kinds), change, side, shots)
+
+
+def _pulls(
+    rng: random.Random, first: float, shots: int, seconds: tuple[float, float, float], *, looses: bool
+) -> tuple[list[float], list[float]]:
+    """Times and how far the string is drawn at each: 0 at the bow, 1 at the cheek, more behind it after a release.
+
+    Args:
+        rng: draws how far the hand goes after each release.
+        first: seconds at which the first shot is begun.
+        shots: their number.
+        seconds: of a draw, of its hold, and from one release to the next draw.
+        looses: the string is released at last.
+    """
+    draw, hold, again = seconds
+    at, drawn, goes = [0.0, first], [0.0, 0.0], first
+    for shot in range(shots):
+        at += [goes + draw, goes + draw + hold]
+        drawn += [1.0, 1.0]
+        if looses:
+            at.append(at[-1] + 0.12)
+            drawn.append(1.0 + rng.uniform(0.25, 0.45))
+        if shot < shots - 1:
+            goes = at[-1] + again
+            at += [at[-1] + 0.2, goes]
+            drawn += [drawn[-1], 0.0]
+    return at, drawn
+
+
+@dataclass(frozen=True)
+class _StringHand:
+    """The hand that draws the string.
+
+    Attributes:
+        side: of the hand.
+        cheek: metres from the head to where it is at full draw, aside, up and toward the target.
+        high: height of the elbow's direction at full draw.
+    """
+
+    side: str
+    cheek: tuple[float, float, float]
+    high: float
+
+    def move(self, body: StandingBody, way: Array, u: Array, bow: Array) -> None:
+        """Move the hand from the string (`u` 0) to the cheek (1) and beyond.
+
+        Args:
+            body: whose other arm holds the bow already.
+            way: (T,) share of the gesture.
+            u: (T, 1) how far the string is drawn.
+            bow: direction of the arm that holds the bow.
+        """
+        aim = np.array([-bow[0], bow[1], bow[2]])  # outward is the other way for this hand
+        aside, up, ahead = self.cheek
+        string = body.from_shoulder(self.side, body.joints[:, ARMS[_OTHER[self.side]][3]]) - 0.1 * aim
+        beside = np.array([aim[2], 0.0, -aim[0]])
+        string += 0.08 * beside
+        face = body.from_shoulder(self.side, body.joints[:, _HEAD]) + aside * beside + [0.0, up, 0.0]
+        pole = (1 - u) * (0.8 * beside - [0.0, 0.7, 0.0]) + u * [-0.9 * aim[0], self.high, -0.9 * aim[2]]
+        bones = body.reach(self.side, (1 - u) * string + u * (face + ahead * aim), pole)
+        body.move_arm(self.side, way, *bones, 0.04)

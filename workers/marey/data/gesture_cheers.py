@@ -5,11 +5,14 @@ from __future__ import annotations
 import random
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of
 from marey.data.gesture_hops import jumps
 from marey.data.gesture_poses import StandingBody, envelope, stations
 from marey.data.part import FPS
+
+Array = NDArray[np.floating]
 
 _PUMPS = {
     "cheer-both": {"low": ((0.14, 0.24), (0.06, 0.22), (0.1, 0.2)), "high": ((0.1, 0.26), (0.4, 0.47), (0.04, 0.14))},
@@ -45,18 +48,11 @@ def cheer(rng: random.Random) -> Gesture:
     crouch = rng.uniform(2, 9) if form != "cheer-yes" else rng.uniform(8, 18)
     pulls = form == "cheer-yes"  # the fists are up first and are pulled down
     jumped = jumps(rng, (), start + 0.1, rng.uniform(0.3, 0.4), times) if form == "cheer-jump" else None
-    times_at, points = [start + wind], [high if pulls else low]
-    for k in range(times):
-        last = k == times - 1
-        for seconds, point in (
-            ((down, low), (pause, low), (up, high)) if pulls else ((up, high), (pause, high), (down, low))
-        ):
-            if last and not pulls and point is low:
-                continue
-            if last and pulls and point is high:
-                continue
-            times_at.append(times_at[-1] + seconds)
-            points.append(point)
+    first = start + wind
+    if pulls:
+        times_at, points = _pumps(first, times, (high, low), (down, pause, up))
+    else:
+        times_at, points = _pumps(first, times, (low, high), (up, pause, down))
     end = times_at[-1] + hold
     if jumped is not None:
         end = max(end, jumped.seconds - fall - 0.2)
@@ -82,3 +78,22 @@ def cheer(rng: random.Random) -> Gesture:
     untrue += "|arms|hands" if side != BOTH else ""
     seconds = end + fall + rng.uniform(0.2, 0.8)
     return Gesture(seconds, tuple(filter(None, kinds)), change, side, times, untrue=untrue)
+
+
+def _pumps(
+    first: float, times: int, ends: tuple[Array, Array], seconds: tuple[float, float, float]
+) -> tuple[list[float], list[Array]]:
+    """Times and places (3,) of a fist that is pumped `times` times from the first of `ends` to the second, where it
+    stays.
+
+    Args:
+        seconds: of a pump, of the pause after it, and of the way back.
+    """
+    (home, there), (out, pause, back) = ends, seconds
+    at, points = [first], [home]
+    for k in range(times):
+        for length, point in ((out, there), (pause, there), (back, home)):
+            if point is there or k < times - 1:
+                at.append(at[-1] + length)
+                points.append(point)
+    return at, points

@@ -58,11 +58,7 @@ def hang(rng: random.Random) -> Gesture:
         ["hang-still", "hang-swing", "hang-side", "hang-kick", "hang-pull", "hang-raise"], (4, 5, 3, 3, 3, 2)
     )[0]
     ledge = form in ("hang-still", "hang-kick", "hang-pull") and rng.random() < 0.35
-    legs = (
-        "ledge" if ledge else rng.choices(["straight", "bent", "tucked"], (6, 3, 0 if form == "hang-raise" else 1))[0]
-    )
-    if form in ("hang-swing", "hang-raise"):
-        legs = rng.choice(["straight", "straight", "bent"]) if form == "hang-swing" else "straight"
+    legs = "ledge" if ledge else _legs(rng, form)
     seconds = rng.uniform(2.2, 7.5)
     bar: Point = (rng.uniform(0.18, 0.32), rng.uniform(2.25, 2.75), rng.uniform(0.02, 0.1))
     reach = _SHOULDERS + math.sqrt(_ARM**2 - (bar[0] - _HALF) ** 2 - _BEHIND**2)
@@ -72,23 +68,7 @@ def hang(rng: random.Random) -> Gesture:
     still = _hanging(rng, bar, reach, legs)
     done = Sequel([rng.uniform(0.1, 0.5)], [still])
     while done.times[-1] < seconds:
-        if form == "hang-pull":
-            neck = (-14.0, 0.0, 0.0)
-            top = _hanging(rng, bar, rng.uniform(0.6, 0.68), legs)
-            done.then(rng.uniform(0.6, 1.1), replace(top, neck=neck, spine=(-4, 0, 0)), rng.uniform(0.05, 0.4))
-            done.then(rng.uniform(0.7, 1.2), _hanging(rng, bar, reach, legs), rng.uniform(0.2, 0.8))
-        elif form == "hang-raise":
-            done.then(rng.uniform(0.6, 1.0), _hanging(rng, bar, reach, "tucked"), rng.uniform(0.1, 0.4))
-            done.then(rng.uniform(0.6, 1.0), _hanging(rng, bar, reach, legs), rng.uniform(0.2, 0.6))
-        elif form == "hang-kick":
-            far = rng.uniform(0.08, 0.2)
-            for sign in (1.0, -1.0):
-                kick = (0.0, 0.25 * far if legs == "ledge" else 0.0, sign * far)
-                done.then(rng.uniform(0.28, 0.45), _hanging(rng, bar, reach, legs, kick))
-        else:
-            moved = _hanging(rng, bar, reach + rng.uniform(-0.012, 0.0), legs)
-            look = rng.uniform(-35, 35) if rng.random() < 0.4 else 0.0
-            done.then(rng.uniform(0.8, 1.4), replace(moved, neck=(rng.uniform(-14, 8), 0, look)), rng.uniform(0.1, 0.6))
+        _move(rng, done, form, bar, reach, legs)
     axis = "forward" if form == "hang-side" else "left"
     rate, phase = rng.uniform(0.38, 0.5), rng.uniform(0, 6.3)
     whip = rng.uniform(0.2, 0.5)
@@ -110,6 +90,39 @@ def hang(rng: random.Random) -> Gesture:
     untrue += ["pull"] if form != "hang-pull" else []
     seconds = done.times[-1] + rng.uniform(0.2, 0.5)
     return Gesture(seconds, tuple(filter(None, told)), change, untrue="|".join(untrue))
+
+
+def _legs(rng: random.Random, form: str) -> str:
+    """Draw how the legs hang from a bar, a key of `_LEGS`."""
+    legs = rng.choices(["straight", "bent", "tucked"], (6, 3, 0 if form == "hang-raise" else 1))[0]
+    if form == "hang-swing":
+        return rng.choice(["straight", "straight", "bent"])
+    return "straight" if form == "hang-raise" else legs
+
+
+def _move(rng: random.Random, done: Sequel, form: str, bar: Point, reach: float, legs: str) -> None:
+    """Add one pull, raise of the legs, kick or look to a sequence of a body that hangs.
+
+    Args:
+        reach: metres from the bar to the hips while it only hangs.
+    """
+    if form == "hang-pull":
+        neck = (-14.0, 0.0, 0.0)
+        top = _hanging(rng, bar, rng.uniform(0.6, 0.68), legs)
+        done.then(rng.uniform(0.6, 1.1), replace(top, neck=neck, spine=(-4, 0, 0)), rng.uniform(0.05, 0.4))
+        done.then(rng.uniform(0.7, 1.2), _hanging(rng, bar, reach, legs), rng.uniform(0.2, 0.8))
+    elif form == "hang-raise":
+        done.then(rng.uniform(0.6, 1.0), _hanging(rng, bar, reach, "tucked"), rng.uniform(0.1, 0.4))
+        done.then(rng.uniform(0.6, 1.0), _hanging(rng, bar, reach, legs), rng.uniform(0.2, 0.6))
+    elif form == "hang-kick":
+        far = rng.uniform(0.08, 0.2)
+        for sign in (1.0, -1.0):
+            kick = (0.0, 0.25 * far if legs == "ledge" else 0.0, sign * far)
+            done.then(rng.uniform(0.28, 0.45), _hanging(rng, bar, reach, legs, kick))
+    else:
+        moved = _hanging(rng, bar, reach + rng.uniform(-0.012, 0.0), legs)
+        look = rng.uniform(-35, 35) if rng.random() < 0.4 else 0.0
+        done.then(rng.uniform(0.8, 1.4), replace(moved, neck=(rng.uniform(-14, 8), 0, look)), rng.uniform(0.1, 0.6))
 
 
 def _swing(body: StandingBody, axis: str, degrees: Array, legs: Array) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,23 +49,8 @@ def shoot(rng: random.Random) -> Gesture:
     side = rng.choices(SIDES, (1, 2))[0]
     back, up, fall = (rng.uniform(*fire[name]) for name in ("back", "up", "fall"))
     burst, pumps = form == "shoot-burst", form == "shoot-shotgun" and rng.random() < 0.6
-    shots = rng.choices((1, 2, 3, 4, 6), (3, 3, 3, 2, 2))[0]
-    gap = (rng.uniform(1.1, 1.6) if pumps else rng.uniform(fall + 0.15, fall + 0.7)) if not burst else 0.15
-    start, rise, ready = rng.uniform(0.1, 0.7), rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.8)
-    aimed = rng.random() < 0.4  # from the first frame to the last
-    if aimed:
-        start, rise = -1.0, 0.5
-        ready += 0.5
-    times = _times(rng, start + rise + ready, shots, gap, burst)
-    if not burst:
-        while len(times) > 1 and times[-1] > 6.2:
-            times.pop()
-    hold = times[-1] + fall + (0.9 if pumps else 0.2) + rng.uniform(0.3, 0.9) - start - rise
-    if aimed:
-        hold = max(hold, _SHORTEST - start - rise)
-    lower = rise * rng.uniform(0.9, 1.4)
-    pace = GesturePace(start, rise, hold, 99.0 if aimed else lower)
-    seconds = start + rise + hold + (0.0 if aimed else lower + rng.uniform(0.2, 0.8))
+    firing = _Firing.draw(rng, fall, burst=burst, pumps=pumps)
+    times = firing.times
     hands, degrees = GUNS[fire["gun"]](rng, side), rng.uniform(*TWISTS[fire["gun"]])
     turned = _OTHER[side] if fire["gun"] == "aim-rifle" else side
     stoop, head, rock = rng.uniform(2, 10), rng.uniform(0, 7), 60 * back * rng.uniform(0.7, 1.3)
@@ -73,10 +59,11 @@ def shoot(rng: random.Random) -> Gesture:
 
     def change(body: StandingBody) -> None:
         frames = len(body.joints)
-        way = pace.way(body)
+        way = firing.pace.way(body)
         if stance:
+            start = firing.pace.start
             for one, sign in ((lead, 1.0), (_OTHER[lead], -1.0)):
-                began = -2.0 if aimed else start + (0.0 if sign > 0 else 0.3)
+                began = -2.0 if firing.aimed else start + (0.0 if sign > 0 else 0.3)
                 step(body, one, (0.03, sign * stance / 2), began, 0.35, turn=4.0 if sign > 0 else 14.0)
             body.shift(-0.02 * way)
             settle(body)
@@ -97,7 +84,45 @@ def shoot(rng: random.Random) -> Gesture:
     kinds = ["shoot", form, count, "shoot-pump" if pumps else ""]
     told = side if form == "shoot-one" else BOTH
     untrue = "|".join(word for word in ("rifle", "pistol", "shotgun", "machine") if word != _WORDS[form])
-    return Gesture(seconds, tuple(filter(None, kinds)), change, told, len(times), untrue=untrue)
+    return Gesture(firing.seconds, tuple(filter(None, kinds)), change, told, len(times), untrue=untrue)
+
+
+@dataclass(frozen=True)
+class _Firing:
+    """When a gun is lifted, fired and lowered.
+
+    Attributes:
+        pace: of the arms.
+        times: seconds at which shots go off.
+        aimed: the gun is up from the first frame to the last.
+        seconds: of the gesture.
+    """
+
+    pace: GesturePace
+    times: list[float]
+    aimed: bool
+    seconds: float
+
+    @classmethod
+    def draw(cls, rng: random.Random, fall: float, *, burst: bool, pumps: bool) -> _Firing:
+        """Draw the times of a gun whose recoil goes in `fall` seconds."""
+        shots = rng.choices((1, 2, 3, 4, 6), (3, 3, 3, 2, 2))[0]
+        gap = (rng.uniform(1.1, 1.6) if pumps else rng.uniform(fall + 0.15, fall + 0.7)) if not burst else 0.15
+        start, rise, ready = rng.uniform(0.1, 0.7), rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.8)
+        aimed = rng.random() < 0.4
+        if aimed:
+            start, rise = -1.0, 0.5
+            ready += 0.5
+        times = _times(rng, start + rise + ready, shots, gap, burst)
+        if not burst:
+            while len(times) > 1 and times[-1] > 6.2:
+                times.pop()
+        hold = times[-1] + fall + (0.9 if pumps else 0.2) + rng.uniform(0.3, 0.9) - start - rise
+        if aimed:
+            hold = max(hold, _SHORTEST - start - rise)
+        lower = rise * rng.uniform(0.9, 1.4)
+        seconds = start + rise + hold + (0.0 if aimed else lower + rng.uniform(0.2, 0.8))
+        return cls(GesturePace(start, rise, hold, 99.0 if aimed else lower), times, aimed, seconds)
 
 
 def _times(rng: random.Random, first: float, shots: int, gap: float, burst: bool) -> list[float]:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
 from marey.data.gesture_stances import glide, settle, step, turn_hips
+
+Array = NDArray[np.floating]
 
 _OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _NECK = (12,)
@@ -37,45 +42,26 @@ def throw(rng: random.Random) -> Gesture:
     snap = {"hard": rng.uniform(0.8, 0.95), "": rng.uniform(0.95, 1.15), "easy": rng.uniform(1.1, 1.3)}[hard]
     stride = {"hard": rng.uniform(0.3, 0.5), "": rng.uniform(0.0, 0.4), "easy": rng.uniform(-0.2, 0.2)}[hard]
     stride = 0.0 if stride < 0.12 else stride
-    start, gather = rng.uniform(0.1, 0.9), rng.uniform(0.35, 0.7)
-    wait = rng.choice([0.1, rng.uniform(0.1, 1.0)])
-    wind, hang = rng.uniform(0.45, 0.9), rng.uniform(0.06, 0.3)
-    begin = start + gather + wait  # of the wind-up
-    go = begin + wind + hang
-    pass_by, let_go = go + 0.14 * snap, go + 0.26 * snap
-    stop = let_go + rng.uniform(0.22, 0.4)
-    rest, fall = rng.uniform(0.1, 0.7), rng.uniform(0.5, 1.0)
+    phases = _Phases.draw(rng, snap)
     chest = np.array([rng.uniform(0.04, 0.14), rng.uniform(-0.28, -0.12), rng.uniform(0.22, 0.32)])
     places = [np.array(place) + [rng.gauss(0, 0.025) for _ in range(3)] for place in _THROWS[form]]
     lifted = [0.15, 0.24, 0.24] if side == BOTH else 0.5 * (chest + places[0]) + [0.06, 0.0, 0.0]
     points = [chest, chest, lifted, places[0], places[0] + [0.0, 0.0, -0.03], *places[1:]]
-    times = [0.0, begin, begin + 0.5 * wind, begin + wind, go, pass_by, let_go, stop]
     gathers, counters = rng.random() < 0.5, rng.random() < 0.65
     returns = rng.random() < 0.7
     sink = rng.uniform(0.01, 0.05)
 
     def change(body: StandingBody) -> None:
-        frames = len(body.joints)
-        way = envelope(frames, start, gather, stop + rest - start - gather, fall)
-        end = stop + rest + fall
+        way = phases.way(body)
         bends = [(0, 0, 0), (0, 0, 0), (-1, -back, -1), (-1, -back, -1), (0.6, stoop, 1), (0.5, 0.8 * stoop, 0.6)]
-        turned, bent, leant = glide(
-            frames,
-            [0.0, begin, begin + wind, go, let_go, stop, end],
-            [*[(a * twist, b, c * sway) for a, b, c in bends], (0, 0, 0)],
-        ).T
+        turned, bent, leant = phases.trunk(body, [*[(a * twist, b, c * sway) for a, b, c in bends], (0, 0, 0)])
         sign = 1.0 if side == LEFT else -1.0
-        forth = glide(frames, [0.0, begin, go - 0.1, let_go, stop, end], [[0], [0], [-0.03], [1], [1], [0]])[:, 0]
         if stride:
-            step(body, lead, (0.0, stride), go - 0.4, 0.4)
+            step(body, lead, (0.0, stride), phases.go - 0.4, 0.4)
             if returns:
-                step(body, lead, (0.0, -stride), stop + rest, 0.5)
-                body.shift(-sink * np.clip(forth, 0, 1), 0.45 * stride * forth)
-            else:
-                held = glide(frames, [0.0, go - 0.1, let_go, end], [[0], [-0.02], [1], [0.9]])[:, 0]
-                body.shift(-sink * np.clip(held, 0, 1), 0.45 * stride * held)
-        else:
-            body.shift(-sink * np.clip(forth, 0, 1), 0.05 * forth)
+                step(body, lead, (0.0, -stride), phases.lower, 0.5)
+        forth = phases.forth(body, returns=returns or not stride)
+        body.shift(-sink * np.clip(forth, 0, 1), (0.45 * stride or 0.05) * forth)
         turn_hips(body, -sign * -0.35 * turned if side != BOTH else 0.0 * turned)
         body.lean(sign * turned if side != BOTH else 0.0 * turned, "up")
         body.turn(0, "left", 0.3 * bent)
@@ -83,17 +69,82 @@ def throw(rng: random.Random) -> Gesture:
         body.lean(-sign * leant, "forward")
         body.lean(-0.3 * bent - 4 * way, "left", _NECK)
         settle(body)
-        path = glide(frames, times, points)
+        path = glide(len(body.joints), phases.hand, points)
         for one in SIDES:
             if side in (one, BOTH):
                 body.hold(one, way, path, lag=0.0, pole=(1.0, -0.4, -0.3))
             elif gathers or counters:
-                _other_hand(body, one, way, times, chest, gathers=gathers, counters=counters)
+                _other_hand(body, one, way, phases.hand, chest, gathers=gathers, counters=counters)
 
     kinds = ["throw", form, "throw-hand" if side != BOTH else "throw-both"]
     kinds += [f"throw-{hard}"] if hard else []
     kinds += ["throw-step"] if stride > 0.2 else []
-    return Gesture(stop + rest + fall + rng.uniform(0.35, 1.0), tuple(dict.fromkeys(kinds)), change, side)
+    return Gesture(phases.end + rng.uniform(0.35, 1.0), tuple(dict.fromkeys(kinds)), change, side)
+
+
+@dataclass(frozen=True)
+class _Phases:
+    """Seconds at which a throw goes from one phase to the next.
+
+    Attributes:
+        start: the hands go to the ball before the chest; `gather`: how long that takes.
+        begin: of the wind-up, which takes `wind`.
+        go, pass_by, let_go: the arm comes forward, passes the body and lets go.
+        stop: of the hand.
+        lower: the hands go down, which takes `fall`.
+    """
+
+    start: float
+    gather: float
+    begin: float
+    wind: float
+    go: float
+    pass_by: float
+    let_go: float
+    stop: float
+    lower: float
+    fall: float
+
+    @classmethod
+    def draw(cls, rng: random.Random, snap: float) -> _Phases:
+        """Draw the times; `snap`: factor of the seconds from `go` to `let_go`."""
+        start, gather = rng.uniform(0.1, 0.9), rng.uniform(0.35, 0.7)
+        wait = rng.choice([0.1, rng.uniform(0.1, 1.0)])
+        wind, hang = rng.uniform(0.45, 0.9), rng.uniform(0.06, 0.3)
+        begin = start + gather + wait
+        go = begin + wind + hang
+        let_go = go + 0.26 * snap
+        stop = let_go + rng.uniform(0.22, 0.4)
+        rest, fall = rng.uniform(0.1, 0.7), rng.uniform(0.5, 1.0)
+        return cls(start, gather, begin, wind, go, go + 0.14 * snap, let_go, stop, stop + rest, fall)
+
+    @property
+    def end(self) -> float:
+        return self.lower + self.fall
+
+    @property
+    def hand(self) -> list[float]:
+        """Times of the eight places of the hand that throws."""
+        middle, wound = self.begin + 0.5 * self.wind, self.begin + self.wind
+        return [0.0, self.begin, middle, wound, self.go, self.pass_by, self.let_go, self.stop]
+
+    def way(self, body: StandingBody) -> Array:
+        """Share (T,) of the gesture."""
+        hold = self.lower - self.start - self.gather
+        return envelope(len(body.joints), self.start, self.gather, hold, self.fall)
+
+    def trunk(self, body: StandingBody, bends: Sequence[tuple[float, float, float]]) -> Array:
+        """Degrees (3, T) of the trunk, through seven bends."""
+        times = [0.0, self.begin, self.begin + self.wind, self.go, self.let_go, self.stop, self.end]
+        return glide(len(body.joints), times, bends).T
+
+    def forth(self, body: StandingBody, *, returns: bool) -> Array:
+        """Share (T,) of the weight that is on the foot ahead, and stays there unless it returns."""
+        if returns:
+            times = [0.0, self.begin, self.go - 0.1, self.let_go, self.stop, self.end]
+            return glide(len(body.joints), times, [[0], [0], [-0.03], [1], [1], [0]])[:, 0]
+        times = [0.0, self.go - 0.1, self.let_go, self.end]
+        return glide(len(body.joints), times, [[0], [-0.02], [1], [0.9]])[:, 0]
 
 
 def _other_hand(

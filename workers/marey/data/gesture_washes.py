@@ -69,26 +69,34 @@ def wash(rng: random.Random) -> Gesture:
         body.lean(look * way, "left", (12,))
         sway = sine if form not in ("wash-face",) else np.zeros(frames)
         body.lean(turn * nod * sway * way, "up", (6, 9))
-        points = {
-            side: at + sine[:, None] * stroke[0] + later[:, None] * stroke[1] + drift * np.array([moves, 0.0, 0.0])
-        }
-        other = _OTHER[side]
-        if form == "wash-hands":
-            points[other] = at + np.array([0.01, -0.02, 0.01]) - sine[:, None] * stroke[0]
-        elif form == "wash-face":
-            points[other] = points[side]
-        elif form == "wash-dishes":
-            points[other] = at * np.array([0.0, 1.0, 1.0]) + np.array([0.05, -0.04, 0.04])
-        elif braced:
-            points[other] = rest
-        for one, point in points.items():
-            body.hold(one, way, point, lag=0.02, pole=_POLE)
+        along = sine[:, None] * stroke[0]
+        rubbing = at + along + later[:, None] * stroke[1] + drift * np.array([moves, 0.0, 0.0])
+        body.hold(side, way, rubbing, lag=0.02, pole=_POLE)
+        other = rest if braced else _other_hand(form, at, along, rubbing)
+        if other is not None:
+            body.hold(_OTHER[side], way, other, lag=0.02, pole=_POLE)
 
     told = BOTH if both or form == "wash-dishes" else side
     wide = f"{form}-circles" if kind == "circles" else ""
     kinds = [form, "wash" if form in ("wash-hands", "wash-face", "wash-body") else "wipe", wide]
     untrue = "|".join({*_THINGS} - {*_TOLD[form]})
     return Gesture(pace.total(rng) if not whole else hold, tuple(filter(None, kinds)), change, told, untrue=untrue)
+
+
+def _other_hand(form: str, at: Array, along: Array, rubbing: Array) -> Array | None:
+    """Where the second hand is, (3,) or (T, 3), None if it hangs.
+
+    Args:
+        at: the middle of the first hand's strokes, (3,).
+        along, rubbing: (T, 3) the strokes of the first hand, from their middle and from the shoulders.
+    """
+    if form == "wash-hands":
+        return at + np.array([0.01, -0.02, 0.01]) - along
+    if form == "wash-face":
+        return rubbing
+    if form == "wash-dishes":
+        return at * np.array([0.0, 1.0, 1.0]) + np.array([0.05, -0.04, 0.04])
+    return None
 
 
 def _stroke(form: str, kind: str, size: float, rng: random.Random) -> Array:
