@@ -55,10 +55,7 @@ def dribble(rng: random.Random) -> Gesture:
         beat = 2 * np.pi * rate * t + phase
         stroke = strong * (np.cos(beat) + 0.16 * np.cos(2 * beat))
         if not walks:
-            for one, ahead in ((side, -back), (_OTHER[side], 0.3 * back)):
-                step(body, one, (wide, ahead), start - 0.1, 0.4)
-                if ends:
-                    step(body, one, (-wide, -ahead), end + (0.1 if one == side else 0.4), 0.4)
+            _stand_apart(body, side, (wide, back), start - 0.1, end if ends else None)
             body.shift(np.zeros(frames), -0.35 * back * way)
         body.shift(-sink * way - 0.06 * strong * way * (1 - np.cos(beat + 0.6)))
         body.bow((bent - 12 * stroke) * way, arms_hang=0.8, head=gaze)
@@ -83,6 +80,20 @@ def dribble(rng: random.Random) -> Gesture:
     seconds = end + (fall + 0.5 if ends else 0.0)
     content, base_of = ("walk", base) if walks else ("idle", None)
     return Gesture(min(seconds, 9.6), tuple(kinds), change, side, base=base_of, content=content)
+
+
+def _stand_apart(body: StandingBody, side: str, apart: tuple[float, float], start: float, end: float | None) -> None:
+    """Step apart at `start`, the foot of the ball back, and together again at `end` seconds.
+
+    Args:
+        side: of the hand that has the ball first.
+        apart: metres of each foot outward, and of that foot back.
+    """
+    wide, back = apart
+    for one, ahead, waits in ((side, -back, 0.1), (_OTHER[side], 0.3 * back, 0.4)):
+        step(body, one, (wide, ahead), start, 0.4)
+        if end is not None:
+            step(body, one, (-wide, -ahead), end + waits, 0.4)
 
 
 def _turns(t: Array, every: float, *, crosses: bool) -> Array:

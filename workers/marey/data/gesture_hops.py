@@ -9,7 +9,7 @@ from dataclasses import replace
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_flights import StandingFoot, fly, on_feet
 from marey.data.gesture_poses import LEFT, RIGHT
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Posture
 from marey.data.gesture_sequels import Sequel, both, near
 
 _LONGEST = 7.6
@@ -33,61 +33,93 @@ _ARMS = {
 
 def hop(rng: random.Random) -> Gesture:
     """Drawn for the right foot and mirrored for the left one; the left foot is lifted."""
-    side = rng.choice(SIDES)
-    flight, ground = rng.uniform(0.22, 0.36), rng.uniform(0.24, 0.4)
-    times = rng.randint(1, min(9, int(_LONGEST / (flight + ground)) - 2))
-    stride = rng.choice((0.0, rng.uniform(0.2, 0.55)))
-    form = rng.choices(list(_FREE), (4, 3, 2))[0]
-    free, knee = _FREE[form]
-    free = replace(free, at=near(rng, free.at, 0.03))
-    arms, swing = rng.choice(list(_ARMS)), rng.uniform(0.02, 0.1)
-    dip, deep, lean = rng.uniform(0.05, 0.09), rng.uniform(0.0, 0.03), rng.uniform(2, 9) + 8 * stride
-    starts, lift = rng.uniform(0.15, 0.7), rng.uniform(0.3, 0.5)
-    more = [rng.uniform(0.93, 1.07) for _ in range(times)]
-    after = rng.uniform(0.3, 0.7)
-
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
-        on = feet[RIGHT]
-
-        def at(up: float, where: float, foot: FootPlace | None, high: float) -> Posture:
-            hand = _ARMS[arms]
-            lifted = replace(hand, at=(hand.at[0], hand.at[1] + swing * high, hand.at[2]))
-            raised = replace(free, at=(free.at[0], free.at[1] + up - 0.9, free.at[2] + where))
-            places = {LEFT: raised, RIGHT: foot} if foot else {LEFT: raised}
-            pelvis: Point = (-on.out + 0.02, up, on.forward + where - 0.02)
-            return Posture(pelvis, (lean, 2, 0), (lean, 0, 0), hands=both(lifted), feet=places, knees={LEFT: knee})
-
-        done = Sequel([starts])
-        done.then(lift, Posture((-on.out + 0.02, 0.92, on.forward - 0.02), (2, 0, 0), (3, 0, 0)))
-        done.then(lift, at(0.92, 0.0, on.flat(), 0.0), 0.1)
-        done.then(0.6 * ground, at(0.92 - dip, 0.0, on.flat(), -1.0))
-        for k in range(times):
-            here, there, seconds = k * stride, (k + 1) * stride, flight * more[k]
-            leaving = at(0.955, here + 0.22 * stride, on.tiptoe(_LEAVES, here), 1.0)
-            landing = at(0.94, there - 0.2 * stride, on.tiptoe(38, there), 0.4)
-            done.then(0.45 * ground, leaving)
-
-            def shaped(share: float, rise: float, here: float = here) -> Posture:
-                """The foot hangs with its toes down and goes ahead."""
-                moved = here + share * stride
-                foot = on.tiptoe(58 - 18 * share, moved, rise + 0.03 * (1 - abs(2 * share - 1)))
-                return at(0.95 + rise, moved, foot, 1.0)
-
-            fly(done, seconds, leaving, landing, shaped)
-            last = k == times - 1
-            done.then(0.08, at(0.91, there - 0.08 * stride, on.flat(there), 0.0))
-            done.then(0.47 * ground, at(0.92 - dip - deep, there, on.flat(there), -1.0), 0.15 if last else 0.0)
-        end = times * stride
-        done.then(0.35, at(0.92, end, on.flat(end), 0.0), 0.1)
-        down = {one: foot.flat(end) for one, foot in feet.items()}
-        done.then(0.45, Posture((0.0, 0.93, end), feet=down) if stride else STAND)
-        return done
-
+    drawn = _Hops(rng)
+    times, form, stride = drawn.times, drawn.form, drawn.stride
     kinds = ["hop", "hop-ahead" if stride else "hop-place", "hop-once" if times == 1 else "hop-many", form]
     if form == "hop-bent":
         kinds.pop()
     untrue = "bunny|place" if stride else "bunny|around|along"
-    return replace(on_feet(sequel, kinds, after, side=side, mirror=side == LEFT, times=times), untrue=untrue)
+    side = drawn.side
+    gesture = on_feet(drawn.sequel, kinds, drawn.after, side=side, mirror=side == LEFT, times=times)
+    return replace(gesture, untrue=untrue)
+
+
+class _Hops:
+    """Hops on the right foot.
+
+    Attributes:
+        side: of the foot that is hopped on once the gesture is mirrored.
+        form: key of `_FREE`, for the lifted foot, which is at `free`, its knee toward `knee`.
+        times, stride: number of hops, and metres of each.
+        flight, more, ground: seconds of a flight, a factor of it for each hop, and seconds on the floor between.
+        arms, swing: key of `_ARMS`, and metres by which the hands go up and down.
+        dip, deep, lean: metres by which the hips go down at a hop and at a landing more, and degrees of the trunk.
+        starts, lift, after: seconds of standing before, of lifting the foot, and of standing after it.
+    """
+
+    def __init__(self, rng: random.Random) -> None:
+        self.side = rng.choice(SIDES)
+        self.flight, self.ground = rng.uniform(0.22, 0.36), rng.uniform(0.24, 0.4)
+        self.times = rng.randint(1, min(9, int(_LONGEST / (self.flight + self.ground)) - 2))
+        self.stride = rng.choice((0.0, rng.uniform(0.2, 0.55)))
+        self.form = rng.choices(list(_FREE), (4, 3, 2))[0]
+        free, self.knee = _FREE[self.form]
+        self.free = replace(free, at=near(rng, free.at, 0.03))
+        self.arms, self.swing = rng.choice(list(_ARMS)), rng.uniform(0.02, 0.1)
+        self.dip, self.deep = rng.uniform(0.05, 0.09), rng.uniform(0.0, 0.03)
+        self.lean = rng.uniform(2, 9) + 8 * self.stride
+        self.starts, self.lift = rng.uniform(0.15, 0.7), rng.uniform(0.3, 0.5)
+        self.more = [rng.uniform(0.93, 1.07) for _ in range(self.times)]
+        self.after = rng.uniform(0.3, 0.7)
+
+    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+        """The postures over the feet of an idle."""
+        on, done = feet[RIGHT], Sequel([self.starts])
+        low = 0.92 - self.dip
+        done.then(self.lift, Posture((-on.out + 0.02, 0.92, on.forward - 0.02), (2, 0, 0), (3, 0, 0)))
+        done.then(self.lift, self._at(on, 0.92, 0.0, on.flat(), 0.0), 0.1)
+        done.then(0.6 * self.ground, self._at(on, low, 0.0, on.flat(), -1.0))
+        for k in range(self.times):
+            there, last = (k + 1) * self.stride, k == self.times - 1
+            self._hop(done, on, k)
+            done.then(0.08, self._at(on, 0.91, there - 0.08 * self.stride, on.flat(there), 0.0))
+            landed = self._at(on, low - self.deep, there, on.flat(there), -1.0)
+            done.then(0.47 * self.ground, landed, 0.15 if last else 0.0)
+        end = self.times * self.stride
+        done.then(0.35, self._at(on, 0.92, end, on.flat(end), 0.0), 0.1)
+        down = {one: foot.flat(end) for one, foot in feet.items()}
+        done.then(0.45, Posture((0.0, 0.93, end), feet=down) if self.stride else STAND)
+        return done
+
+    def _hop(self, done: Sequel, on: StandingFoot, k: int) -> None:
+        """Add the way up to the toes and the flight of hop `k`."""
+        stride = self.stride
+        here, there = k * stride, (k + 1) * stride
+        leaving = self._at(on, 0.955, here + 0.22 * stride, on.tiptoe(_LEAVES, here), 1.0)
+        landing = self._at(on, 0.94, there - 0.2 * stride, on.tiptoe(38, there), 0.4)
+
+        def shaped(share: float, rise: float) -> Posture:
+            """The foot hangs with its toes down and goes ahead."""
+            moved = here + share * stride
+            foot = on.tiptoe(58 - 18 * share, moved, rise + 0.03 * (1 - abs(2 * share - 1)))
+            return self._at(on, 0.95 + rise, moved, foot, 1.0)
+
+        done.then(0.45 * self.ground, leaving)
+        fly(done, self.flight * self.more[k], leaving, landing, shaped)
+
+    def _at(self, on: StandingFoot, up: float, where: float, foot: FootPlace, high: float) -> Posture:
+        """The posture with the hips `up` over the floor and `where` ahead; `high`: share of the hands' swing."""
+        hand, free = _ARMS[self.arms], self.free
+        lifted = replace(hand, at=(hand.at[0], hand.at[1] + self.swing * high, hand.at[2]))
+        raised = replace(free, at=(free.at[0], free.at[1] + up - 0.9, free.at[2] + where))
+        return Posture(
+            (-on.out + 0.02, up, on.forward + where - 0.02),
+            (self.lean, 2, 0),
+            (self.lean, 0, 0),
+            hands=both(lifted),
+            feet={LEFT: raised, RIGHT: foot},
+            knees={LEFT: self.knee},
+        )
 
 
 _REACH = HandPlace((0.16, 0.42, 0.14), "shoulder", (0.8, 0.2, 0.2))
@@ -145,65 +177,88 @@ def jumps(
         ahead: metres of each.
         tuck: metres by which the feet are drawn up.
     """
-    dip = 0.1 + 0.75 * (flight - 0.3) + rng.uniform(0.0, 0.06)
-    land = 0.12 + 0.5 * (flight - 0.3) + rng.uniform(0.0, 0.05)
-    arms = rng.choice(["up", "ahead", "bent", "side"] if flight < 0.45 else ["up", "up", "ahead"])
-    crouch, rise = rng.uniform(0.32, 0.6), rng.uniform(0.17, 0.22)
-    absorb, after = rng.uniform(0.16, 0.24), rng.uniform(0.3, 0.9)
-    back = rng.choice(("back", "bent")) if times == 1 or arms != "bent" else "bent"
-    gaze, straighten = rng.uniform(-6, 4), rng.uniform(0.4, 0.7)
+    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
+    return on_feet(drawn.sequel, kinds, drawn.after, times=times)
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
-        def at(
-            up: float, where: float, feet_at: dict[str, FootPlace], hands: HandPlace, lean: float, spine: float = 0.0
-        ) -> Posture:
-            return Posture(
-                (0.0, up, where),
-                (lean, 0, 0),
-                (spine, 0, 0),
-                (gaze - 0.5 * lean, 0, 0),
-                hands=both(hands),
-                feet=feet_at,
-            )
 
-        def flat(where: float) -> dict[str, FootPlace]:
-            return {side: foot.flat(where) for side, foot in feet.items()}
+class _Jumps:
+    """Jumps of both feet; see `jumps`.
 
-        def tiptoe(degrees: float, where: float, up: float = 0.0) -> dict[str, FootPlace]:
-            return {side: foot.tiptoe(degrees, where, up) for side, foot in feet.items()}
+    Attributes:
+        dip, land: metres by which the hips go down before a jump, and when they land.
+        back, arms: where the hands are before a flight, and in it; keys of `_SWUNG`.
+        crouch, rise, absorb, straighten, after: seconds of going down, of leaving the floor, of landing, of standing
+            up, and of standing after it.
+        gaze: degrees of the neck.
+    """
 
-        hip_lean = 60 * dip
-        done = Sequel([starts])
-        done.then(crouch, at(0.92 - dip, -0.3 * dip, flat(0.0), _SWUNG[back], hip_lean, 0.8 * hip_lean), 0.04)
-        for k in range(times):
-            here, there = k * ahead, (k + 1) * ahead
-            lean = 4 + 16 * ahead
-            leaving = at(0.975 - 0.05 * ahead, here + 0.26 * ahead, tiptoe(_LEAVES, here), _SWUNG[arms], lean)
-            landing = at(0.93 - 0.05 * ahead, there - 0.16 * ahead, tiptoe(36, there), _SWUNG["bent"], 0.6 * lean)
-            done.then(rise, leaving)
+    def __init__(
+        self, rng: random.Random, starts: float, flight: float, times: int, *, ahead: float, tuck: float
+    ) -> None:
+        self.starts, self.flight, self.times, self.ahead, self.tuck = starts, flight, times, ahead, tuck
+        self.dip = 0.1 + 0.75 * (flight - 0.3) + rng.uniform(0.0, 0.06)
+        self.land = 0.12 + 0.5 * (flight - 0.3) + rng.uniform(0.0, 0.05)
+        self.arms = rng.choice(["up", "ahead", "bent", "side"] if flight < 0.45 else ["up", "up", "ahead"])
+        self.crouch, self.rise = rng.uniform(0.32, 0.6), rng.uniform(0.17, 0.22)
+        self.absorb, self.after = rng.uniform(0.16, 0.24), rng.uniform(0.3, 0.9)
+        self.back = rng.choice(("back", "bent")) if times == 1 or self.arms != "bent" else "bent"
+        self.gaze, self.straighten = rng.uniform(-6, 4), rng.uniform(0.4, 0.7)
 
-            def shaped(share: float, up: float, here: float = here, lean: float = lean) -> Posture:
-                drawn = tuck * (1 - (2 * share - 1) ** 2)
-                where = here + ahead * (share + 0.25 * share * (1 - share))
-                pointed = 66 - 26 * share - 20 * min(ahead, 1.0) * share
-                hands = _SWUNG[arms] if share < 0.6 else _SWUNG["side" if arms != "bent" else "bent"]
-                return at(
-                    0.95 + up, where, tiptoe(pointed, where, up + drawn), hands, lean * (1 - share), 4 + 40 * drawn
-                )
-
-            fly(done, flight, leaving, landing, shaped)
-            soft = at(0.92 - land, there - 0.3 * land, flat(there), _SWUNG["bent"], 70 * land, 50 * land)
-            done.then(
-                0.07, at(0.915 - 0.35 * land, there - 0.1 * ahead, flat(there), _SWUNG["bent"], 40 * land, 20 * land)
-            )
-            if k < times - 1:
-                done.then(
-                    absorb, at(0.92 - dip, there - 0.3 * dip, flat(there), _SWUNG[back], hip_lean, 0.6 * hip_lean)
-                )
+    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+        """The postures over the feet of an idle."""
+        done = Sequel([self.starts])
+        done.then(self.crouch, self._crouched(0.0, _flat(feet, 0.0), 0.8), 0.04)
+        for k in range(self.times):
+            here, there = k * self.ahead, (k + 1) * self.ahead
+            self._jump(done, feet, here, there)
+            flat, land = _flat(feet, there), self.land
+            touch = self._at(0.915 - 0.35 * land, there - 0.1 * self.ahead, flat, _SWUNG["bent"], 40 * land, 20 * land)
+            done.then(0.07, touch)
+            if k < self.times - 1:
+                done.then(self.absorb, self._crouched(there, flat, 0.6))
             else:
-                done.then(absorb, soft, 0.05)
-        end = times * ahead
-        done.then(straighten, Posture((0.0, 0.935, end), feet=flat(end)) if ahead else STAND)
+                soft = self._at(0.92 - land, there - 0.3 * land, flat, _SWUNG["bent"], 70 * land, 50 * land)
+                done.then(self.absorb, soft, 0.05)
+        end = self.times * self.ahead
+        done.then(self.straighten, Posture((0.0, 0.935, end), feet=_flat(feet, end)) if self.ahead else STAND)
         return done
 
-    return on_feet(sequel, kinds, after, times=times)
+    def _jump(self, done: Sequel, feet: dict[str, StandingFoot], here: float, there: float) -> None:
+        """Add the way up to the toes and the flight from one place to another, metres ahead of the idle's."""
+        ahead, arms = self.ahead, _SWUNG[self.arms]
+        lean = 4 + 16 * ahead
+        leaving = self._at(0.975 - 0.05 * ahead, here + 0.26 * ahead, _tiptoe(feet, _LEAVES, here), arms, lean)
+        landing = self._at(
+            0.93 - 0.05 * ahead, there - 0.16 * ahead, _tiptoe(feet, 36, there), _SWUNG["bent"], 0.6 * lean
+        )
+
+        def shaped(share: float, up: float) -> Posture:
+            drawn = self.tuck * (1 - (2 * share - 1) ** 2)
+            where = here + ahead * (share + 0.25 * share * (1 - share))
+            pointed = 66 - 26 * share - 20 * min(ahead, 1.0) * share
+            hands = arms if share < 0.6 else _SWUNG["side" if self.arms != "bent" else "bent"]
+            toes = _tiptoe(feet, pointed, where, up + drawn)
+            return self._at(0.95 + up, where, toes, hands, lean * (1 - share), 4 + 40 * drawn)
+
+        done.then(self.rise, leaving)
+        fly(done, self.flight, leaving, landing, shaped)
+
+    def _crouched(self, where: float, feet: dict[str, FootPlace], bent: float) -> Posture:
+        """The posture before a jump; `bent`: share of the hips' lean that the spine leans too."""
+        lean = 60 * self.dip
+        return self._at(0.92 - self.dip, where - 0.3 * self.dip, feet, _SWUNG[self.back], lean, bent * lean)
+
+    def _at(
+        self, up: float, where: float, feet: dict[str, FootPlace], hands: HandPlace, lean: float, spine: float = 0.0
+    ) -> Posture:
+        return Posture(
+            (0.0, up, where), (lean, 0, 0), (spine, 0, 0), (self.gaze - 0.5 * lean, 0, 0), hands=both(hands), feet=feet
+        )
+
+
+def _flat(feet: dict[str, StandingFoot], where: float) -> dict[str, FootPlace]:
+    return {side: foot.flat(where) for side, foot in feet.items()}
+
+
+def _tiptoe(feet: dict[str, StandingFoot], degrees: float, where: float, up: float = 0.0) -> dict[str, FootPlace]:
+    return {side: foot.tiptoe(degrees, where, up) for side, foot in feet.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +48,7 @@ def shoot(rng: random.Random) -> Gesture:
     side = rng.choices(SIDES, (1, 2))[0]
     back, up, fall = (rng.uniform(*fire[name]) for name in ("back", "up", "fall"))
     burst, pumps = form == "shoot-burst", form == "shoot-shotgun" and rng.random() < 0.6
-    firing = _Firing.draw(rng, fall, burst=burst, pumps=pumps)
+    firing = _Firing(rng, fall, burst=burst, pumps=pumps)
     times = firing.times
     hands, degrees = GUNS[fire["gun"]](rng, side), rng.uniform(*TWISTS[fire["gun"]])
     turned = _OTHER[side] if fire["gun"] == "aim-rifle" else side
@@ -87,42 +86,35 @@ def shoot(rng: random.Random) -> Gesture:
     return Gesture(firing.seconds, tuple(filter(None, kinds)), change, told, len(times), untrue=untrue)
 
 
-@dataclass(frozen=True)
 class _Firing:
     """When a gun is lifted, fired and lowered.
 
     Attributes:
-        pace: of the arms.
-        times: seconds at which shots go off.
         aimed: the gun is up from the first frame to the last.
+        times: seconds at which shots go off.
+        pace: of the arms.
         seconds: of the gesture.
     """
 
-    pace: GesturePace
-    times: list[float]
-    aimed: bool
-    seconds: float
-
-    @classmethod
-    def draw(cls, rng: random.Random, fall: float, *, burst: bool, pumps: bool) -> _Firing:
+    def __init__(self, rng: random.Random, fall: float, *, burst: bool, pumps: bool) -> None:
         """Draw the times of a gun whose recoil goes in `fall` seconds."""
         shots = rng.choices((1, 2, 3, 4, 6), (3, 3, 3, 2, 2))[0]
         gap = (rng.uniform(1.1, 1.6) if pumps else rng.uniform(fall + 0.15, fall + 0.7)) if not burst else 0.15
         start, rise, ready = rng.uniform(0.1, 0.7), rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.8)
-        aimed = rng.random() < 0.4
-        if aimed:
+        self.aimed = rng.random() < 0.4
+        if self.aimed:
             start, rise = -1.0, 0.5
             ready += 0.5
-        times = _times(rng, start + rise + ready, shots, gap, burst)
+        self.times = _times(rng, start + rise + ready, shots, gap, burst)
         if not burst:
-            while len(times) > 1 and times[-1] > 6.2:
-                times.pop()
-        hold = times[-1] + fall + (0.9 if pumps else 0.2) + rng.uniform(0.3, 0.9) - start - rise
-        if aimed:
+            while len(self.times) > 1 and self.times[-1] > 6.2:
+                self.times.pop()
+        hold = self.times[-1] + fall + (0.9 if pumps else 0.2) + rng.uniform(0.3, 0.9) - start - rise
+        if self.aimed:
             hold = max(hold, _SHORTEST - start - rise)
         lower = rise * rng.uniform(0.9, 1.4)
-        seconds = start + rise + hold + (0.0 if aimed else lower + rng.uniform(0.2, 0.8))
-        return cls(GesturePace(start, rise, hold, 99.0 if aimed else lower), times, aimed, seconds)
+        self.pace = GesturePace(start, rise, hold, 99.0 if self.aimed else lower)
+        self.seconds = start + rise + hold + (0.0 if self.aimed else lower + rng.uniform(0.2, 0.8))
 
 
 def _times(rng: random.Random, first: float, shots: int, gap: float, burst: bool) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +41,7 @@ def throw(rng: random.Random) -> Gesture:
     snap = {"hard": rng.uniform(0.8, 0.95), "": rng.uniform(0.95, 1.15), "easy": rng.uniform(1.1, 1.3)}[hard]
     stride = {"hard": rng.uniform(0.3, 0.5), "": rng.uniform(0.0, 0.4), "easy": rng.uniform(-0.2, 0.2)}[hard]
     stride = 0.0 if stride < 0.12 else stride
-    phases = _Phases.draw(rng, snap)
+    phases = _Phases(rng, snap)
     chest = np.array([rng.uniform(0.04, 0.14), rng.uniform(-0.28, -0.12), rng.uniform(0.22, 0.32)])
     places = [np.array(place) + [rng.gauss(0, 0.025) for _ in range(3)] for place in _THROWS[form]]
     lifted = [0.15, 0.24, 0.24] if side == BOTH else 0.5 * (chest + places[0]) + [0.06, 0.0, 0.0]
@@ -82,41 +81,28 @@ def throw(rng: random.Random) -> Gesture:
     return Gesture(phases.end + rng.uniform(0.35, 1.0), tuple(dict.fromkeys(kinds)), change, side)
 
 
-@dataclass(frozen=True)
 class _Phases:
     """Seconds at which a throw goes from one phase to the next.
 
     Attributes:
-        start: the hands go to the ball before the chest; `gather`: how long that takes.
+        start: the hands go to the ball before the chest, which takes `gather`.
         begin: of the wind-up, which takes `wind`.
         go, pass_by, let_go: the arm comes forward, passes the body and lets go.
         stop: of the hand.
         lower: the hands go down, which takes `fall`.
     """
 
-    start: float
-    gather: float
-    begin: float
-    wind: float
-    go: float
-    pass_by: float
-    let_go: float
-    stop: float
-    lower: float
-    fall: float
-
-    @classmethod
-    def draw(cls, rng: random.Random, snap: float) -> _Phases:
+    def __init__(self, rng: random.Random, snap: float) -> None:
         """Draw the times; `snap`: factor of the seconds from `go` to `let_go`."""
-        start, gather = rng.uniform(0.1, 0.9), rng.uniform(0.35, 0.7)
+        self.start, self.gather = rng.uniform(0.1, 0.9), rng.uniform(0.35, 0.7)
         wait = rng.choice([0.1, rng.uniform(0.1, 1.0)])
-        wind, hang = rng.uniform(0.45, 0.9), rng.uniform(0.06, 0.3)
-        begin = start + gather + wait
-        go = begin + wind + hang
-        let_go = go + 0.26 * snap
-        stop = let_go + rng.uniform(0.22, 0.4)
-        rest, fall = rng.uniform(0.1, 0.7), rng.uniform(0.5, 1.0)
-        return cls(start, gather, begin, wind, go, go + 0.14 * snap, let_go, stop, stop + rest, fall)
+        self.wind, hang = rng.uniform(0.45, 0.9), rng.uniform(0.06, 0.3)
+        self.begin = self.start + self.gather + wait
+        self.go = self.begin + self.wind + hang
+        self.pass_by, self.let_go = self.go + 0.14 * snap, self.go + 0.26 * snap
+        self.stop = self.let_go + rng.uniform(0.22, 0.4)
+        rest, self.fall = rng.uniform(0.1, 0.7), rng.uniform(0.5, 1.0)
+        self.lower = self.stop + rest
 
     @property
     def end(self) -> float:
