@@ -94,7 +94,14 @@ class Breaker:
         self._start_again = start_again
         self._probe = probe
         self.faults: list[Fault] = []
-        self.kinds: dict[str, Callable[[Fault], None]] = {
+        self.kinds = self._kinds()
+
+    def _kinds(self) -> dict[str, Callable[[Fault], None]]:
+        """Return what breaks something of each kind."""
+        place, proxies = self._place, dict(self._cluster.proxies)
+        if place.proxy is not None:
+            proxies["store"] = place.proxy
+        kinds: dict[str, Callable[[Fault], None]] = {
             "worker's child killed": self._child,
             "worker killed, its child left": self._parent,
             "worker and child killed": self._worker,
@@ -111,9 +118,10 @@ class Breaker:
             "store full": lambda fault: self._without_store(fault, place.full()),
             "garbage collected": self._collect,
         }
-        for name, proxy in (cluster.proxies | ({} if place.proxy is None else {"store": place.proxy})).items():
-            self.kinds[f"{name} {OPEN_SILENT}"] = partial(self._open_silent, proxy=proxy)
-            self.kinds[f"{name} {ALL_SILENT}"] = partial(self._all_silent, proxy=proxy)
+        for name, proxy in proxies.items():
+            kinds[f"{name} {OPEN_SILENT}"] = partial(self._open_silent, proxy=proxy)
+            kinds[f"{name} {ALL_SILENT}"] = partial(self._all_silent, proxy=proxy)
+        return kinds
 
     def break_one(self, kind: str) -> Fault:
         """Break something of this kind and bring it back."""

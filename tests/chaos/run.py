@@ -128,11 +128,7 @@ class Run:
         self.url = f"http://127.0.0.1:{ports[0]}"
         ledger.install(cluster.engine)
         write_bundle(cluster.home / "models")
-        dealt = [plan.toxic[first :: len(plan.tenants)] for first in range(len(plan.tenants))]
-        self.studios = [
-            self._studio(name, share, quota, toxic)
-            for (name, (share, quota)), toxic in zip(plan.tenants.items(), dealt, strict=True)
-        ]
+        self.studios = self._studios()
         self.webhook = new_webhook(cluster.engine, receiver.url(), tenant=self.studios[0].tenant)
         self.operator = Operator(self.studios, plan.seed, self._done, plan.operator_pause)
         self._start = {
@@ -163,6 +159,13 @@ class Run:
             probe=self.probe,
         )
         self.seconds = 0.0
+
+    def _studios(self) -> list[Studio]:
+        tenants, toxic = self.plan.tenants, self.plan.toxic
+        return [
+            self._studio(name, share, quota, toxic[number :: len(tenants)])
+            for number, (name, (share, quota)) in enumerate(tenants.items())
+        ]
 
     def _studio(self, name: str, share: float, quota: Quota, toxic: Sequence[str]) -> Studio:
         plan = self.plan
@@ -321,6 +324,30 @@ class Run:
             lost = conn.execute(
                 sa.text("SELECT count(*) FROM ledger_item WHERE after = 'ready' AND reason LIKE 'lease_lost%'")
             ).scalar_one()
+        samples = self._samples()
+        return {
+            "seed": self.plan.seed,
+            "seconds": round(self.seconds),
+            "jobs": sum(len(studio.accepted) for studio in self.studios),
+            "items": sum(sum(studio.accepted.values()) for studio in self.studios),
+            "states": states,
+            "transitions": moves,
+            "items_of_lost_leases": lost,
+            "faults": dict(Counter(fault.kind for fault in self.breaker.faults)),
+            "ended_by_themselves": {f"{name} ({status})": n for (name, status), n in self.watch.ended.items()},
+            "refused": {s.tenant: dict(s.refused) for s in self.studios},
+            "asked_again": sum(studio.asked_again for studio in self.studios),
+            "odd_answers": [*self.operator.odd, *(odd for studio in self.studios for odd in studio.odd)],
+            "verbs": {f"{verb} {status}": n for (verb, status), n in sorted(self.operator.answers.items())},
+            "quota_looks": self.watch.looks,
+            "webhook_messages": len(self.receiver.received),
+            "webhook_events": len({request.id for request in self.receiver.received}),
+            "samples": samples,
+            "bars_missed": missed(samples),
+        }
+
+    def _samples(self) -> list[dict[str, Any]]:
+        """Return the recovery times after each fault; `alone`: before the next fault began."""
         faults = self.breaker.faults
         following = [*(fault.at for fault in faults[1:]), None]
         samples: list[dict[str, Any]] = []
@@ -338,26 +365,7 @@ class Run:
                 if what in SINCE_FAULT and seconds > PATIENCE:
                     sample["meanwhile"] = meanwhile(self.cluster.engine, fault, seconds)
                 samples.append(sample)
-        return {
-            "seed": self.plan.seed,
-            "seconds": round(self.seconds),
-            "jobs": sum(len(studio.accepted) for studio in self.studios),
-            "items": sum(sum(studio.accepted.values()) for studio in self.studios),
-            "states": states,
-            "transitions": moves,
-            "items_of_lost_leases": lost,
-            "faults": dict(Counter(fault.kind for fault in faults)),
-            "ended_by_themselves": {f"{name} ({status})": n for (name, status), n in self.watch.ended.items()},
-            "refused": {s.tenant: dict(s.refused) for s in self.studios},
-            "asked_again": sum(studio.asked_again for studio in self.studios),
-            "odd_answers": [*self.operator.odd, *(odd for studio in self.studios for odd in studio.odd)],
-            "verbs": {f"{verb} {status}": n for (verb, status), n in sorted(self.operator.answers.items())},
-            "quota_looks": self.watch.looks,
-            "webhook_messages": len(self.receiver.received),
-            "webhook_events": len({request.id for request in self.receiver.received}),
-            "samples": samples,
-            "bars_missed": missed(samples),
-        }
+        return samples
 
 
 def environment(place: Place, home: Path, port: int, plan: Plan) -> dict[str, str]:

@@ -68,27 +68,7 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
     motions = [HUMANML3D_263.canonicalize(swinging(36 + 9 * (i % 8), seed)) for i, seed in enumerate(seeds)]
     features = [HUMANML3D_263.encode(joints) for joints in motions]
     starts = np.concatenate([[0], np.cumsum([len(f) for f in features])])
-    lines = [
-        Clip(
-            id=f"clip{i}",
-            start=int(starts[i]),
-            length=len(f),
-            joints_start=int(starts[i]) + i,
-            split=("train", "train", "train", "train", "val", "test")[i % 6],
-            dataset="synthetic",
-            content=acts[i % len(acts)] if acts else "walk" if i % 3 else "run",
-            style="normal",
-            mirrored=False,
-            spliced=(),
-            acts=(acts[i % len(acts)],) if acts else ("walk", "bow") if joined(i) else ("walk",),
-            sides=("", "") if joined(i) and not acts else ("",),
-            measured=Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side=""),
-            captions=(f"a person does {acts[i % len(acts)]}", acts[i % len(acts)]) if acts else ("one", "two"),
-            seams=(20,) if joined(i) and not acts else (),
-            act_captions=("three", "four") if joined(i) and not acts else (),
-        )
-        for i, f in enumerate(features)
-    ]
+    lines = [_clip(i, int(starts[i]), len(f), acts) for i, f in enumerate(features)]
     (folder / names.CLIPS).write_text("".join(c.model_dump_json() + "\n" for c in lines), encoding="utf-8")
     whole = np.concatenate(features).astype(np.float32)
     std = whole.std(0)
@@ -99,19 +79,46 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
     np.save(folder / names.JOINTS, local)
     np.save(folder / names.ROOTS, roots)
     np.savez(folder / names.STATISTICS, mean=whole.mean(0), std=std)
+    manifest = _manifest(folder, clips, len(whole))
+    (folder / names.MANIFEST).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
+    made_up_texts([4 if joined(i) and not acts else 2 for i in range(clips)]).save(folder)
+    return folder
+
+
+def _clip(number: int, start: int, length: int, acts: Sequence[str]) -> Clip:
+    act = acts[number % len(acts)] if acts else None
+    two = joined(number) and act is None
+    return Clip(
+        id=f"clip{number}",
+        start=start,
+        length=length,
+        joints_start=start + number,
+        split=("train", "train", "train", "train", "val", "test")[number % 6],
+        dataset="synthetic",
+        content=act or ("walk" if number % 3 else "run"),
+        style="normal",
+        mirrored=False,
+        spliced=(),
+        acts=(act,) if act else ("walk", "bow") if two else ("walk",),
+        sides=("", "") if two else ("",),
+        measured=Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side=""),
+        captions=(f"a person does {act}", act) if act else ("one", "two"),
+        seams=(20,) if two else (),
+        act_captions=("three", "four") if two else (),
+    )
+
+
+def _manifest(folder: Path, clips: int, frames: int) -> Manifest:
     files = {n: FileEntry(sha256=sha256_of(folder / n), bytes=(folder / n).stat().st_size) for n in names.FILES}
     source = SourceEntry(
         name="synthetic", title="-", licence="MIT", credit="-", url="-", tier="commercial", clips=clips
     )
-    manifest = Manifest(
+    return Manifest(
         format=names.FORMAT, sources=(source,), tier="commercial",
         layout="humanml3d-263", facing_sigma=20, fps=20, skeleton="humanml3d",
-        dim=263, frames=len(whole), clips=clips, splits={}, lengths={}, kinds={}, captions=2, left_out={},
+        dim=263, frames=frames, clips=clips, splits={}, lengths={}, kinds={}, captions=2, left_out={},
         compositional_pairs=(), files=files,
     )  # fmt: skip
-    (folder / names.MANIFEST).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
-    made_up_texts([4 if joined(i) and not acts else 2 for i in range(clips)]).save(folder)
-    return folder
 
 
 def joined(clip: int) -> bool:

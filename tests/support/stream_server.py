@@ -302,71 +302,77 @@ class StreamServer:
         }.get(path)
 
 
-def _handler(server: StreamServer) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        def handle(self) -> None:
-            head = self._head()
-            if b"upgrade: websocket" not in head.lower():
-                super().handle()
-                return
-            protocol = ServerProtocol(subprotocols=[Subprotocol("marey.stream.v1")])
-            protocol.receive_data(self.connection.recv(len(head)))
-            (request,) = protocol.events_received()
-            assert isinstance(request, Request)
-            protocol.send_response(protocol.accept(request))
-            self.connection.sendall(b"".join(protocol.data_to_send()))
-            connection = Connection(self.connection, protocol, close_timeout=2)
-            try:
-                server.show(connection, request)
-            except (ConnectionClosed, OSError):
-                pass
-            finally:
-                connection.close()
-                connection.wait_closed(5)
-
-        def _head(self) -> bytes:
-            head = b""
-            while b"\r\n\r\n" not in head:
-                seen = self.connection.recv(65536, socket.MSG_PEEK)
-                if len(seen) == len(head):
-                    time.sleep(0.001)
-                if not seen:
-                    return b""
-                head = seen
-            return head[: head.index(b"\r\n\r\n") + 4]
-
-        def do_POST(self) -> None:
-            body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-            if self.path == f"/v1/streams/{STREAM}/end" and self.headers["Authorization"] == f"Bearer {KEY}":
-                server.apply({"kind": "stop", **body})
-                self._send(202, server.view())
-            elif self.path != "/v1/streams":
-                self._send(404, {"type": "urn:marey:problem:not-found", "detail": "nothing here"})
-            elif self.headers["Authorization"] != f"Bearer {KEY}":
-                self._send(401, {"type": "urn:marey:problem:unauthenticated", "detail": "no such key"})
-            elif server.plan.begin is not None:
-                server.begun.append(body)
-                self._send(*server.plan.begin)
-            else:
-                self._send(201, server.begin(body))
-
-        def do_GET(self) -> None:
-            found = server.answer(urlsplit(self.path).path)
-            if found is None:
-                self._send(404, {"type": "urn:marey:problem:not-found", "detail": "nothing here"})
-            else:
-                self._send(200, found)
-
-        def _send(self, status: int, content: Any) -> None:
-            data = content if isinstance(content, bytes) else json.dumps(content).encode()
-            self.send_response(status)
-            self.send_header("Content-Length", str(len(data)))
-            if status == 429:
-                self.send_header("Retry-After", "30")
-            self.end_headers()
-            self.wfile.write(data)
-
-        def log_message(self, *_: object) -> None:
-            pass
+def _handler(server: StreamServer) -> type[_Handler]:
+    class Handler(_Handler):
+        streams = server
 
     return Handler
+
+
+class _Handler(BaseHTTPRequestHandler):
+    streams: StreamServer
+
+    def handle(self) -> None:
+        head = self._head()
+        if b"upgrade: websocket" not in head.lower():
+            super().handle()
+            return
+        protocol = ServerProtocol(subprotocols=[Subprotocol("marey.stream.v1")])
+        protocol.receive_data(self.connection.recv(len(head)))
+        (request,) = protocol.events_received()
+        assert isinstance(request, Request)
+        protocol.send_response(protocol.accept(request))
+        self.connection.sendall(b"".join(protocol.data_to_send()))
+        connection = Connection(self.connection, protocol, close_timeout=2)
+        try:
+            self.streams.show(connection, request)
+        except (ConnectionClosed, OSError):
+            pass
+        finally:
+            connection.close()
+            connection.wait_closed(5)
+
+    def _head(self) -> bytes:
+        head = b""
+        while b"\r\n\r\n" not in head:
+            seen = self.connection.recv(65536, socket.MSG_PEEK)
+            if len(seen) == len(head):
+                time.sleep(0.001)
+            if not seen:
+                return b""
+            head = seen
+        return head[: head.index(b"\r\n\r\n") + 4]
+
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        if self.path == f"/v1/streams/{STREAM}/end" and self.headers["Authorization"] == f"Bearer {KEY}":
+            self.streams.apply({"kind": "stop", **body})
+            self._send(202, self.streams.view())
+        elif self.path != "/v1/streams":
+            self._send(404, {"type": "urn:marey:problem:not-found", "detail": "nothing here"})
+        elif self.headers["Authorization"] != f"Bearer {KEY}":
+            self._send(401, {"type": "urn:marey:problem:unauthenticated", "detail": "no such key"})
+        elif self.streams.plan.begin is not None:
+            self.streams.begun.append(body)
+            self._send(*self.streams.plan.begin)
+        else:
+            self._send(201, self.streams.begin(body))
+
+    def do_GET(self) -> None:
+        found = self.streams.answer(urlsplit(self.path).path)
+        if found is None:
+            self._send(404, {"type": "urn:marey:problem:not-found", "detail": "nothing here"})
+        else:
+            self._send(200, found)
+
+    def _send(self, status: int, content: Any) -> None:
+        data = content if isinstance(content, bytes) else json.dumps(content).encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(data)))
+        if status == 429:
+            self.send_header("Retry-After", "30")
+        self.end_headers()
+        self.wfile.write(data)
+
+    def log_message(self, *_: object) -> None:
+        pass
