@@ -39,6 +39,7 @@ def draw_bow(rng: random.Random) -> Gesture:
         rng.uniform(-0.13, -0.06),
         rng.uniform(-0.11, -0.02),
     )  # aside, up, toward the target
+    bow_hand = _BowHand(side, low)
     string_hand = _StringHand(_OTHER[side], cheek, rng.uniform(0.08, 0.4))
     twist, hips = rng.uniform(0.4, 0.6) * (90 - aside), rng.uniform(6, 22)
     stride, turn, steps = rng.uniform(0.08, 0.22), rng.uniform(0, 25), rng.random() < 0.6
@@ -57,14 +58,7 @@ def draw_bow(rng: random.Random) -> Gesture:
         body.lean((1.0 if side == LEFT else -1.0) * 0.7 * aside * way, "up", _NECK)
         settle(body)
         bow = direction(aside, up)
-        carried = np.tile(low, (frames, 1)) + body.from_shoulder(side, body.joints[:, [16, 17]].mean(1))
-        pull = np.clip(pulled, 0.0, 1.0)[:, None]
-        w = (raised if nocks else np.ones(frames))[:, None]
-        bent = (1 - w) * carried + w * (0.8 + 0.17 * pull) * _ARM * bow
-        bones = [
-            (1 - 0.8 * w * pull) * bone + 0.8 * w * pull * bow for bone in body.reach(side, bent, (0.3, -1.0, -0.4))
-        ]
-        body.move_arm(side, way, bones[0], bones[1], 0.04)
+        bow_hand.move(body, way, raised if nocks else np.ones(frames), np.clip(pulled, 0.0, 1.0), bow)
         string_hand.move(body, way, pulled[:, None], bow)
 
     kinds = ["draw-bow", "draw-bow-loose" if looses else "draw-bow-hold", "draw-bow-hand"]
@@ -101,6 +95,39 @@ def _pulls(
             at += [at[-1] + 0.2, goes]
             drawn += [drawn[-1], 0.0]
     return at, drawn
+
+
+@dataclass(frozen=True)
+class _BowHand:
+    """The hand that holds the bow.
+
+    Attributes:
+        side: of the hand.
+        low: metres from the middle of the shoulders to where the bow is carried, outward, up and forward.
+    """
+
+    side: str
+    low: tuple[float, float, float]
+
+    def move(self, body: StandingBody, way: Array, raised: Array, pull: Array, bow: Array) -> None:
+        """Lift the bow; the arm straightens as the string is drawn.
+
+        Args:
+            body: turned to the target.
+            way: (T,) share of the gesture.
+            raised: (T,) share to which the bow is up.
+            pull: (T,) share to which the string is drawn.
+            bow: direction to the target.
+        """
+        middle = body.from_shoulder(self.side, body.joints[:, [16, 17]].mean(1))
+        carried = np.tile(self.low, (len(way), 1)) + middle
+        pull, w = pull[:, None], raised[:, None]
+        bent = (1 - w) * carried + w * (0.8 + 0.17 * pull) * _ARM * bow
+        upper, fore = (
+            (1 - 0.8 * w * pull) * bone + 0.8 * w * pull * bow
+            for bone in body.reach(self.side, bent, (0.3, -1.0, -0.4))
+        )
+        body.move_arm(self.side, way, upper, fore, 0.04)
 
 
 @dataclass(frozen=True)

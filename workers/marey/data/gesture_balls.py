@@ -21,65 +21,91 @@ _LEAST_STROKES = 5
 
 
 def dribble(rng: random.Random) -> Gesture:
-    walks = rng.random() < 0.35
-    low, crosses = not walks and rng.random() < 0.35, not walks and rng.random() < 0.3
-    side = rng.choice(SIDES)
-    rate = rng.uniform(1.9, 2.7) if low else rng.uniform(1.25, 2.1)
-    strong = rng.uniform(0.07, 0.1) if low else rng.uniform(0.09, 0.15)
-    bent = rng.uniform(26, 42) if low else rng.uniform(10, 26)
-    bent = 0.6 * bent if walks else bent
-    sink = rng.uniform(0.08, 0.16) if low else rng.uniform(0.02, 0.09)
-    sink = 0.3 * sink if walks else sink
-    begins = walks or rng.random() < 0.4
-    start, rise, fall = -2.0 if begins else rng.uniform(0.1, 0.5), 0.5, rng.uniform(0.5, 0.8)
-    strokes = rng.randint(_LEAST_STROKES, 10) if not crosses else rng.choice((8, 9, 10, 12))
-    hold = strokes / rate
-    end = max(start, -rise) + rise + hold
-    ends = not walks and rng.random() < 0.6
-    up = rng.uniform(0.02, 0.08) if low else rng.uniform(0.08, 0.16)
-    place = np.array([rng.uniform(0.18, 0.26), up, rng.uniform(0.26, 0.36)])
-    guard = np.array([rng.uniform(0.12, 0.26), rng.uniform(-0.36, -0.2), rng.uniform(0.14, 0.3)])
-    guards = crosses or rng.random() < 0.6
-    wide, back = rng.uniform(0.02, 0.08), rng.uniform(0.0, 0.2)
-    gaze, phase = rng.uniform(-0.4, 0.2), rng.uniform(0, 6.28)
-    every = rng.choice((4, 5)) / rate
+    drawn = _Dribble(rng)
+    kinds = ["dribble", "dribble-low" if drawn.low else "dribble-high"]
+    kinds += ["dribble-walk" if drawn.walks else "dribble-stand", "dribble-cross" if drawn.crosses else "dribble-hand"]
+    seconds = min(drawn.end + (drawn.fall + 0.5 if drawn.ends else 0.0), 9.6)
+    content, base = ("walk", drawn.base) if drawn.walks else ("idle", None)
+    return Gesture(seconds, tuple(kinds), drawn.change, drawn.side, base=base, content=content)
 
-    def base(part: Part) -> Array | None:
+
+class _Dribble:
+    """A ball that is dribbled.
+
+    Attributes:
+        walks, low, crosses: at a walk, with the ball low, and from hand to hand, `every` so many seconds.
+        side: of the hand that has the ball first.
+        rate, strong, phase: strokes a second, metres of each to either side of its middle, and their phase.
+        bent, sink, gaze: degrees of the trunk, metres by which the hips go down, and how far the head stays up.
+        start, rise, end, fall: seconds of the way into the stance and out of it, if it `ends`.
+        place, guard: where the hand with the ball is, from its shoulder at the height of the hips, and the other one.
+        guards: the hand without the ball is held before the body.
+        apart: metres of the feet outward and back.
+    """
+
+    def __init__(self, rng: random.Random) -> None:
+        self.walks = walks = rng.random() < 0.35
+        self.low, self.crosses = not walks and rng.random() < 0.35, not walks and rng.random() < 0.3
+        self.side = rng.choice(SIDES)
+        self.rate = rng.uniform(1.9, 2.7) if self.low else rng.uniform(1.25, 2.1)
+        self.strong = rng.uniform(0.07, 0.1) if self.low else rng.uniform(0.09, 0.15)
+        bent = rng.uniform(26, 42) if self.low else rng.uniform(10, 26)
+        self.bent = 0.6 * bent if walks else bent
+        sink = rng.uniform(0.08, 0.16) if self.low else rng.uniform(0.02, 0.09)
+        self.sink = 0.3 * sink if walks else sink
+        begins = walks or rng.random() < 0.4
+        self.start, self.rise, self.fall = -2.0 if begins else rng.uniform(0.1, 0.5), 0.5, rng.uniform(0.5, 0.8)
+        strokes = rng.randint(_LEAST_STROKES, 10) if not self.crosses else rng.choice((8, 9, 10, 12))
+        self.end = max(self.start, -self.rise) + self.rise + strokes / self.rate
+        self.ends = not walks and rng.random() < 0.6
+        up = rng.uniform(0.02, 0.08) if self.low else rng.uniform(0.08, 0.16)
+        self.place = np.array([rng.uniform(0.18, 0.26), up, rng.uniform(0.26, 0.36)])
+        self.guard = np.array([rng.uniform(0.12, 0.26), rng.uniform(-0.36, -0.2), rng.uniform(0.14, 0.3)])
+        self.guards = self.crosses or rng.random() < 0.6
+        self.apart = rng.uniform(0.02, 0.08), rng.uniform(0.0, 0.2)
+        self.gaze, self.phase = rng.uniform(-0.4, 0.2), rng.uniform(0, 6.28)
+        self.every = rng.choice((4, 5)) / self.rate
+
+    def base(self, part: Part) -> Array | None:
+        """The captured walk, if it lasts long enough."""
         joints = part.joints[:LIMIT].astype(np.float64)
-        return joints if len(joints) * rate >= (_LEAST_STROKES + 1) * FPS else None
+        return joints if len(joints) * self.rate >= (_LEAST_STROKES + 1) * FPS else None
 
-    def change(body: StandingBody) -> None:
+    def change(self, body: StandingBody) -> None:
+        """See `Gesture`."""
         frames = len(body.joints)
         t = np.arange(frames) / FPS
-        way = envelope(frames, start, rise, end - start - rise if ends else 60.0, fall)
-        beat = 2 * np.pi * rate * t + phase
-        stroke = strong * (np.cos(beat) + 0.16 * np.cos(2 * beat))
-        if not walks:
-            _stand_apart(body, side, (wide, back), start - 0.1, end if ends else None)
-            body.shift(np.zeros(frames), -0.35 * back * way)
-        body.shift(-sink * way - 0.06 * strong * way * (1 - np.cos(beat + 0.6)))
-        body.bow((bent - 12 * stroke) * way, arms_hang=0.8, head=gaze)
-        if not walks:
+        hold = self.end - self.start - self.rise if self.ends else 60.0
+        way = envelope(frames, self.start, self.rise, hold, self.fall)
+        beat = 2 * np.pi * self.rate * t + self.phase
+        stroke = self.strong * (np.cos(beat) + 0.16 * np.cos(2 * beat))
+        if not self.walks:
+            _stand_apart(body, self.side, self.apart, self.start - 0.1, self.end if self.ends else None)
+            body.shift(np.zeros(frames), -0.35 * self.apart[1] * way)
+        body.shift(-self.sink * way - 0.06 * self.strong * way * (1 - np.cos(beat + 0.6)))
+        body.bow((self.bent - 12 * stroke) * way, arms_hang=0.8, head=self.gaze)
+        if not self.walks:
             settle(body)
-        turn = _turns(t, every, crosses=crosses)
+        self._move_hands(body, way, stroke, _turns(t, self.every, crosses=self.crosses))
+
+    def _move_hands(self, body: StandingBody, way: Array, stroke: Array, turn: Array) -> None:
+        """Move each hand with the ball while it has it, and before the body else.
+
+        Args:
+            stroke: (T,) metres of the ball over the middle of its strokes.
+            turn: see `_turns`.
+        """
         hips = body.joints[:, 0]
-        for one, active in ((side, 1 - turn), (_OTHER[side], turn)):
-            if one != side and not guards:
+        for one, active in ((self.side, 1 - turn), (_OTHER[self.side], turn)):
+            if one != self.side and not self.guards:
                 body.lift_arm(one, 8 * way)
                 continue
-            seen = body.from_shoulder(one, hips)
-            ball = seen + place + stroke[:, None] * np.array([0.0, 1.0, -0.12])
+            ball = body.from_shoulder(one, hips) + self.place + stroke[:, None] * np.array([0.0, 1.0, -0.12])
             inward = 4 * turn * (1 - turn)
             ball[:, 0] -= 0.16 * inward
-            waits = body.from_shoulder(one, body.joints[:, [16, 17]].mean(1)) + guard
+            waits = body.from_shoulder(one, body.joints[:, [16, 17]].mean(1)) + self.guard
             w = active[:, None]
             body.move_arm(one, way, *body.reach(one, w * ball + (1 - w) * waits, (0.6, -0.6, -0.8)), 0.02)
-
-    kinds = ["dribble", "dribble-low" if low else "dribble-high"]
-    kinds += ["dribble-walk" if walks else "dribble-stand", "dribble-cross" if crosses else "dribble-hand"]
-    seconds = end + (fall + 0.5 if ends else 0.0)
-    content, base_of = ("walk", base) if walks else ("idle", None)
-    return Gesture(min(seconds, 9.6), tuple(kinds), change, side, base=base_of, content=content)
 
 
 def _stand_apart(body: StandingBody, side: str, apart: tuple[float, float], start: float, end: float | None) -> None:

@@ -176,11 +176,7 @@ def flip(rng: random.Random) -> Gesture:
         (0.0, start + 0.1 * turn), 1.07, (16 * turn, 0, 0), (-6, 0, 0), (-6 * turn, 0, 0), raised, toes, splay=0.1
     )
     tight = rng.uniform(0.0, 1.0)
-    feet = pair(Limb((0.1, -0.4 - 0.2 * tight, 0.36 - 0.1 * tight), towards=(0.1, -0.8, 0.5)))
-    spine = (34 - 14 * tight, 0, 0)
-    middle = Whole((0.0, start), 1.45, (0, 0, 0), spine, (16, 0, 0), _SHINS, feet, splay=0.2)
     arms = pair(Limb((0.34, -0.24, 0.3), towards=(0.8, -0.6, -0.2)))
-    opened = pair(Limb((0.1, -0.72, 0.16 if form == "back" else 0.1), towards=(0.1, -0.5, 0.8)))
     landed = Whole(
         (0.0, end - 0.04 * turn),
         0.84,
@@ -192,17 +188,9 @@ def flip(rng: random.Random) -> Gesture:
         splay=0.25,
     )
     sunk = replace(landed, height=rng.uniform(0.6, 0.74), tilt=(turn * 360 + 26, 0, 0), spine=(20, 0, 0))
-    if not steps:
-        done.then(rng.uniform(0.4, 0.6), low)
-    else:
-        done.then(0.22, low)
+    done.then(0.22 if steps else rng.uniform(0.4, 0.6), low)
     done.then(rng.uniform(0.22, 0.28), off)
-    begins = done.times[-1]
-    for share, angle in ((0.3, 108), (0.5, 200), (0.72, 296)):
-        whole = replace(middle, at=(0.0, start + share * (end - start)), tilt=(turn * angle, 0, 0))
-        done.then(begins + share * lasts - done.times[-1], replace(whole, feet=opened) if share > 0.7 else whole)
-    done.then(begins + lasts - done.times[-1], landed)
-    done.flights.append((begins, begins + lasts))
+    _turn_over(done, (start, end), lasts, landed, tight)
     done.then(rng.uniform(0.16, 0.24), sunk)
     done.then(
         rng.uniform(0.5, 0.8), Whole((0.0, end), tilt=(turn * 360, 0, 0), feet=stood(0, end)), rng.uniform(0.2, 0.9)
@@ -210,3 +198,26 @@ def flip(rng: random.Random) -> Gesture:
     kinds = ["flip", f"flip-{form}", "flip-steps" if steps else "flip-standing"]
     other = "back" if form == "front" else "front|forward"
     return done.gesture(rng, kinds, untrue=rf"({other}|handspring)")
+
+
+def _turn_over(done: Tumble, way: tuple[float, float], lasts: float, landed: Whole, tight: float) -> None:
+    """Add the flight of a somersault, tucked at first and opened before it lands.
+
+    Args:
+        done: ends where the feet leave the floor.
+        way: metres ahead of the idle's place at both ends; the body turns in this direction.
+        lasts: seconds.
+        landed: the posture at the end.
+        tight: share to which the body is tucked.
+    """
+    start, end = way
+    forward = end > start
+    feet = pair(Limb((0.1, -0.4 - 0.2 * tight, 0.36 - 0.1 * tight), towards=(0.1, -0.8, 0.5)))
+    opened = pair(Limb((0.1, -0.72, 0.1 if forward else 0.16), towards=(0.1, -0.5, 0.8)))
+    middle = Whole((0.0, start), 1.45, (0, 0, 0), (34 - 14 * tight, 0, 0), (16, 0, 0), _SHINS, feet, splay=0.2)
+    begins = done.times[-1]
+    for share, angle in ((0.3, 108), (0.5, 200), (0.72, 296)):
+        whole = replace(middle, at=(0.0, start + share * (end - start)), tilt=(angle if forward else -angle, 0, 0))
+        done.then(begins + share * lasts - done.times[-1], replace(whole, feet=opened) if share > 0.7 else whole)
+    done.then(begins + lasts - done.times[-1], landed)
+    done.flights.append((begins, begins + lasts))
