@@ -35,21 +35,8 @@ def stab(rng: random.Random) -> Gesture:
         hands: dict[str, tuple[Point, ...]] = {side: (back, near(rng, end, 0.04))}
         if form == "stab-spear":
             hands[_OTHER[side]] = ((front[0], front[1], front[2] - 0.12), (front[0] + 0.02, front[1] + 0.06, 0.52))
-        blow = Blow(
-            begin,
-            hands,
-            wind=rng.uniform(0.22, 0.4),
-            out=rng.uniform(0.16, 0.24),
-            stay=rng.uniform(0.06, 0.4),
-            back=rng.uniform(0.3, 0.55),
-            side=side,
-            twist=rng.uniform(16, 36),
-            stoop=rng.uniform(6, 18),
-            ahead=rng.uniform(0.3, 0.42) * stride if lunges else rng.uniform(0.03, 0.08),
-            pole=(0.7, -0.9, -0.4),
-        )
-        blows.append(blow)
-        begin = blow.end + rng.uniform(0.1, 0.6)
+        blows.append(_thrust(rng, begin, hands, side, stride if lunges else 0.0))
+        begin = blows[-1].end + rng.uniform(0.1, 0.6)
     seconds = begin + rng.uniform(0.4, 0.9)
     guards = {side: guard, _OTHER[side]: front if form == "stab-spear" else near(rng, (0.16, -0.2, 0.22))}
     lowers = stance is None and rng.random() < 0.8
@@ -66,6 +53,23 @@ def stab(rng: random.Random) -> Gesture:
     kinds += ["stab-many"] if number > 1 else []
     acting = BOTH if form == "stab-spear" else side
     return Gesture(seconds + (0.4 if lowers else 0.0), tuple(kinds), change, acting, number)
+
+
+def _thrust(rng: random.Random, begin: float, hands: dict[str, tuple[Point, ...]], side: str, lunge: float) -> Blow:
+    """Draw one thrust; `lunge`: metres of the step that goes with it, 0 for none."""
+    return Blow(
+        begin,
+        hands,
+        wind=rng.uniform(0.22, 0.4),
+        out=rng.uniform(0.16, 0.24),
+        stay=rng.uniform(0.06, 0.4),
+        back=rng.uniform(0.3, 0.55),
+        side=side,
+        twist=rng.uniform(16, 36),
+        stoop=rng.uniform(6, 18),
+        ahead=rng.uniform(0.3, 0.42) * lunge if lunge else rng.uniform(0.03, 0.08),
+        pole=(0.7, -0.9, -0.4),
+    )
 
 
 _SLASHES: dict[str, tuple[Point, Point, Point]] = {
@@ -94,26 +98,11 @@ def slash(rng: random.Random) -> Gesture:
         places = tuple(near(rng, place) for place in _SLASHES[kind])
         if both:  # the other hand is next to it on the grip, so that neither gets far from the middle
             places = tuple((x, 1.1 * y, max(z, 0.26 - 0.35 * max(y, 0.0))) for x, y, z in places)
-        hands = {side: places}
+        hands: dict[str, tuple[Point, ...]] = {side: places}
         if both:
             hands[_OTHER[side]] = tuple((0.03 - x, y - 0.07, z - 0.02) for x, y, z in places)
-        turns = {"slash-back": -1.0, "slash-down": 0.2}.get(kind, 1.0)
-        blow = Blow(
-            begin,
-            hands,
-            wind=rng.uniform(0.5, 0.8) if heavy else rng.uniform(0.35, 0.55),
-            out=rng.uniform(0.22, 0.27) if both else rng.uniform(0.24, 0.31),
-            stay=rng.uniform(0.05, 0.3),
-            back=rng.uniform(0.45, 0.75),
-            side=side,
-            twist=turns * (rng.uniform(30, 48) if both else rng.uniform(18, 38)),
-            stoop=rng.uniform(14, 30) if kind in ("slash-down", "slash-diagonal") else rng.uniform(2, 12),
-            ahead=rng.uniform(0.02, 0.08),
-            coil=rng.uniform(0.8, 1.1) if both else 0.5,
-            pole=(0.9, -0.6, -0.2),
-        )
-        blows.append(blow)
-        begin = blow.end + rng.uniform(0.05, 0.5)
+        blows.append(_sweep(rng, kind, begin, hands, side, heavy=heavy))
+        begin = blows[-1].end + rng.uniform(0.05, 0.5)
     seconds = begin + rng.uniform(0.4, 0.9)
     ahead = near(rng, (0.06, -0.2, 0.34))
     other = (0.03 - ahead[0], ahead[1] - 0.07, ahead[2] - 0.03) if both else near(rng, (0.18, -0.28, 0.16))
@@ -127,3 +116,25 @@ def slash(rng: random.Random) -> Gesture:
     kinds = ["slash", *([form] if form else []), "slash-both" if both else "slash-hand"]
     kinds += ["slash-many"] if number > 1 else []
     return Gesture(seconds + (0.4 if lowers else 0.0), tuple(kinds), change, BOTH if both else side, number)
+
+
+def _sweep(
+    rng: random.Random, kind: str, begin: float, hands: dict[str, tuple[Point, ...]], side: str, *, heavy: bool
+) -> Blow:
+    """Draw one sweep of a blade that the hands of both sides hold, or that of `side` alone."""
+    both = len(hands) == 2
+    turns = {"slash-back": -1.0, "slash-down": 0.2}.get(kind, 1.0)
+    return Blow(
+        begin,
+        hands,
+        wind=rng.uniform(0.5, 0.8) if heavy else rng.uniform(0.35, 0.55),
+        out=rng.uniform(0.22, 0.27) if both else rng.uniform(0.24, 0.31),
+        stay=rng.uniform(0.05, 0.3),
+        back=rng.uniform(0.45, 0.75),
+        side=side,
+        twist=turns * (rng.uniform(30, 48) if both else rng.uniform(18, 38)),
+        stoop=rng.uniform(14, 30) if kind in ("slash-down", "slash-diagonal") else rng.uniform(2, 12),
+        ahead=rng.uniform(0.02, 0.08),
+        coil=rng.uniform(0.8, 1.1) if both else 0.5,
+        pole=(0.9, -0.6, -0.2),
+    )

@@ -36,22 +36,8 @@ def punch(rng: random.Random) -> Gesture:
     one = hand or rng.choice(SIDES)
     for _ in range(number):
         kind = form or rng.choice(list(_PUNCHES))
-        back, end, pole = _PUNCHES[kind]
         begin = max(begin, free[one])
-        far = one != lead
-        blow = Blow(
-            begin,
-            {one: (near(rng, back), near(rng, end, 0.04))},
-            wind=rng.uniform(0.12, 0.24) if kind == "straight" else rng.uniform(0.22, 0.32),
-            out=rng.uniform(0.13, 0.18) * snap,
-            stay=rng.uniform(0.04, 0.12),
-            back=rng.uniform(0.22, 0.4) * snap,
-            side=one,
-            twist=rng.uniform(22, 40) if far or kind != "straight" else rng.uniform(8, 20),
-            stoop=rng.uniform(0, 10),
-            ahead=rng.uniform(0.02, 0.07),
-            pole=pole,
-        )
+        blow = _blow(rng, kind, begin, one, snap, far=one != lead)
         blows.append(blow)
         free[one] = blow.end + rng.uniform(0.03, 0.5)
         begin = blow.hit + rng.uniform(0.05, 0.3)
@@ -69,6 +55,31 @@ def punch(rng: random.Random) -> Gesture:
     acting = {side for blow in blows for side in blow.hands}
     side = acting.pop() if len(acting) == 1 else BOTH
     return Gesture(seconds + (0.4 if lowers else 0.0), tuple(kinds), change, side, number)
+
+
+def _blow(rng: random.Random, kind: str, begin: float, side: str, snap: float, *, far: bool) -> Blow:
+    """Draw one punch.
+
+    Args:
+        kind: key of `_PUNCHES`.
+        begin: seconds.
+        side: of the fist, which is `far` if the other foot is ahead.
+        snap: factor of its seconds.
+    """
+    back, end, pole = _PUNCHES[kind]
+    return Blow(
+        begin,
+        {side: (near(rng, back), near(rng, end, 0.04))},
+        wind=rng.uniform(0.12, 0.24) if kind == "straight" else rng.uniform(0.22, 0.32),
+        out=rng.uniform(0.13, 0.18) * snap,
+        stay=rng.uniform(0.04, 0.12),
+        back=rng.uniform(0.22, 0.4) * snap,
+        side=side,
+        twist=rng.uniform(22, 40) if far or kind != "straight" else rng.uniform(8, 20),
+        stoop=rng.uniform(0, 10),
+        ahead=rng.uniform(0.02, 0.07),
+        pole=pole,
+    )
 
 
 _BLOCKS: dict[str, tuple[dict[str, Point], Point]] = {

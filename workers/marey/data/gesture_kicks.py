@@ -99,22 +99,7 @@ def kick_ball(rng: random.Random) -> Gesture:
     hard = rng.random() < 0.6
     stride, pace = rng.uniform(0.34, 0.5), rng.uniform(0.3, 0.4)
     done = Sequel([rng.uniform(0.15, 0.8)])
-    at = {LEFT: 0.0, RIGHT: 0.0}
-    for k in range(steps):
-        side = RIGHT if (steps - k) % 2 else LEFT  # the last step is that of the standing foot
-        at[side] = max(at.values()) + (stride if k else 0.7 * stride)
-        last = k == steps - 1
-        swing = 1.0 if side == RIGHT else -1.0
-        middle = 0.5 * (at[LEFT] + at[RIGHT]) if not last else at[RIGHT] - 0.08
-        walk = Posture((-0.05 if last else 0.0, 0.89, middle), (4, 0, 0), hands=_swinging(rng, -swing))
-        feet = {one: FootPlace((0.09, 0.07, at[one])) for one in SIDES}
-        if last:
-            feet[LEFT] = FootPlace(
-                (0.12, rng.uniform(0.3, 0.45), at[RIGHT] - rng.uniform(0.42, 0.52)), (0.1, -0.9, -0.1)
-            )
-            walk = replace(walk, tilt=(8, 0, 12), hands=_swinging(rng, -1.2))
-        done.then(pace if not last else 1.1 * pace, replace(walk, feet=feet))
-    plant = at[RIGHT]
+    plant = _run_up(rng, done, steps, stride, pace)
     stand = {RIGHT: FootPlace((0.09, 0.07, plant))} if steps else {}
     if not steps:
         wound = Posture((0.03, 0.9, 0.0), (8, 0, 10), over=RIGHT, hands=_swinging(rng, -1.0))
@@ -139,6 +124,31 @@ def kick_ball(rng: random.Random) -> Gesture:
     return _side(
         rng, done, ["kick-ball", "kick-ball-run" if steps > 1 else "", "kick-ball-hard" if hard else "kick-ball-soft"]
     )
+
+
+def _run_up(rng: random.Random, done: Sequel, steps: int, stride: float, pace: float) -> float:
+    """Add steps up to a ball, the last one with the left foot drawn back; return where the right foot stands, metres
+    ahead.
+
+    Args:
+        stride, pace: metres and seconds of a step.
+    """
+    at = {LEFT: 0.0, RIGHT: 0.0}
+    for k in range(steps):
+        side = RIGHT if (steps - k) % 2 else LEFT  # the last step is that of the standing foot
+        at[side] = max(at.values()) + (stride if k else 0.7 * stride)
+        last = k == steps - 1
+        swing = 1.0 if side == RIGHT else -1.0
+        middle = 0.5 * (at[LEFT] + at[RIGHT]) if not last else at[RIGHT] - 0.08
+        walk = Posture((-0.05 if last else 0.0, 0.89, middle), (4, 0, 0), hands=_swinging(rng, -swing))
+        feet = {one: FootPlace((0.09, 0.07, at[one])) for one in SIDES}
+        if last:
+            feet[LEFT] = FootPlace(
+                (0.12, rng.uniform(0.3, 0.45), at[RIGHT] - rng.uniform(0.42, 0.52)), (0.1, -0.9, -0.1)
+            )
+            walk = replace(walk, tilt=(8, 0, 12), hands=_swinging(rng, -1.2))
+        done.then(pace if not last else 1.1 * pace, replace(walk, feet=feet))
+    return at[RIGHT]
 
 
 _BALANCES = {

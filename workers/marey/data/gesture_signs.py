@@ -36,24 +36,9 @@ def signal(rng: random.Random) -> Gesture:
     side = rng.choice(SIDES) if form == "signal-one" else BOTH
     signs = rng.randint(3, 6)
     brisk = rng.random() < 0.5
-    moves, holds = ((0.38, 0.5), (0.3, 0.8)) if brisk else ((0.45, 0.75), (0.5, 1.3))
-    times, begin = [0.0], rng.uniform(0.1, 0.6)
-    for _ in range(signs):
-        times += [begin, begin + rng.uniform(*moves)]
-        begin = times[-1] + rng.uniform(*holds)
-        if begin > 7.4 and len(times) >= 7:
-            break
-    times += [begin, begin + rng.uniform(0.5, 0.8)]
+    times = _times(rng, signs, brisk=brisk)
     count = (len(times) - 3) // 2
-    names = {one: _sequence(rng, count) if side in (one, BOTH) else [_DOWN] * count for one in SIDES}
-    if form == "signal-both":
-        alike = [_ALIKE.get(name, name) for name in names[SIDES[0]]]
-        names = dict.fromkeys(SIDES, alike)
-    elif form == "signal-mixed":  # one arm rests now and then, never both
-        for k in range(count):
-            crossed = all(row[k] == _ACROSS for row in names.values())
-            if crossed or rng.random() < 0.5:
-                names[rng.choice(SIDES)][k] = _DOWN
+    names = _signs(rng, form, side, count)
     paths = {one: [_bones(rng, name) for name in row] for one, row in names.items()}
     swing, rate = rng.choice([0.0, rng.uniform(10, 24)]), rng.uniform(1.2, 2.2)
     looks = [(rng.uniform(-35, 35), rng.uniform(-6, 6)) for _ in range(count)]
@@ -76,6 +61,32 @@ def signal(rng: random.Random) -> Gesture:
 
     kinds = ["signal", form, "signal-brisk" if brisk else "signal-calm"]
     return Gesture(times[-1] + rng.uniform(0.3, 0.8), tuple(kinds), change, side)
+
+
+def _times(rng: random.Random, signs: int, *, brisk: bool) -> list[float]:
+    """Seconds at which the arms begin to move and stop: up to each sign, of which long ones are fewer, and down."""
+    moves, holds = ((0.38, 0.5), (0.3, 0.8)) if brisk else ((0.45, 0.75), (0.5, 1.3))
+    times, begin = [0.0], rng.uniform(0.1, 0.6)
+    for _ in range(signs):
+        times += [begin, begin + rng.uniform(*moves)]
+        begin = times[-1] + rng.uniform(*holds)
+        if begin > 7.4 and len(times) >= 7:
+            break
+    return [*times, begin, begin + rng.uniform(0.5, 0.8)]
+
+
+def _signs(rng: random.Random, form: str, side: str, count: int) -> dict[str, list[str]]:
+    """Draw the names of the signs of each arm."""
+    names = {one: _sequence(rng, count) if side in (one, BOTH) else [_DOWN] * count for one in SIDES}
+    if form == "signal-both":
+        alike = [_ALIKE.get(name, name) for name in names[SIDES[0]]]
+        return dict.fromkeys(SIDES, alike)
+    if form == "signal-mixed":  # one arm rests now and then, never both
+        for k in range(count):
+            crossed = all(row[k] == _ACROSS for row in names.values())
+            if crossed or rng.random() < 0.5:
+                names[rng.choice(SIDES)][k] = _DOWN
+    return names
 
 
 def _between(vectors: Array) -> Array:

@@ -18,6 +18,10 @@ def _put(left: Point, right: Point, anchor: str = "trunk", elbow: Point = _OUT) 
     return {LEFT: HandPlace(left, anchor, elbow), RIGHT: HandPlace(right, anchor, elbow)}
 
 
+def _near_hands(rng: random.Random, hands: _Hands, far: float) -> _Hands:
+    return {side: replace(hand, at=near(rng, hand.at, far)) for side, hand in hands.items()}
+
+
 _AHEAD = _put((0.08, -0.06, 0.5), (0.08, -0.06, 0.5))
 _LOW = _put((0.26, -0.34, 0.16), (0.26, -0.34, 0.16))
 _HIGH = _put((0.2, 0.38, 0.16), (0.2, 0.38, 0.16), elbow=(1.0, 0.1, 0.1))
@@ -44,9 +48,7 @@ _CASTS = {
 
 def cast_spell(rng: random.Random) -> Gesture:
     form = rng.choices(list(_CASTS), (5, 3, 5, 2, 4, 3, 2))[0]
-    gather, send = (
-        {side: replace(hand, at=near(rng, hand.at, 0.03)) for side, hand in hands.items()} for hands in _CASTS[form]
-    )
+    gather, send = (_near_hands(rng, hands, 0.03) for hands in _CASTS[form])
     slow = form in ("cast-rise", "cast-staff") and rng.random() < 0.6
     times = rng.choices((1, 2, 3), (6, 2, 1))[0]
     lifts = form in ("cast-rise", "cast-staff", "cast-spread")
@@ -54,10 +56,7 @@ def cast_spell(rng: random.Random) -> Gesture:
     turn = {"cast-hip": -rng.uniform(18, 34), "cast-one": -rng.uniform(8, 24)}.get(form, 0.0)
     stoop, lean = rng.uniform(4, 14), rng.uniform(4, 16) if not lifts else -rng.uniform(0, 8)
     dip = rng.uniform(0.02, 0.09)
-    feet = {}
-    if steps:
-        ahead = rng.uniform(0.18, 0.3)
-        feet = {LEFT: FootPlace((0.1, 0.07, ahead))}
+    feet = {LEFT: FootPlace((0.1, 0.07, rng.uniform(0.18, 0.3)))} if steps else {}
     wait = Posture((0.0, 0.93 - dip, -0.02), (0.4 * stoop, 0, 0), (stoop, 0, turn), (-0.5 * stoop, 0, -0.7 * turn))
     wait = replace(wait, hands=gather)
     forward = 0.4 * feet[LEFT].at[2] if steps else 0.02
@@ -66,20 +65,18 @@ def cast_spell(rng: random.Random) -> Gesture:
     cast = replace(cast, hands=send, feet=feet)
     done = Sequel([rng.uniform(0.1, 0.7)])
     for k in range(times):
-        if k:
-            done.then(rng.uniform(0.4, 0.6), replace(wait, feet=feet, pelvis=cast.pelvis))
-        else:
-            done.then(rng.uniform(0.45, 0.8), wait)
+        again = replace(wait, feet=feet, pelvis=cast.pelvis)
+        done.then(rng.uniform(0.4, 0.6) if k else rng.uniform(0.45, 0.8), again if k else wait)
         charge = rng.uniform(0.2, 1.1) if not k else 0.15
         begin = done.times[-1]
         while done.times[-1] < begin + charge:  # hands tremble with what they gather
-            shaken = {side: replace(hand, at=near(rng, hand.at, 0.02)) for side, hand in gather.items()}
+            shaken = _near_hands(rng, gather, 0.02)
             done.then(rng.uniform(0.2, 0.35), replace(done.postures[-1], hands=shaken))
         done.then(rng.uniform(0.6, 1.1) if slow else rng.uniform(0.18, 0.32), cast)
         hold = rng.uniform(0.4, 1.8) if times == 1 else rng.uniform(0.35, 0.7)
         held = done.times[-1] + hold
         while done.times[-1] < held:
-            shaken = {side: replace(hand, at=near(rng, hand.at, 0.012)) for side, hand in send.items()}
+            shaken = _near_hands(rng, send, 0.012)
             done.then(rng.uniform(0.25, 0.4), replace(cast, hands=shaken))
     done.then(rng.uniform(0.5, 0.9), STAND)
     one = form in ("cast-one", "cast-staff")
