@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -99,20 +99,9 @@ def fetch_job(
     check_folder(folder)
     check_manifest(folder, overwrite=overwrite)
     make_folders(folder, (file.path for file in wanted))
-    done: set[Path] = set()
-
-    def note(download: FileToFetch) -> None:
-        done.add(download.path)
-        observer.fetched(download.path)
-
     observer.planned(len(wanted))
-    try:
+    with _part_on_error(folder, job, planned, observer, overwrite=overwrite) as note:
         download_all(transport, wanted, overwrite=overwrite, done=note)
-    except BaseException as error:
-        late = any(file.making or file.asked is not None for file in wanted)
-        if not isinstance(error, Conflict) or late:  # else nothing was fetched
-            _write_part(folder, job, planned, done, observer, overwrite=overwrite)
-        raise
     left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
     if prune:
         remove_left(folder, left)
@@ -127,6 +116,26 @@ def _check_export(transport: Transport, formats: Sequence[str] | None, export: E
     check_options((known[name] for name in formats or known if name in known), export)
     check_body(export)
     check_rig(Rigs(transport), export)
+
+
+@contextmanager
+def _part_on_error(
+    folder: Path, job: str, planned: Planned, observer: FetchObserver, *, overwrite: bool
+) -> Generator[Callable[[FileToFetch], None]]:
+    """Within it, call what it yields with each file that is complete; an error writes a manifest of these files."""
+    done: set[Path] = set()
+
+    def note(download: FileToFetch) -> None:
+        done.add(download.path)
+        observer.fetched(download.path)
+
+    try:
+        yield note
+    except BaseException as error:
+        late = any(file.making or file.asked is not None for _, files in planned for file in files)
+        if not isinstance(error, Conflict) or late:  # else nothing was fetched
+            _write_part(folder, job, planned, done, observer, overwrite=overwrite)
+        raise
 
 
 def _write_part(

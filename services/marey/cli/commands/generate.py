@@ -79,7 +79,6 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Generate motions in this process, without a server or a queue."""
-    from marey.cli.roles.editing import loop as loop_clip
     from marey.cli.roles.generating import OneShot
     from marey.cli.roles.generating import read_file as read_constraints_file
     from marey.client.fetching import check_folder, make_folders
@@ -113,12 +112,27 @@ def generate(
     _examine(reader, items, studio, scope)
     if chosen.manifest.random:
         console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")
+    _make(studio, planned, export, loop=loop, overwrite=overwrite, as_json=as_json)
+
+
+def _make(
+    studio: OneShot,
+    planned: Sequence[Planned],
+    export: ExportOptions,
+    *,
+    loop: bool,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Make the motions, and write and report each when it is there."""
+    from marey.cli.roles.editing import loop as loop_clip
+
     with console.bar() as bar:
         task = bar.add_task("generating", total=len(planned))
-        made = studio.make([p.wanted for p in planned])
+        made = studio.make([plan.wanted for plan in planned])
         for plan, (wanted, clip, elapsed) in zip(planned, made, strict=True):
             result = loop_clip(clip, f"{wanted.prompt!r}, seed {wanted.seed}") if loop else clip
-            line = _write(plan, result, elapsed, chosen, export, overwrite=overwrite)
+            line = _write(plan, result, elapsed, studio.bundle, export, overwrite=overwrite)
             bar.advance(task)
             _report(line, clip, as_json=as_json)
 

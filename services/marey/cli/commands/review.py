@@ -7,6 +7,8 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -86,25 +88,52 @@ def review(
         _check_free(paths, overwrite=overwrite)
         with console.bar() as bar, _together(paths) as drafts, Drawers(len(found)) as drawers:
             task = bar.add_task("drawing", total=len(found))
+            book = _Book(client, names, sources, drawers, partial(bar.advance, task))
+            beside = [None, *(path.name for path in paths), None]
             for number, page in enumerate(pages):
                 first = skip + number * per_page
                 count = f"{first + 1} to {first + len(page)} of {skip + len(found)}{' and more' if more else ''}"
-                with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
-                    files = client.motions.fetch_all(page, folder)
-                    facts = _facts(page, names)
-                    if output.suffix.lower() == ".png":
-                        _sheet(
-                            page, facts, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task)
-                        )
-                    else:
-                        beside = [None, *(path.name for path in paths), None]
-                        cards = _cards(client, page, facts, files, sources)
-                        _page(cards, drafts[number], (name, count), beside[number : number + 3 : 2], len(ids))
-                        bar.advance(task, len(page))
+                book.draw(page, drafts[number], (name, count), beside[number : number + 3 : 2])
     for path in paths:
         console.result(console.home_relative(path))
     if more:
         _say_more(output, skip + len(found))
+
+
+@dataclass(frozen=True)
+class _Book:
+    """Draws pages.
+
+    Attributes:
+        names: of the jobs, by their ids.
+        sources: prompts of motions, by their ids; see `_edit_note`.
+        done: called with the number of motions that have been drawn.
+    """
+
+    client: Client
+    names: Mapping[str, str]
+    sources: dict[str, str]
+    drawers: Drawers
+    done: Callable[[int], None]
+
+    def draw(
+        self, motions: Sequence[Motion], path: Path, heading: tuple[str, str], beside: Sequence[str | None]
+    ) -> None:
+        """Draw a page, or a sheet where the path is a .png.
+
+        Args:
+            heading: title and count.
+            beside: names of the page before and of that behind.
+        """
+        with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
+            files = self.client.motions.fetch_all(motions, folder)
+            facts = _facts(motions, self.names)
+            if path.suffix.lower() == ".png":
+                _sheet(motions, facts, files, path, ": ".join(heading), self.drawers, lambda: self.done(1))
+            else:
+                cards = _cards(self.client, motions, facts, files, self.sources)
+                _page(cards, path, heading, beside, len(self.names))
+                self.done(len(motions))
 
 
 def _say_more(output: Path, shown: int) -> None:
