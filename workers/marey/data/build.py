@@ -16,7 +16,7 @@ from marey.core.errors import InvalidInput
 from marey.core.sides import swap_sides
 from marey.data import wording
 from marey.data.captions import captions, phrasings
-from marey.data.compose import COMPOSED, COUNTS, compose
+from marey.data.compose import COMPOSED, COUNTS, Composed, compose
 from marey.data.describe import ACTIONS, STYLE_NAMES, Facts, describe, describe_text
 from marey.data.folder import LEAST_STD, PreparedWriter
 from marey.data.gestures import made_gestures
@@ -208,16 +208,33 @@ class FolderWriter(PreparedWriter):
     def __init__(self, out: Path) -> None:
         super().__init__(out, LAYOUT)
 
-    def add(
+    def add_part(self, part: Part) -> None:
+        """Encode and append a clip of one action."""
+        self._add(part, part.joints, (part.facts,), name=part.id, made=part.made)
+
+    def add_composed(self, composed: Composed) -> None:
+        """Encode and append a clip that is composed of others."""
+        parts = composed.parts
+        self._add(
+            parts[0],
+            composed.joints,
+            composed.facts,
+            name=composed.name,
+            spliced=tuple(part.id for part in parts),
+            seams=composed.seams,
+            made=any(part.made for part in parts),
+        )
+
+    def _add(
         self,
         part: Part,
         joints: NDArray[np.floating],
         actions: Sequence[Facts],
         *,
         name: str,
-        spliced: tuple[str, ...],
+        made: bool,
+        spliced: tuple[str, ...] = (),
         seams: tuple[int, ...] = (),
-        made: bool = False,
     ) -> None:
         """Encode and append one clip; joints (T, 22, 3)."""
         placed = LAYOUT.canonicalize(joints)
@@ -346,25 +363,17 @@ def build(packs: Sequence[JointsPack], out: Path, *, speed: float = 0.0, progres
         for part in parts_of(packs, left_out, speed):
             if part.speed == 1:
                 by_split[part.source.split].append(part)
-            writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
+            writer.add_part(part)
             if progress:
                 progress(len(writer.clips), total)
         for part in list(made_gestures(by_split["train"])):
             by_split["train"].append(part)
-            writer.add(part, part.joints, (part.facts,), name=part.id, spliced=(), made=True)
+            writer.add_part(part)
             if progress:
                 progress(len(writer.clips), max(total, len(writer.clips)))
         for split, parts in by_split.items():
             for joined in chain(compose(parts, split), compose_texts(parts, split)):
-                writer.add(
-                    joined.parts[0],
-                    joined.joints,
-                    joined.facts,
-                    name=joined.name,
-                    spliced=tuple(part.id for part in joined.parts),
-                    seams=joined.seams,
-                    made=any(part.made for part in joined.parts),
-                )
+                writer.add_composed(joined)
                 if progress:
                     progress(len(writer.clips), max(total, len(writer.clips)))
         return writer.finish(packs, left_out)

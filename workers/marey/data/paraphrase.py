@@ -61,18 +61,10 @@ def paraphrase(
         Unreachable: the language model gave no usable answer to a whole batch; what was written before it stays.
     """
     captures = CaptureSet.own(folder)
-    ours = next((file.captions for file in captures.caption_files if file.name == FILE), {})
-    written_by_people = replace(
-        captures, caption_files=tuple(file for file in captures.caption_files if file.name != FILE)
-    )
-    told = {
-        row.id: tuple(dict.fromkeys(chain(*authors)))
-        for row in captures.rows
-        if row.action != UNUSED and (authors := written_by_people.captions_of(row))
-    }
+    told = _captions_by_people(captures)
     if not told:
         raise InvalidInput("no clip has captions to rephrase", where=str(folder), hint="Write some into index.csv.")
-    done = dict(ours)
+    done = dict(next((file.captions for file in captures.caption_files if file.name == FILE), {}))
     missing = [clip for clip in told if clip not in done]
     refused, written, path = Counter[str](), 0, folder / FILE
     for start in range(0, len(missing), CLIPS_AT_ONCE):
@@ -92,6 +84,16 @@ def paraphrase(
         write_atomically(path, _as_csv(done).encode())
         progress(len(told) - len(missing) + start + len(batch), len(told))
     return Paraphrased(path, len(done), written, refused)
+
+
+def _captions_by_people(captures: CaptureSet) -> dict[str, tuple[str, ...]]:
+    """Return the captions of each clip that is used, without paraphrases of earlier calls."""
+    by_people = replace(captures, caption_files=tuple(file for file in captures.caption_files if file.name != FILE))
+    return {
+        row.id: tuple(dict.fromkeys(chain(*authors)))
+        for row in captures.rows
+        if row.action != UNUSED and (authors := by_people.captions_of(row))
+    }
 
 
 def _of_clip(captions: Sequence[str], rewriters: Sequence[PromptRewriter], refused: Counter[str]) -> Iterator[str]:

@@ -127,10 +127,7 @@ def reconstruct(
     sources = {name: tuple(name.split("+")) for name in BUNDLE_SOURCES if set(name.split("+")) <= set(real.splits)}
     whole = real.joined([name for name in sources if name in real.splits])
     features = _features(data, whole, tokenizer.frames_per_token, evaluator)
-    made: list[Features] = []
-    for low in range(0, len(features), BATCH):
-        made += rebuilt(tokenizer, features[low : low + BATCH])
-        progress(len(made), len(features))
+    made = _rebuild_all(tokenizer, features, progress)
     checked, errors = _joints(space, whole, features, made)
     motion = evaluator.embed_motion(made)
     rows = _rows(real, sources)
@@ -150,6 +147,16 @@ def reconstruct(
     pairs = zip(whole.clips, checked, strict=True)
     heat = heat_of((expected_of(c.acts, c.sides), style_of(c.label), each.obeyed) for c, each in pairs)
     return Rebuilt(reconstruction, heat)
+
+
+def _rebuild_all(
+    tokenizer: MotionTokenizer, features: Sequence[Features], progress: Callable[[int, int], None]
+) -> list[Features]:
+    made: list[Features] = []
+    for low in range(0, len(features), BATCH):
+        made += rebuilt(tokenizer, features[low : low + BATCH])
+        progress(len(made), len(features))
+    return made
 
 
 @torch.inference_mode()
