@@ -23,13 +23,14 @@ from tests.support.live_api import write_bundle
 
 
 class Counting(Catalogue):
-    """Counts how often a name is looked for in vain."""
+    """Counts how often a name is looked for, and how often in vain."""
 
     def __init__(self, config: Settings) -> None:
         super().__init__(config)
-        self.missed = 0
+        self.asked = self.missed = 0
 
     def capabilities(self, name: str | None) -> GeneratorCapabilities:
+        self.asked += 1
         try:
             return super().capabilities(name)
         except NotFound:
@@ -54,6 +55,11 @@ def test_a_model_that_is_not_there_is_looked_for_once_and_told_of_each_line(cata
     assert raised.value.total == 500
     assert [problem.line for problem in raised.value.problems[:2]] == [2, 3]
     assert catalogue.missed == 1
+
+
+def test_a_job_has_one_bundle_of_a_model_though_another_may_come_while_it_is_read(catalogue: Counting) -> None:
+    assert submit(catalogue, *[{"prompt": "a person walks"}] * 50).count == 50
+    assert catalogue.asked == 1
 
 
 def test_no_more_names_of_models_are_looked_for_than_a_job_may_have(catalogue: Counting) -> None:
