@@ -27,7 +27,7 @@ from marey.vocabulary.inflection import third_person
 
 SEQUENCES = 4000
 """Number of texts of several actions that are made of those of single ones."""
-WRITTEN = 8.0
+WRITTEN = 3.0
 """Weight of the texts of `several.toml` and `outside.toml`."""
 LONGEST = 45
 """Most words of them."""

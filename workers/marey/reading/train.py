@@ -28,9 +28,9 @@ from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.parsed import without_punctuation
 from marey.vocabulary.entries import load_vocabulary
 
-HIDDEN, MEMBERS = 160, 3
+HIDDEN, MEMBERS = 200, 3
 """Units of each of the networks whose scores are averaged; side by side they are one network."""
-EPOCHS, BATCH, RATE, DECAY, DROPOUT = 30, 1024, 3e-3, 0.02, 0.4
+EPOCHS, BATCH, RATE, DECAY, DROPOUT = 45, 1024, 3e-3, 0.02, 0.4
 SMOOTHING = 0.05
 BALANCE = 0.5
 """Exponent of a class's number of texts by which each of them weighs less."""
