@@ -15,6 +15,7 @@ OPTIONS = {
     "bvh_root": "--bvh-root",
     "extra_columns": "--extra-columns",
     "file_format": "--input-format",
+    "formats": "--format",
     "fps": "--fps",
     "in_place": "--in-place",
     "licence": "--licence",

@@ -7,6 +7,7 @@ see docs/extending.md. Importing this package needs the standard library only.
 from marey.exporters.exporter import Coordinates, Exporter
 from marey.exporters.registry import (
     GROUP,
+    check_known,
     check_options,
     check_writers,
     exporter_for,
@@ -21,6 +22,7 @@ __all__ = [
     "GROUP",
     "Coordinates",
     "Exporter",
+    "check_known",
     "check_options",
     "check_writers",
     "exporter_for",

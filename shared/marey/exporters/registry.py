@@ -74,6 +74,26 @@ def version_of(format: str) -> str:
     return f"{EXPORTERS.owner(format)} {EXPORTERS.version(format)}, marey {version('marey')}"
 
 
+def check_known(formats: Iterable[str], *, hint: str = "") -> None:
+    """Validate that each format is installed here.
+
+    Args:
+        hint: follows the known formats.
+
+    Raises:
+        InvalidInput: one is not.
+    """
+    known = exporters()
+    for name in formats:
+        if name not in known:
+            raise InvalidInput(
+                f"{name[:40]!r} is not a known motion format",
+                where="formats",
+                hint=" ".join(filter(None, (f"Known: {', '.join(known)}.", hint))),
+                argument="formats",
+            )
+
+
 def extension_of(format: str) -> str:
     """Return the ending of a format's file names: the format itself where its exporter is not installed."""
     found = exporters().get(format)

@@ -39,6 +39,42 @@ def test_generate_and_submit(
     assert not (tmp_path / "out").exists()
 
 
+KNOWN = "bvh, fbx, gif, glb, mp4, npz, smplx, usd, vrma, webp"
+
+
+@pytest.mark.parametrize(
+    ("command", "hint"),
+    [
+        (("generate", "a person walks", "--bundle", "hgm3-starter", "-o"), f"Known: {KNOWN}."),
+        (("submit", "a person walks", "--fetch"), f"Known: {KNOWN}. One that only the server has:"),
+    ],
+)
+def test_a_format_that_is_not_known(marey: Command, tmp_path: Path, command: tuple[str, ...], hint: str) -> None:
+    ran = marey(*command, tmp_path / "out", "--format", "npz", "--format", "bwh")
+    assert (ran.code, ran.out) == (2, "")
+    assert f"--format: 'bwh' is not a known motion format\n  {hint}" in ran.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--format", "bwh"), ("--format", "glb"), ("--body", "hero"), ("--name-template", "{seed}")]
+)
+@pytest.mark.parametrize("more", [(), ("--watch",), ("--dry-run",)])
+def test_submit_refuses_options_of_files_that_it_does_not_fetch(
+    marey: Command, option: str, value: str, more: tuple[str, ...]
+) -> None:
+    ran = marey("submit", "a person walks", option, value, *more)
+    assert (ran.code, ran.out) == (2, "")
+    assert f"{option}: acts on files that are fetched, and none are" in ran.err
+    assert f"Add --fetch FOLDER, or leave it to `marey fetch JOB {option} " in ran.err
+
+
+def test_submit_refuses_a_time_limit_where_it_does_not_wait(marey: Command) -> None:
+    ran = marey("submit", "a person walks", "--timeout", 3)
+    assert (ran.code, ran.out) == (2, "")
+    assert "--timeout: limits the time of waiting, and nothing is waited for\n  Add --watch or --fetch" in ran.err
+
+
 def test_a_rig_that_is_no_model_of_smplx(marey: Command, tmp_path: Path) -> None:
     options = ("--format", "smplx", "--rig", "mixamo")
     ran = marey("generate", "a person walks", "--bundle", "hgm3-starter", "-o", tmp_path / "out", *options)

@@ -315,14 +315,10 @@ def _exporters(formats: list[str] | None, export: ExportOptions) -> list[Exporte
             not given, or an unknown rig.
         NotFound, InvalidFile, TooLarge: the rig cannot be read.
     """
-    from marey.exporters import check_writers, exporters
+    from marey.exporters import check_known, check_writers, exporters
 
+    check_known(formats or ())
     known = exporters()
-    for name in formats or ():
-        if name not in known:
-            raise InvalidInput(
-                f"{name!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
-            )
     stored = [name for name, exporter in known.items() if exporter.stored]
     kinds = [known[name] for name in dict.fromkeys(formats or stored)]
     check_writers(kinds, export)

@@ -78,6 +78,14 @@ def submit(
     from marey.client.making import check_rig
 
     check_template(name_template)
+    if fetch is None:
+        _refuse_of_files(formats, body, name_template)
+    if timeout is not None and fetch is None and not watch:
+        raise InvalidInput(
+            "limits the time of waiting, and nothing is waited for",
+            where="--timeout",
+            hint="Add --watch or --fetch FOLDER, or leave it to `marey jobs wait JOB --timeout SECONDS`.",
+        )
     export = _export_of(fetch, formats, body)
     if fetch is not None:
         from marey.client.fetching import check_folder
@@ -127,25 +135,42 @@ def submit(
                 _follow(client, job.id, fetch, formats, name_template, timeout, as_json, export)
 
 
+def _refuse_of_files(formats: list[str] | None, body: str | None, template: str) -> None:
+    """Refuse the options of files that are fetched, where none are.
+
+    Raises:
+        InvalidInput: one is given.
+    """
+    given = {
+        "--format FORMAT": bool(formats),
+        "--body NAME|FILE": body is not None,
+        "--name-template TEMPLATE": template != options.TEMPLATE,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise InvalidInput(
+                "acts on files that are fetched, and none are",
+                where=option.partition(" ")[0],
+                hint=f"Add --fetch FOLDER, or leave it to `marey fetch JOB {option}`.",
+            )
+
+
 def _export_of(folder: Path | None, formats: list[str] | None, body: str | None) -> ExportOptions:
     """Return the options of the files that `--fetch` writes; the file of a body is read, and formats that are made here
     are checked, before anything is enqueued.
 
     Raises:
-        InvalidInput: a body without `--fetch`, a file that is none, or a format that cannot be made here.
+        InvalidInput: a file that is none, or a format that is not known or cannot be made here.
         NotFound, InvalidFile: of the file.
     """
     from marey.client.making import check_body, check_formats
+    from marey.exporters import check_known
 
-    if body is not None and folder is None:
-        raise InvalidInput(
-            "the server has one body; files are put on another where they are fetched",
-            where="--body",
-            hint="Add --fetch FOLDER, or leave it to `marey fetch JOB --body NAME|FILE`.",
-        )
     export = ExportOptions(body=body)
     check_body(export)
     if folder is not None:
+        hint = "One that only the server has: submit without --fetch, then `marey fetch JOB --format FORMAT`."
+        check_known(formats or (), hint=hint)
         check_formats(formats, export)
     return export
 

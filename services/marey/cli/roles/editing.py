@@ -135,17 +135,13 @@ def loop(clip: MotionClip, where: str) -> MotionClip:
 
 def _writer(output: Path, file_format: str) -> tuple[Exporter[Any], bool]:
     """Return the exporter of the results, and whether the output names one file."""
-    from marey.exporters import exporter_named, exporters
+    from marey.exporters import check_known, exporter_named, exporters
 
-    known = exporters()
     named = exporter_named(output.name)
     if named is not None and not output.is_dir():
         return named, True
-    if file_format not in known:
-        raise InvalidInput(
-            f"{file_format!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
-        )
-    return known[file_format], False
+    check_known([file_format])
+    return exporters()[file_format], False
 
 
 def _read(path: Path) -> EditSource:
