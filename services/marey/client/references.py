@@ -30,6 +30,7 @@ class References(Resource):
             No element: there is no such object. Several: the reference is ambiguous.
 
         Raises:
+            NotFound: the reference names an item that has no motion; the error tells its state.
             InvalidInput: the reference is empty or too long.
             Refused, Unreachable: as the server says.
         """

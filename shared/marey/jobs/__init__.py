@@ -38,7 +38,7 @@ from marey.jobs.lease_types import (
     WorkerRow,
 )
 from marey.jobs.listings import events_after, get_job, list_items, list_jobs
-from marey.jobs.motions import find_motions, get_motion, motions_of
+from marey.jobs.motions import find_motions, get_motion, missing_motion, motions_of
 from marey.jobs.operate import cancel, pause, resume, retry, set_comment, set_fail_early, set_priority
 from marey.jobs.policy import Policy, policy
 from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
@@ -133,6 +133,7 @@ __all__ = [
     "live_workers",
     "load_texts",
     "make_due",
+    "missing_motion",
     "motions_of",
     "open_stream_counts",
     "outbox_state",

@@ -14,6 +14,7 @@ from marey.jobs import tables
 from marey.jobs.files import files_of
 from marey.jobs.states import Review
 from marey.jobs.types import Edits, MotionFile, MotionRow
+from marey.jobs.unmade import item_is, no_motion
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
@@ -29,17 +30,24 @@ def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> l
     """Return these motions, in the order given, without duplicates.
 
     Raises:
-        NotFound: the tenant lacks one of them.
+        NotFound: the tenant lacks one of them; of an item's id the error tells its state.
     """
     asked = list(dict.fromkeys(motions))
     rows = find_motions(conn, tenant, asked)
     missing = [motion for motion in asked if motion not in rows]
     if missing:
-        more = f" (and {len(missing) - 1} more of those given)" if len(missing) > 1 else ""
-        raise NotFound(
-            f"there is no such motion{more}", where=f"motion {missing[0]}", hint="`marey motions list` shows yours."
-        )
+        error = missing_motion(conn, tenant, missing[0])
+        if len(missing) > 1:
+            error.message += f" (and {len(missing) - 1} more of those given are missing)"
+        raise error
     return [rows[motion] for motion in asked]
+
+
+def missing_motion(conn: sa.Connection, tenant: str, motion: UUID) -> NotFound:
+    """Return the error about a motion that the tenant does not have; of an item's id it tells the state."""
+    where = f"motion {motion}"
+    found = no_motion(conn, tenant, item_is(motion), where=where)
+    return found or NotFound("there is no such motion", where=where, hint="`marey motions list` shows yours.")
 
 
 def find_motions(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> dict[UUID, MotionRow]:

@@ -22,6 +22,7 @@ from marey.db.sql import among, check_text
 from marey.db.tables import short_id
 from marey.evaluations import tables as evaluation_tables
 from marey.jobs import tables as job_tables
+from marey.jobs.unmade import item_at, item_is, no_motion
 from marey.streams import tables as stream_tables
 from marey.takes.searching import motions_at
 from marey.tenants import tables as tenant_tables
@@ -100,7 +101,8 @@ def resolve_reference(
 
     Raises:
         InvalidInput: not a reference, or a delivery without its webhook.
-        NotFound: the tenant has no such webhook.
+        NotFound: the tenant has no such webhook, or the reference names an item that has no motion; the error tells
+            its state.
     """
     check_text(reference, "reference")
     if not 1 <= len(reference) <= MAX_REFERENCE:
@@ -176,12 +178,15 @@ def _motions(conn: sa.Connection, tenant: str, reference: str) -> list[Reference
     query = sa.select(table.motion_id, table.created_at).where(table.tenant_id == tenant)
     readings = _by_id(reference, table.motion_id)
     ids = [row[0] for row in _read(conn, query, readings, table.created_at, table.motion_id, last=reference == LAST)]
+    unmade = [item_is(UUID(reference))] if _WHOLE.fullmatch(reference) else []
+    variant = None
     if place := _PLACE.fullmatch(reference):
+        index, variant = int(place["index"]), None if place["variant"] is None else int(place["variant"])
         jobs = _newest(_rows(conn, tenant, ReferenceKind.JOB, place["job"]))
         if len(jobs) > 1:
             return jobs  # the intended one comes first
-        ids += [motion for job in jobs for motion in motions_at(conn, job.id, int(place["index"]))]
-    variant = None if place is None or place["variant"] is None else int(place["variant"])
+        ids += [motion for job in jobs for motion in motions_at(conn, job.id, index)]
+        unmade += [item_at(job.id, index, variant) for job in jobs]
     motion, item = job_tables.motion.c, job_tables.item.c
     found = (
         sa.select(
@@ -191,11 +196,15 @@ def _motions(conn: sa.Connection, tenant: str, reference: str) -> list[Reference
         .join(job_tables.item, item.id == motion.item_id)
         .where(among(motion.id, ids), motion.tenant_id == tenant)
     )
-    return [
+    matches = [
         ReferenceMatch(ReferenceKind.MOTION, *row[:4], job=row.job, index=row.place, variant=row.variant)
         for row in conn.execute(found)
         if variant is None or row.variant == variant
     ]
+    for wanted in () if matches else unmade:
+        if (reason := no_motion(conn, tenant, wanted, where=f"motion {reference[:80]!r}")) is not None:
+            raise reason
+    return matches
 
 
 def _deliveries(conn: sa.Connection, webhook: UUID, reference: str) -> list[ReferenceMatch]:

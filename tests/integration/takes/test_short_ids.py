@@ -7,6 +7,7 @@ import pty
 import re
 import subprocess
 import sys
+from pathlib import Path
 from uuid import uuid4
 
 import pytest
@@ -51,6 +52,56 @@ def test_a_motion_is_named_by_its_place_and_verdicts_go_where_they_belong(marey:
         motions[2, 0], motions[2, 1], motions[0, 0],
     }  # fmt: skip
     marey("motions", "keep", "last:9").refused(3, "there is no such motion")
+
+
+def test_a_motion_that_is_not_made_is_told_from_one_that_does_not_exist(
+    marey: Command, api: LiveApi, tmp_path: Path
+) -> None:
+    prompts = ["a person walks", "a person tangoes", "a person jumps"]
+    with api.client() as client:
+        job = client.submit([{"prompt": prompt} for prompt in prompts], name="not yet")["id"]
+        items = [item["id"] for item in client.pages(f"/v1/jobs/{job}/items")]
+
+    def file(reference: object, *words: str) -> None:
+        marey("motions", "file", reference, "glb", "-o", tmp_path / "walk.glb").refused(3, *words)
+
+    for reference in ("not yet:0", f"{short(job)}:1.0", "last:2", items[0]):
+        file(reference, "the motion is not made yet: its item waits for a worker", f"`marey jobs wait {job}`")
+    with api.http() as http:
+        answer = http.get(f"/v1/motions/{items[0]}")
+        assert (answer.status_code, "not made yet" in answer.json()["detail"]) == (404, True)
+        given = {"motions": [items[0], str(uuid4())], "verdict": "kept"}
+        assert "and 1 more" in http.post("/v1/motions/review", json=given).json()["detail"]
+        pose = {"type": "pose_keyframe", "frame": 0, "motion": {"id": items[0], "frame": 0}}
+        wanted = {"items": [{"prompt": "a person bows", "constraints": [pose]}]}
+        assert "not made yet" in http.post("/v1/jobs", json=wanted).json()["problems"][0]["message"]
+    marey("jobs", "pause", job).ok()
+    file("not yet:0", f"Its job is paused: `marey jobs resume {job}` goes on.")
+    marey("jobs", "resume", job).ok()
+
+    api.work(fail=frozenset({prompts[1]}))
+    (walk, _) = marey("motions", "list", "--job", job, "--json").ok().lines
+    assert marey("motions", "keep", "not yet:0", "--json").ok().lines[0]["id"] == walk["id"]
+    file(items[0], "this is an item, not a motion", f"Its motion is {walk['id']}.")
+    file("not yet:1", "there is no motion: its item failed: this cannot be danced", "Walk.")
+    file("not yet:0.1", "there is no such motion")
+    file("not yet:3", "there is no such motion")
+    with api.client() as client:
+        job = client.submit([{"prompt": "a person walks"}], name="never")["id"]
+    marey("jobs", "cancel", job).ok()
+    file("never:0", "there is no motion: its item was cancelled", f"`marey jobs retry {job}`")
+
+
+def test_an_item_of_another_tenant_is_no_motion(marey: Command, api: LiveApi) -> None:
+    with transaction(api.engine) as conn:
+        create_tenant(conn, "beside")
+        key = create_key(conn, "bea", ["admin"], tenant="beside").secret
+    with api.client() as client:
+        job = client.submit([{"prompt": "a person walks"}])["id"]
+        (item,) = client.pages(f"/v1/jobs/{job}/items")
+    other = Command({"MAREY_SERVER": api.url, "MAREY_KEY": key})
+    for reference in (item["id"], f"{job}:0", "last"):
+        other("motions", "keep", reference).refused(3, "there is no such motion")
 
 
 def test_an_ambiguous_name_lists_its_candidates_and_nothing_is_done(marey: Command, api: LiveApi, job: str) -> None:

@@ -84,7 +84,7 @@ def test_what_cannot_be_read_names_the_field(api: LiveApi, http: httpx2.Client) 
     for validate_only in (False, True):
         answer = post(http, keyframe(source["id"], 7, 1), keyframe(missing, 0), validate_only=validate_only)
         assert problems(answer) == [
-            (2, "constraints.1.motion.id", "there is no such motion: `marey motions list` shows yours")
+            (2, "constraints.1.motion.id", "there is no such motion. `marey motions list` shows yours.")
         ]
     ((line, field, message),) = problems(post(http, keyframe(source["id"], 4000)))
     assert (line, field) == (2, "constraints.0.motion.frame")

@@ -16,7 +16,7 @@ from marey.exporters.registry import CANONICAL
 from marey.items.constraints import named_motions
 from marey.items.item import Item
 from marey.items.problems import InvalidItems, Problem
-from marey.jobs import MotionRow, asset_key, find_motions
+from marey.jobs import MotionRow, asset_key, find_motions, missing_motion
 from marey.motion.edits.licences import LICENCE, terms_with
 from marey.motion.keyframes import beyond, with_pose
 from marey.tenants import ApiKey
@@ -155,12 +155,13 @@ def _find(shared: Context, key: ApiKey, named: NamedPoses) -> Mapping[UUID, Moti
     """
     with transaction(shared.engine) as conn:
         rows = find_motions(conn, key.tenant, named.frames)
+        missing = {each: missing_motion(conn, key.tenant, each) for each in named.frames if each not in rows}
     problems: list[Problem] = []
     for motion, frames in named.frames.items():
         row = rows.get(motion)
         if row is None:
             line, where = next(iter(frames.values()))
-            problems.append(Problem(line, f"{where}.id", "there is no such motion: `marey motions list` shows yours"))
+            problems.append(Problem(line, f"{where}.id", missing[motion].on_a_line))
             continue
         late = [(place, frame) for frame, place in frames.items() if frame >= row.frames]
         problems += [Problem(line, f"{where}.frame", beyond(frame, row.frames)) for (line, where), frame in late]
