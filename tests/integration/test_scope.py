@@ -57,7 +57,7 @@ def test_a_submit_warns_of_what_the_model_does_not_know_and_stores_each_scope(ht
     }  # fmt: skip
     assert job["scope_report"]["actions"] == {BUNDLE: ["walk", "run"]}
     assert job["warnings"][0].endswith(KNOWN)
-    assert f"number 4, {NONSENSE!r}" in job["warnings"][0]
+    assert f"index 3 (from 0), {NONSENSE!r}" in job["warnings"][0]
     scopes = [item["scope"] for item in items(http, job)]
     assert [scope["verdict"] for scope in scopes] == ["known", "close", "tried", "unknown"]
     assert {scope["by"] for scope in scopes} == {"words"}

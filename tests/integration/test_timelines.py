@@ -127,7 +127,7 @@ def test_the_command_line_submits_fetches_and_submits_again(api: LiveApi, marey:
 def test_the_command_line_takes_one_kind_of_input(marey: Command) -> None:
     marey("submit", "a person walks", "--timeline", TEXT).refused(2, "both PROMPT and --timeline are given")
     marey("submit", "--timeline", TEXT, "--seconds", 5).refused(2, "seconds: 5 is not the end of the timeline, 20")
-    marey("submit", "--timeline", "0-3 walk; wave").refused(2, "line 1: timeline: row 2, 'wave', has no times")
+    marey("submit", "--timeline", "0-3 walk; wave").refused(2, "argument 1: timeline: row 2, 'wave', has no times")
     dry = marey("submit", "--timeline", TEXT, "--timeline", TEXT, "--dry-run").ok()
     assert f"2 motions would be made, with {BUNDLE}" in dry.err
 

@@ -95,7 +95,7 @@ Template = Annotated[
     typer.Option(
         "--name-template",
         help="File names, of {index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}, and {tag:shot} "
-        "for shot=…; / makes folders.",
+        "for shot=…; index and variant count from 0, / makes folders.",
     ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files with other content.")]

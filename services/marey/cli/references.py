@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from marey.client.references import ReferenceKind as Kind
 
 FORMS = "its id, the last 8 digits of it, a name, or last"
-MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX, JOB:INDEX.VARIANT, or last"
+MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX or JOB:INDEX.VARIANT (both from 0), or last"
 LISTED = 5
 LISTS = {
     "job": "marey jobs list",

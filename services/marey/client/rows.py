@@ -35,12 +35,14 @@ class PromptReader:
 
     Attributes:
         where: the name of the source in messages.
+        unit: the name of a line in messages.
         lines: the line of each item.
         total: number of problems.
     """
 
-    def __init__(self, raws: Rows, where: str) -> None:
+    def __init__(self, raws: Rows, where: str, unit: str = "line") -> None:
         self.where = where
+        self.unit = unit
         self.lines: list[int | None] = []
         self.total = 0
         self._raws = raws
@@ -93,7 +95,8 @@ class PromptReader:
             yield
         except OutOfScope as error:  # everything else was right
             found = self.located(error.problems)
-            raise OutOfScope(found, where=self.where, total=error.total, hint=error.hint or "") from None
+            hint = error.hint or ""
+            raise OutOfScope(found, where=self.where, total=error.total, hint=hint, unit=self.unit) from None
         except InvalidItems as error:
             if all(problem.line is None for problem in error.problems):
                 raise
@@ -101,13 +104,14 @@ class PromptReader:
             self.total += error.total - len(error.problems)
             raise self.error() from None
 
-    def error(self, *, hint: str | None = None) -> InvalidItems:
+    def error(self, *, more: str | None = None) -> InvalidItems:
         """Return the error with all problems, by line."""
         found = sorted(self._problems, key=lambda problem: problem.line or 0)
         extra = any("is not a known column" in problem.message for problem in found)
-        hints = [EXTRA_HINT if extra else "Correct them and try again.", *([hint] if hint else [])]
+        hints = [EXTRA_HINT if extra else "Correct them and try again.", *([more] if more else [])]
         argument = "extra_columns" if extra else None
-        return InvalidItems(found, where=self.where, total=self.total, hint=" ".join(hints), argument=argument)
+        hint = " ".join(hints)
+        return InvalidItems(found, where=self.where, total=self.total, hint=hint, argument=argument, unit=self.unit)
 
 
 def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Problem]:
@@ -176,17 +180,17 @@ def defaults_of(
 
 def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Read prompts given as arguments; a problem names the number of the argument."""
-    return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT")
+    return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT", "argument")
 
 
 def read_timelines(timelines: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Read timelines given as arguments; a problem names the number of the argument."""
-    return PromptReader(((i, {"timeline": t, **defaults}) for i, t in enumerate(timelines, 1)), "ROWS")
+    return PromptReader(((i, {"timeline": t, **defaults}) for i, t in enumerate(timelines, 1)), "timelines", "argument")
 
 
 def read_rows(raws: Iterable[object], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Read the rows of a program; a problem names the number of the row, from 1."""
-    return PromptReader(((number, _completed(raw, defaults)) for number, raw in enumerate(raws, 1)), "rows")
+    return PromptReader(((number, _completed(raw, defaults)) for number, raw in enumerate(raws, 1)), "rows", "row")
 
 
 def read_file(

@@ -24,6 +24,7 @@ def refuse_unknown(
     prompts: Iterable[tuple[int | None, str | None, str, Bundle]],
     *,
     where: str | None = None,
+    unit: str = "line",
     match: Callable[[str, ActionLists], Scope] = match_scope,
 ) -> None:
     """Check that every prompt names only actions that its bundle knows, tries, or reads as a known one.
@@ -33,6 +34,7 @@ def refuse_unknown(
     Args:
         prompts: line in the input, name of the row of a timeline, prompt, and the bundle that will read it.
         where: name of the input.
+        unit: name of a line of it.
         match: by words, or by words and meaning.
 
     Raises:
@@ -62,7 +64,8 @@ def refuse_unknown(
             problems.append(problem)
     if total:
         knows = " ".join(says_known(name, actions) for name, actions in known.items())
-        raise OutOfScope(problems, where=where, total=total, hint=f"{knows} The scope `warn` accepts such prompts.")
+        hint = f"{knows} The scope `warn` accepts such prompts."
+        raise OutOfScope(problems, where=where, total=total, hint=hint, unit=unit)
 
 
 def examine_prompts(

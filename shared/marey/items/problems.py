@@ -20,12 +20,20 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        place = ": ".join(str(p) for p in (f"line {self.line}" if self.line else None, self.field) if p is not None)
+        return self.counted("line")
+
+    def counted(self, unit: str) -> str:
+        """Return the problem with the number of its line, which is called `unit`."""
+        place = ": ".join(str(p) for p in (f"{unit} {self.line}" if self.line else None, self.field) if p is not None)
         return f"{place}: {self.message}" if place else self.message
 
 
 class InvalidItems(InvalidInput):
-    """Input with unusable lines; none of it was used."""
+    """Input with unusable lines; none of it was used.
+
+    Args:
+        unit: name of a line in messages: input that is no file has arguments or rows.
+    """
 
     problem_type = "invalid-items"
 
@@ -37,7 +45,9 @@ class InvalidItems(InvalidInput):
         total: int | None = None,
         hint: str = "Correct them and try again.",
         argument: str | None = None,
+        unit: str = "line",
     ) -> None:
+        self.unit = unit
         found = list(problems)
         self.total = len(found) if total is None else total
         self.problems = tuple(found[:MAX_PROBLEMS])
@@ -45,7 +55,7 @@ class InvalidItems(InvalidInput):
         super().__init__(f"{count} in the input; none of it is used", where=where, hint=hint, argument=argument)
 
     def __str__(self) -> str:
-        lines = [f"  {problem}" for problem in self.problems]
+        lines = [f"  {problem.counted(self.unit)}" for problem in self.problems]
         if self.total > len(lines):
             lines.append(f"  … and {self.total - len(lines)} more")
         head = f"{self.where}: {self.message}" if self.where else self.message

@@ -12,7 +12,7 @@ from marey.vocabulary.scope import ActionLists, Scope, Verdict, match_scope, sco
 
 MAX_EXAMPLES = 3
 """Of each verdict and flag."""
-MAX_NUMBERS = 10
+MAX_PLACES = 10
 """Places of prompts that a warning names."""
 MAX_SHOWN = 60
 """Characters of a prompt in a message."""
@@ -84,8 +84,8 @@ class ScopeReport:
     left: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     _noted: Counter[str] = field(default_factory=Counter[str])
     """Prompts with each flag that warnings tell of: those of `unknown` prompts only where they are its reason."""
-    _numbers: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
-    """Places of the first prompts of each verdict and with each flag, from 1."""
+    _places: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
+    """Places of the first prompts of each verdict and with each flag, from 0 as in `JOB:INDEX`."""
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
 
     def judge(
@@ -150,9 +150,9 @@ class ScopeReport:
             self.left.setdefault(bundle, []).append(prompt)
 
     def _add(self, kind: str, index: int, prompt: str, scope: Scope) -> None:
-        numbers = self._numbers.setdefault(kind, [])
-        if len(numbers) < MAX_NUMBERS:
-            numbers.append(index + 1)
+        places = self._places.setdefault(kind, [])
+        if len(places) < MAX_PLACES:
+            places.append(index)
         examples = self._examples.setdefault(kind, [])
         if len(examples) < MAX_EXAMPLES:
             named = (each for each in scope.actions if each.verdict == kind)
@@ -190,9 +190,9 @@ class ScopeReport:
             return f"{first.prompt!r}{what}"
         count = self.counts[kind] or self._noted[kind]
         if count == 1:
-            return f"1 of {self.total} prompts, number {first.index + 1}, {first.prompt!r}{what}"
-        numbers = ", ".join(map(str, self._numbers[kind])) + (", …" if count > MAX_NUMBERS else "")
-        return f"{count} of {self.total} prompts, numbers {numbers}, first {first.prompt!r}{what}"
+            return f"1 of {self.total} prompts, index {first.index} (from 0), {first.prompt!r}{what}"
+        places = ", ".join(map(str, self._places[kind])) + (", …" if count > MAX_PLACES else "")
+        return f"{count} of {self.total} prompts, indexes {places} (from 0), first {first.prompt!r}{what}"
 
 
 def with_length(scope: Scope, prompt: str, lengths: tuple[float, float]) -> Scope:

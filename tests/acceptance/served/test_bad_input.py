@@ -35,7 +35,7 @@ def nothing_new(marey: Marey, before: list[dict[str, object]]) -> None:
 )
 def test_a_prompt_that_cannot_be_used(marey: Marey, prompt: str, said: str) -> None:
     before = marey.jobs()
-    marey("submit", "a person walks", prompt).refused(2, "line 2: prompt", said)
+    marey("submit", "a person walks", prompt).refused(2, "PROMPT: 1 problem", "argument 2: prompt", said)
     nothing_new(marey, before)
 
 

@@ -84,6 +84,8 @@ def test_a_motion_that_is_not_made_is_told_from_one_that_does_not_exist(
     assert marey("motions", "keep", "not yet:0", "--json").ok().lines[0]["id"] == walk["id"]
     file(items[0], "this is an item, not a motion", f"Its motion is {walk['id']}.")
     file("not yet:1", "there is no motion: its item failed: this cannot be danced", "Walk.")
+    failure = f"failed     {short(job)}:1.0 'a person tangoes': this cannot be danced"
+    assert failure in marey("jobs", "show", job).ok().out.splitlines()
     file("not yet:0.1", "there is no such motion")
     file("not yet:3", "there is no such motion")
     with api.client() as client:

@@ -9,11 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.client.rows import defaults_of, read_arguments, read_evaluation_prompts, right_items
+from marey.client.rows import (
+    defaults_of,
+    read_arguments,
+    read_evaluation_prompts,
+    read_file,
+    read_rows,
+    read_timelines,
+    right_items,
+)
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import Item
-from marey.items.problems import InvalidItems
+from marey.items.problems import InvalidItems, OutOfScope, Problem
 from tests.support.models import NOT_KEEPING
 from tests.support.rows import items_of
 
@@ -265,3 +273,17 @@ def test_an_argument_that_is_a_setting_is_named_once(given: dict[str, Any], wher
     with pytest.raises(InvalidInput) as told:
         defaults_of(**given)
     assert (told.value.where, told.value.argument, told.value.message) == (where, where, message)
+
+
+def test_a_problem_counts_lines_arguments_or_rows(tmp_path: Path) -> None:
+    file = write(tmp_path, "p.txt", f"a person walks\n\n{'a' * 101}\n")
+    for reader, unit, number in (
+        (read_file(file), "line", 3),
+        (read_arguments(["a person walks", ""]), "argument", 2),
+        (read_timelines(["0-3 a person walks", "walk"]), "argument", 2),
+        (read_rows([{"prompt": "a person walks"}, {"prompt": ""}]), "row", 2),
+    ):
+        list(reader)
+        assert f"\n  {unit} {number}: " in str(reader.error())
+        with pytest.raises(OutOfScope, match=f"\n  {unit} 1: prompt: is unknown"), reader.in_source():
+            raise OutOfScope([Problem(1, "prompt", "is unknown")], hint="No.")

@@ -33,5 +33,5 @@ def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert [item.constraints for item in reader] == [None]
     with pytest.raises(InvalidInput) as refused:
         raise reader.error()
-    assert "line 1: constraints.0.motion.file: this needs what the extra 'motion' installs" in str(refused.value)
+    assert "row 1: constraints.0.motion.file: this needs what the extra 'motion' installs" in str(refused.value)
     assert "pip install 'marey[motion]'" in str(refused.value)

@@ -43,26 +43,28 @@ def test_known_prompts_are_counted_without_a_warning() -> None:
 def test_every_verdict_and_flag_has_its_sentence() -> None:
     found = report_of("a person walks", "he kicks", "she sprints", "he walks, not runs", "kicks twice").warnings()
     assert found == [
-        "2 of 5 prompts, numbers 2, 5, first 'he kicks' (kick): named actions are unreliable with this model",
-        "1 of 5 prompts, number 3, 'she sprints' (run): read as another action",
-        "1 of 5 prompts, number 4, 'he walks, not runs': what is not to be done may be done",
-        "1 of 5 prompts, number 5, 'kicks twice': may be done another number of times",
+        "2 of 5 prompts, indexes 1, 4 (from 0), first 'he kicks' (kick): named actions are unreliable with this model",
+        "1 of 5 prompts, index 2 (from 0), 'she sprints' (run): read as another action",
+        "1 of 5 prompts, index 3 (from 0), 'he walks, not runs': what is not to be done may be done",
+        "1 of 5 prompts, index 4 (from 0), 'kicks twice': may be done another number of times",
     ]
 
 
 def test_a_warning_says_that_a_prompt_is_in_another_language_or_of_another_subject() -> None:
     found = report_of("a person walks", "ein Mann geht nach links", "un homme marche", "the dog barks").warnings()
-    assert found[0].startswith("3 of 4 prompts, numbers 2, 3, 4, first 'ein Mann geht nach links': no action")
+    assert found[0].startswith("3 of 4 prompts, indexes 1, 2, 3 (from 0), first 'ein Mann geht nach links': no action")
     assert found[1:] == [
-        "2 of 4 prompts, numbers 2, 3, first 'ein Mann geht nach links': "
+        "2 of 4 prompts, indexes 1, 2 (from 0), first 'ein Mann geht nach links': "
         "words in another language are not read: write in English",
-        "1 of 4 prompts, number 4, 'the dog barks': a person is shown in place of its subject",
+        "1 of 4 prompts, index 3 (from 0), 'the dog barks': a person is shown in place of its subject",
     ]
 
 
 def test_the_report_is_bounded() -> None:
     report = report_of(*["qqqqqq " * 100] * 50)
-    assert report.warnings()[0].startswith("50 of 50 prompts, numbers 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, …, first 'qq")
+    assert report.warnings()[0].startswith(
+        "50 of 50 prompts, indexes 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, … (from 0), first 'qq"
+    )
     examples = report.as_json()["examples"]
     assert [example["kind"] for example in examples] == ["unknown"] * MAX_EXAMPLES
     assert max(len(example["prompt"]) for example in examples) == MAX_SHOWN
@@ -103,5 +105,5 @@ def test_a_timeline_is_counted_once_and_the_row_is_named() -> None:
     counts = report.as_json()
     assert (counts["unknown"], counts["tried"], counts["known"]) == (1, 1, 0)
     first, *_ = report.warnings()
-    assert first.startswith("1 of 2 prompts, number 1, 'row 2 (3-5): he juggles'")
+    assert first.startswith("1 of 2 prompts, index 0 (from 0), 'row 2 (3-5): he juggles'")
     assert [(each["index"], each["kind"]) for each in counts["examples"]] == [(0, "unknown"), (1, "tried")]

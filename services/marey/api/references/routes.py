@@ -32,8 +32,8 @@ class MatchView(View):
     created: datetime
     items: int | None = Field(description="Of a job, how many.")
     job: UUID | None = Field(description="Of a motion.")
-    index: int | None = Field(description="Of a motion, its prompt's in the job.")
-    variant: int | None = Field(description="Of a motion, among those of its prompt.")
+    index: int | None = Field(description="Of a motion, its prompt's in the job, from 0.")
+    variant: int | None = Field(description="Of a motion, among those of its prompt, from 0.")
 
     @classmethod
     def of(cls, match: ReferenceMatch) -> MatchView:
@@ -58,7 +58,7 @@ def resolve(
             min_length=1,
             max_length=MAX_REFERENCE,
             description="An id; its last 8 or more digits; a name; `last`, the newest; of a motion also `JOB:INDEX` or "
-            "`JOB:INDEX.VARIANT`, where JOB is any of these.",
+            "`JOB:INDEX.VARIANT`, both from 0, where JOB is any of these.",
             examples=["1a2b3c4d", "day 1", "last", "last:0.1"],
         ),
     ],

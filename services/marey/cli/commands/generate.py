@@ -267,7 +267,8 @@ def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, st
         for line, item in zip(reader.lines, items, strict=True)
         for row, prompt in prompts_with_rows(item.prompt, item.timeline)
     )
-    refuse_unknown(lines, where=reader.where, match=match_scope if studio is None else studio.match_scope)
+    match = match_scope if studio is None else studio.match_scope
+    refuse_unknown(lines, where=reader.where, unit=reader.unit, match=match)
 
 
 def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: options.ScopeOption) -> None:

@@ -259,7 +259,8 @@ def _show_failures(client: Client, job: str, state: str, limit: int = 20) -> Non
     for item in (each.raw for each in islice(found, limit)):
         error = item["error"] or {"message": item["reason"], "hint": None}
         place = f"{error['where']}: " if error.get("where") else ""
-        console.result(f"{state:<10} {item['index']}: {item['prompt'][:60]!r}: {place}{error['message']}")
+        reference = f"{console.short_id(job)}:{item['index']}.{item['variant']}"
+        console.result(f"{state:<10} {reference} {item['prompt'][:60]!r}: {place}{error['message']}")
         if error.get("hint"):
             console.result(f"{'':<10} {error['hint']}")
     if next(found, None) is not None:

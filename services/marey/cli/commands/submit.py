@@ -187,7 +187,7 @@ def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
         reader.add(reader.located(error.problems))
         reader.total += error.total - len(error.problems)
     except MareyError as error:
-        return reader.error(hint=f"Lengths and models were not checked: {error.message}.")
+        return reader.error(more=f"Lengths and models were not checked: {error.message}.")
     return reader.error()
 
 
