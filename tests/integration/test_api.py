@@ -367,7 +367,16 @@ def test_the_names_of_this_machine_are_answered(api: LiveApi, host: str) -> None
 
 def test_unknown_paths_and_methods_are_problems(http: httpx2.Client) -> None:
     refused(http.get("/v2/jobs"), 404, "not-found")
-    refused(http.put("/v1/jobs"), 405, "method-not-allowed")
+    for method, path, allowed in (
+        ("PUT", "/v1/jobs", "GET, POST"),
+        ("PUT", f"/v1/jobs/{uuid4()}", "GET, PATCH, DELETE"),
+        ("DELETE", f"/v1/motions/{uuid4()}/files/npz", "GET, HEAD"),
+        ("OPTIONS", "/livez", "GET"),
+    ):
+        answer = http.request(method, path)
+        problem = refused(answer, 405, "method-not-allowed")
+        assert (answer.headers["allow"], problem["hint"]) == (allowed, f"Allowed: {allowed}.")
+        assert (problem["where"], problem["detail"]) == (path, f"{method} is not a method of this path")
     problem = refused(http.get("/v1/jobs/not-a-uuid"), 422, "invalid-input")
     assert problem["problems"][0]["field"] == "job"
 

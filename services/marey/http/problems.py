@@ -14,6 +14,7 @@ from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from marey.core.errors import (
     Busy,
@@ -36,6 +37,7 @@ RETRY_AFTER = "2"
 LONGEST_VALUE = 80
 OF_THE_REQUEST = ("body", "prompts")
 """Prefixes of locations that a caller knows: they are part of the request."""
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 UNKNOWN_FIELD = "extra_forbidden"
 """Type of pydantic's error for a field that a model does not have."""
 SUBJECT = re.compile(r"^\w+ should")
@@ -186,15 +188,30 @@ def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that is not UTF-8 or nested too deeply
         return problem_response(InvalidInput("the body cannot be read", where="body", hint="Send JSON in UTF-8."))
     phrase = HTTPStatus(error.status_code).phrase
+    headers = dict(error.headers or {})
     body = ProblemBody(
         type=TYPE_PREFIX + phrase.lower().replace(" ", "-"),
         title=phrase,
         status=error.status_code,
         detail=_clean(str(error.detail)) or phrase,
     )
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        headers["Allow"] = ", ".join(_allowed(request))
+        body.detail = f"{_clean(request.method)} is not a method of this path"
+        body.where = _clean(request.url.path)
+        body.hint = f"Allowed: {headers['Allow']}."
     return JSONResponse(
-        body.model_dump(mode="json", exclude_none=True), error.status_code, headers=error.headers, media_type=MEDIA_TYPE
+        body.model_dump(mode="json", exclude_none=True), error.status_code, headers=headers, media_type=MEDIA_TYPE
     )
+
+
+def _allowed(request: Request) -> list[str]:
+    """Return the methods that the routes of the request's path have. The header that comes with the exception has those
+    of one route."""
+    given = {name: request.scope[name] for name in ("path", "root_path", "headers")}
+    asked = {method: {"type": "http", "method": method, **given} for method in METHODS}
+    routes = request.app.routes
+    return [name for name, scope in asked.items() if any(each.matches(scope)[0] is Match.FULL for each in routes)]
 
 
 def _body_model(request: Request) -> Any:
