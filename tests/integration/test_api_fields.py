@@ -21,6 +21,12 @@ BROKEN = {
     "no UTF-8": b'{"prompt": "\xff"}',
     "nested too deeply": b"[" * 200_000,
     "no object": b"[1]",
+    "a number without end": b'{"priority": ' + b"1" * 5000 + b"}",
+}
+SAID = {
+    "no UTF-8": "the body is not UTF-8 (byte 0xff at position 12)",
+    "nested too deeply": "the body is nested too deeply",
+    "a number without end": "the body holds a number of too many digits",
 }
 WITH_BODY = ("/v1/jobs", "/v1/evaluations", "/v1/schedules", "/v1/streams", "/v1/webhooks", "/v1/texts/parse")
 
@@ -47,7 +53,9 @@ def refusal(response: httpx2.Response) -> tuple[int, str]:
 @pytest.mark.parametrize("path", WITH_BODY)
 @pytest.mark.parametrize("broken", BROKEN)
 def test_of_a_body_that_cannot_be_read_the_body_is_named(http: httpx2.Client, path: str, broken: str) -> None:
-    assert refusal(http.post(path, content=BROKEN[broken], headers=JSON)) == (422, "body")
+    answer = http.post(path, content=BROKEN[broken], headers=JSON)
+    assert refusal(answer) == (422, "body")
+    assert SAID.get(broken, "") in answer.json()["detail"]
 
 
 def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> None:

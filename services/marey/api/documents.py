@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from json.decoder import JSONDecodeError
 from typing import Any, BinaryIO
 
+from marey.core.documents import json_problem
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.item import MAX_ITEMS
 
@@ -181,7 +182,7 @@ class _Window:
                 raise _too_large(where) from None
             raise self.error(error.msg, error.pos) from None
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
+            raise InvalidInput(f"the body {json_problem(error)}", where="body") from error
         if end - self._at > MAX_VALUE or (end == len(self._text) and not self._whole):
             raise _too_large(where)
         self._at = end
@@ -208,7 +209,8 @@ class _Window:
             try:
                 parts.append(self._decode(read, final=self._whole))
             except UnicodeDecodeError as error:  # its object includes bytes that the decoder kept
-                raise _undecodable(error, self._bytes - (len(error.object) - len(read))) from None
+                before = self._bytes - (len(error.object) - len(read))
+                raise InvalidInput(f"the body {json_problem(error, before=before)}", where="body") from None
             self._bytes += len(read)
             ahead += len(parts[-1])
         self._text = "".join(parts)
@@ -220,15 +222,6 @@ class _Window:
             self._line = self._gone + newline + 1
         self._gone += self._at
         self._text, self._at = self._text[self._at :], 0
-
-
-def _undecodable(error: UnicodeDecodeError, before: int) -> InvalidInput:
-    """Return Python's decoding error with positions in the whole body; `before` bytes precede the error's object."""
-    start, last = before + error.start, before + error.end - 1
-    one = f"byte 0x{error.object[error.start]:02x} in position {start}"
-    place = one if start == last else f"bytes in position {start}-{last}"
-    message = f"{error.encoding!r} codec can't decode {place}: {error.reason}"
-    return InvalidInput(f"the body is not JSON: {message}", where="body")
 
 
 def _too_large(where: str) -> TooLarge:

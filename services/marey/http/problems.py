@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
+from marey.core.documents import json_problem
 from marey.core.errors import (
     Busy,
     InvalidInput,
@@ -185,8 +186,11 @@ def _validation(request: Request, error: RequestValidationError) -> JSONResponse
 def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     if error.status_code == NotFound.status:
         return problem_response(NotFound("there is nothing at this path", where=_clean(request.url.path)))
-    if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that is not UTF-8 or nested too deeply
-        return problem_response(InvalidInput("the body cannot be read", where="body", hint="Send JSON in UTF-8."))
+    if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that `json` cannot read
+        cause = error.__cause__
+        known = isinstance(cause, ValueError | RecursionError)
+        message = f"the body {json_problem(cause) if known else 'cannot be read'}"
+        return problem_response(InvalidInput(message, where="body", hint="Send JSON in UTF-8."))
     phrase = HTTPStatus(error.status_code).phrase
     headers = dict(error.headers or {})
     body = ProblemBody(

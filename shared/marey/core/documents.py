@@ -55,6 +55,23 @@ def read_bytes(
         raise NotFound("there is no such file", where=where, hint=hint) from None
 
 
+def json_problem(error: Exception, *, before: int = 0) -> str:
+    """Return why `json` could not read a document, for people who do not know Python.
+
+    Args:
+        error: a `ValueError` or `RecursionError` of `json`.
+        before: bytes of the document before those that `json` read.
+    """
+    if isinstance(error, RecursionError):
+        return "is nested too deeply"
+    if isinstance(error, UnicodeDecodeError):
+        place = f"byte 0x{error.object[error.start]:02x} at position {before + error.start}"
+        return f"is not {error.encoding.upper()} ({place})"
+    if isinstance(error, json.JSONDecodeError):
+        return f"is not JSON: {error}"
+    return "holds a number of too many digits"
+
+
 def parse_json(
     data: bytes | str,
     where: str,
@@ -81,10 +98,8 @@ def parse_json(
         problem = _problem(value, allow_nan, max_depth)
     except RecursionError:
         problem = f"is nested more than {max_depth} levels deep"
-    except UnicodeDecodeError:
-        problem = "is not UTF-8"
     except ValueError as failure:
-        problem = f"is not JSON: {failure}"
+        problem = json_problem(failure)
     else:
         if problem is None:
             return value

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
+from marey.core.documents import json_problem
 from marey.core.errors import InvalidInput
 from marey.items.constraint_values import (
     MAX_POINTS,
@@ -90,11 +91,9 @@ def parse_constraints(text: str | bytes) -> list[Constraint]:
     """
     try:
         value: object = json.loads(text)
-    except RecursionError:
-        raise InvalidInput("is nested too deeply", where="constraints") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         hint = 'Write {"constraints": [{"type": "root_path", …}]}.'
-        raise InvalidInput(f"is not JSON: {error}", where="constraints", hint=hint) from None
+        raise InvalidInput(json_problem(error), where="constraints", hint=hint) from None
     if isinstance(value, Mapping):
         given = cast("Mapping[str, object]", value)
         return read_constraints(given["constraints"] if set(given) == {"constraints"} else given)

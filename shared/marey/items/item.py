@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar, cast
 
+from marey.core.documents import json_problem
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.constraints import read_constraints
 from marey.items.problems import MAX_PROBLEMS, InvalidItems, Problem
@@ -109,10 +110,8 @@ def read_json(line: str | bytes) -> object:
         return json.loads(line, object_pairs_hook=_object)
     except _RepeatedKeyError as error:
         return Unreadable(f"gives {error.args[0]!r} twice")
-    except RecursionError:
-        return Unreadable("is nested too deeply")
-    except ValueError as error:
-        return Unreadable(f"is not JSON: {error}")
+    except (ValueError, RecursionError) as error:
+        return Unreadable(json_problem(error))
 
 
 class _RepeatedKeyError(ValueError):

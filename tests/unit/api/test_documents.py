@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from marey.api import documents
 from marey.api.documents import Document
+from marey.core.documents import json_problem
 from marey.core.errors import InvalidInput, TooLarge
 
 VALUES = st.recursive(
@@ -52,7 +53,7 @@ def outcome(reader: Callable[[bytes], Any], body: bytes) -> str:
     except InvalidInput as error:
         return error.message
     except ValueError as error:
-        return f"the body is not JSON: {error}"
+        return f"the body {json_problem(error)}"
     return (
         repr(sorted(value.items(), key=lambda pair: pair[0]))
         if isinstance(value, dict)
@@ -117,7 +118,7 @@ def test_a_value_that_is_far_too_long_is_refused(body: bytes, where: str) -> Non
 def test_a_list_given_twice_and_one_nested_too_deeply_are_refused() -> None:
     with pytest.raises(InvalidInput, match="given twice"):
         read(b'{"items": [1], "items": [2]}')
-    with pytest.raises(InvalidInput, match="recursion"):
+    with pytest.raises(InvalidInput, match="the body is nested too deeply"):
         read(b'{"items": [' + b"[" * 1500 + b"]" * 1500 + b"]}")
 
 
