@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from marey.client.names import DEFAULT_TEMPLATE
-from marey.core.errors import InvalidInput
-from marey.items.settings import MAX_BEST_OF, MAX_REDRAWS, read_setting
+from marey.core.errors import InvalidInput, PluginError
+from marey.items.settings import MAX_BEST_OF, MAX_REDRAWS, OUTPUT_FPS, PLATFORM_SETTINGS, read_setting
 
 
 def settings_of(given: Sequence[str]) -> dict[str, float]:
@@ -23,7 +23,23 @@ def settings_of(given: Sequence[str]) -> dict[str, float]:
     try:
         return dict(map(read_setting, given))
     except InvalidInput as error:
-        raise InvalidInput(error.message, where="--set", hint=error.hint) from None
+        hint = None if error.where is None else _allowed(error.where)
+        raise InvalidInput(error.message, where="--set", hint=hint) from None
+
+
+def _allowed(setting: str) -> str:
+    """Return a hint with the values that a setting may have, as far as they are known here."""
+    from marey.registry import models_by_range
+
+    if setting in PLATFORM_SETTINGS:
+        low, high = PLATFORM_SETTINGS[setting]
+        return f"Allowed: {'' if setting == OUTPUT_FPS else 'whole numbers, '}{low:g} to {high:g}."
+    try:
+        found = models_by_range(setting)
+    except PluginError:
+        found = {}
+    ranges = "; ".join(f"{values} with {', '.join(names)}" for values, names in found.items())
+    return f"Allowed: {ranges}." if ranges else "`marey models show NAME` lists the settings of a model."
 
 
 class InputFormat(StrEnum):

@@ -42,8 +42,11 @@ def check_settings(value: object) -> dict[str, float]:
         InvalidInput: with the setting in the message.
     """
     if not isinstance(value, Mapping):
-        if isinstance(value, str):  # of a table
-            raise InvalidInput(f"{value[:60]!r} is not settings: write guidance=4.5;temperature=0.8")
+        if isinstance(value, str):  # of a table, where it cannot be read
+            try:
+                read_settings(value)
+            except InvalidInput as error:
+                raise InvalidInput(f"{error.message}; write guidance=4.5;temperature=0.8") from None
         raise InvalidInput('is not an object: write {"guidance": 4.5}')
     given = cast("Mapping[object, object]", value)
     if len(given) > MAX_SETTINGS:
@@ -75,15 +78,17 @@ def read_setting(text: str) -> tuple[str, float]:
     """Read `NAME=VALUE`, as `guidance=4.5`.
 
     Raises:
-        InvalidInput: it is something else.
+        InvalidInput: it is something else; `where` is the setting whose value is no number.
     """
     name, _, value = (part.strip() for part in text.partition("="))
+    if not SETTING.fullmatch(name) or not value:
+        raise InvalidInput(f"{text[:60]!r} is not a setting: it is NAME=VALUE, such as guidance=4.5")
     try:
         number = float(value)
     except ValueError:
         number = math.nan
-    if not SETTING.fullmatch(name) or not math.isfinite(number):
-        raise InvalidInput(f"{text[:60]!r} is not a setting: write NAME=VALUE, such as guidance=4.5")
+    if not math.isfinite(number):
+        raise InvalidInput(f"{name}: {value[:40]!r} is not a number", where=name)
     return name, number
 
 

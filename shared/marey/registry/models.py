@@ -230,6 +230,20 @@ def get_model(name: str, where: str | None = None) -> ModelSpec:
     return spec
 
 
+def models_by_range(setting: str) -> dict[str, list[str]]:
+    """Return the names of the installed models that have a setting, by its values in words: `whole numbers, 1 to 100`.
+
+    Raises:
+        PluginError: a model cannot be loaded.
+    """
+    found: dict[str, list[str]] = {}
+    for name, spec in MODELS.all().items():
+        for each in spec.settings:
+            if each.name == setting:
+                found.setdefault(f"{'whole numbers, ' if each.whole else ''}{each.range}", []).append(name)
+    return found
+
+
 def streaming_models() -> tuple[str, ...]:
     """The names of the registered models that make live streams, sorted.
 

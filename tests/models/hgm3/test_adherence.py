@@ -37,7 +37,7 @@ def test_a_report_counts_each_prompt_and_seed(bundle: str, tmp_path: Path) -> No
     ("arguments", "message"),
     [
         (("--set", "steps"), "not a setting"),
-        (("--set", "steps=many"), "not a setting"),
+        (("--set", "steps=many"), "steps: 'many' is not a number"),
         (("--set", "wings=2"), "unknown setting 'wings' of tiny"),
         (("--set", "steps=101"), "steps: 101 is outside 1 to 100"),
         (("--prompts", "own"), "there is no set 'own'"),

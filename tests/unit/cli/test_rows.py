@@ -100,6 +100,13 @@ def test_settings_that_are_none_are_told_with_their_line(tmp_path: Path, cell: s
     assert "write guidance=4.5;temperature=0.8" in problem
 
 
+def test_a_setting_that_is_no_number_is_named(tmp_path: Path) -> None:
+    (problem,) = problems(tmp_path, "p.csv", "prompt,settings\na person waves,guidance=4;top_k=high\n")
+    assert problem == "line 2: settings: top_k: 'high' is not a number; write guidance=4.5;temperature=0.8"
+    (problem,) = problems(tmp_path, "p.jsonl", '{"prompt": "a person waves", "settings": "guidance=4"}\n')
+    assert problem == 'line 1: settings: is not an object: write {"guidance": 4.5}'
+
+
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
     path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
     assert [item.prompt for item in items_of(path)] == ["a person waves", "a person bows"]
