@@ -329,7 +329,7 @@ def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
     if first.startswith("{"):
         return "jsonl", read
     names = next(csv.reader([first], delimiter=delimiter_of(first, COLUMNS)), list[str]())
-    return ("csv" if TEXTS.intersection(name.strip() for name in names) else "txt"), read
+    return ("csv" if TEXTS.intersection(name.strip().lower() for name in names) else "txt"), read
 
 
 def _jsonl(lines: Lines) -> Rows:

@@ -14,6 +14,7 @@ from marey.client import manifest
 from marey.client.csv_cells import TAG_SEPARATOR, restore, split_tags
 from marey.core.characters import find_forbidden
 from marey.core.errors import InvalidInput
+from marey.core.suggestions import did_you_mean, nearest
 from marey.items.item import Unreadable
 from marey.items.settings import read_settings
 
@@ -95,14 +96,15 @@ def csv_rows(lines: Lines, columns: Sequence[str], extra: ExtraColumns = "refuse
 
 
 def delimiter_of(header: str, columns: Sequence[str]) -> str:
-    """Return the delimiter that gives most of the known columns in the header line; by default the comma."""
+    """Return the delimiter that gives most of the known columns, in any case, in the header line; by default the
+    comma."""
 
     def known(delimiter: str) -> int:
         try:
             names = next(csv.reader([header], delimiter=delimiter), list[str]())
         except csv.Error:
             return 0
-        return sum(name.strip(BLANK) in columns for name in names)
+        return sum(name.strip(BLANK).lower() in columns for name in names)
 
     return max(DELIMITERS, key=known)
 
@@ -135,11 +137,13 @@ def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) 
         if is_tag and (not name or "=" in name):
             problems.append(Unreadable(f"{name!r} cannot be the key of a tag: give the column a name without ="))
         elif extra == "refuse" and name not in columns and not (ours and manifest.is_column(name)):
-            problems.append(Unreadable(f"{name!r} is not a known column; {known}"))
+            problems.append(Unreadable(f"{name!r} is not a known column{did_you_mean(name, columns)}; {known}"))
         elif earlier == 1 and (is_tag or name in columns):
             problems.append(Unreadable("appears twice", name))
     if not TEXTS.intersection(names) & {"prompt", *columns}:
-        problems.append(Unreadable(f"is not among the columns of the first line; {known}", "prompt"))
+        near = nearest("prompt", names)
+        meant = "" if near is None or extra == "refuse" else f" (is {near!r} meant?)"
+        problems.append(Unreadable(f"is not among the columns of the first line{meant}; {known}", "prompt"))
     if ours and "seconds" in names:
         return Header(found, restore, split_tags), problems
     return Header(found), problems

@@ -27,6 +27,7 @@ from marey.core.errors import (
     Unauthenticated,
     Unreachable,
 )
+from marey.core.suggestions import did_you_mean
 from marey.items.problems import InvalidItems
 from marey.tenants import QuotaHeadroom
 
@@ -233,8 +234,10 @@ def unknown_field(body_model: Any, path: Sequence[object]) -> str:
         path: of the field in the body; those beside a nested one are not listed.
     """
     is_model = isinstance(body_model, type) and issubclass(body_model, BaseModel)
-    known = ", ".join(body_model.model_fields) if is_model and len(path) == 1 else ""
-    return "is not a known field" + (f"; known: {known}" if known else "")
+    known = tuple(body_model.model_fields) if is_model and len(path) == 1 else ()
+    return f"is not a known field{did_you_mean(str(path[-1]), known)}" + (
+        f"; known: {', '.join(known)}" if known else ""
+    )
 
 
 def _field_problem(error: Mapping[str, Any], body_model: Any) -> FieldProblem:

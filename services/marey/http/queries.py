@@ -9,6 +9,7 @@ from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from marey.core.errors import InvalidInput
+from marey.core.suggestions import did_you_mean
 
 LONGEST_NAME = 60
 
@@ -34,7 +35,8 @@ def check_query(asked: HTTPConnection) -> None:
     known = sorted({each.alias for each in params if getattr(each.field_info, "in_", None) == ParamTypes.query})
     for name in asked.query_params:
         if name not in known:
-            message = f"unknown parameter {name[:LONGEST_NAME]!r}; known: {', '.join(known) or 'none'}"
+            unknown = f"unknown parameter {name[:LONGEST_NAME]!r}{did_you_mean(name, known)}"
+            message = f"{unknown}; known: {', '.join(known) or 'none'}"
             raise InvalidInput(message, where=name[:LONGEST_NAME] or "query")
 
 

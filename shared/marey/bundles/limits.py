@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
+from marey.core.suggestions import did_you_mean
 from marey.items.constraint_frames import for_clip, frames_to_last, last_frame
 from marey.items.constraints import ROOT_PATH
 from marey.items.item import Item, Rows
@@ -177,8 +178,9 @@ def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, flo
     own = {name: value for name, value in values.items() if name not in platform}
     for name in own:
         if name not in known:
-            names = ", ".join([*known, *PLATFORM_SETTINGS])
-            raise InvalidInput(f"unknown setting {name!r} of {bundle.manifest.name}; known: {names}")
+            names = [*known, *PLATFORM_SETTINGS]
+            message = f"unknown setting {name!r} of {bundle.manifest.name}{did_you_mean(name, names)}"
+            raise InvalidInput(f"{message}; known: {', '.join(names)}")
     return {**{name: known[name].check(value) for name, value in own.items()}, **_platform_settings(bundle, platform)}
 
 

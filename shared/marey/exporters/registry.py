@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from marey.core.errors import InvalidInput, PluginError
+from marey.core.suggestions import did_you_mean
 from marey.exporters.exporter import Exporter
 from marey.motion.export_options import ExportOptions
 from marey.registry import PlugIns
@@ -87,7 +88,7 @@ def check_known(formats: Iterable[str], *, hint: str = "") -> None:
     for name in formats:
         if name not in known:
             raise InvalidInput(
-                f"{name[:40]!r} is not a known motion format",
+                f"{name[:40]!r} is not a known motion format{did_you_mean(name, known)}",
                 where="formats",
                 hint=" ".join(filter(None, (f"Known: {', '.join(known)}.", hint))),
                 argument="formats",

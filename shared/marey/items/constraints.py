@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
 from marey.core.documents import json_problem
 from marey.core.errors import InvalidInput
+from marey.core.suggestions import did_you_mean
 from marey.items.constraint_values import (
     MAX_POINTS,
     check_same_length,
@@ -75,9 +76,7 @@ def read_pose(value: object, where: str) -> Constraint:
     given = read_object(value, where)
     for name in given:
         if name not in POSE_FIELDS:
-            raise InvalidInput(
-                f"unknown field of a pose; known: {', '.join(POSE_FIELDS)}", where=f"{where}.{ascii(name)[1:-1][:40]}"
-            )
+            raise _unknown("a pose", name, POSE_FIELDS, where)
     pose = _pose_keyframe({**{name: each for name, each in given.items() if each is not None}, "frame": 0}, where)
     del pose["frame"]
     return pose
@@ -107,6 +106,11 @@ def named_motions(constraints: Sequence[Mapping[str, Any]]) -> Iterator[tuple[st
             yield f"constraints.{number}.motion", each["motion"]
 
 
+def _unknown(what: str, name: object, known: Iterable[str], where: str) -> InvalidInput:
+    message = f"unknown field of {what}{did_you_mean(str(name), known)}; known: {', '.join(known)}"
+    return InvalidInput(message, where=f"{where}.{ascii(name)[1:-1][:40]}")
+
+
 def _constraint(value: object, where: str) -> Constraint:
     given = read_object(value, where)
     kind = given.get("type")
@@ -117,9 +121,7 @@ def _constraint(value: object, where: str) -> Constraint:
     allowed, read = _READERS[kind]
     for name in given:
         if name != "type" and name not in allowed:
-            raise InvalidInput(
-                f"unknown field of {kind!r}; known: {', '.join(allowed)}", where=f"{where}.{ascii(name)[1:-1][:40]}"
-            )
+            raise _unknown(repr(kind), name, allowed, where)
     return {"type": kind, **read({name: each for name, each in given.items() if each is not None}, where)}
 
 

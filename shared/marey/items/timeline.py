@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, cast
 
 from marey.core.errors import InvalidInput
+from marey.core.suggestions import did_you_mean
 from marey.items.prompts import check_prompt
 
 MIN_ROW_SECONDS = 1.0
@@ -155,7 +156,8 @@ def _rows_of_list(values: Sequence[object]) -> _Numbered:
         row = cast("Mapping[object, object]", value)
         unknown = [str(name)[:40] for name in row if name not in _FIELDS]
         if unknown:
-            raise InvalidInput(f"row {number}: {unknown[0]!r} is not a known field; known: {', '.join(_FIELDS)}")
+            meant = did_you_mean(unknown[0], _FIELDS)
+            raise InvalidInput(f"row {number}: {unknown[0]!r} is not a known field{meant}; known: {', '.join(_FIELDS)}")
         start, end = (_time(number, name, row.get(name)) for name in ("start", "end"))
         prompt = row.get("prompt")
         if not isinstance(prompt, str):

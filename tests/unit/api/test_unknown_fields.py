@@ -13,7 +13,7 @@ from marey.api.schedules.schemas import ScheduleFields, SchedulePatch
 from marey.http import problems
 from marey.items.problems import InvalidItems
 
-PATCH_FIELDS = "is not a known field; known: priority, comment, fail_early"
+PATCH_FIELDS = "is not a known field (did you mean 'priority'?); known: priority, comment, fail_early"
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_of_a_body_that_the_route_parses_itself() -> None:
     with pytest.raises(InvalidItems) as caught:
         job_fields({"priorty": 3}, NewJobBody)
     assert [(each.field, each.message) for each in caught.value.problems] == [
-        ("priorty", f"is not a known field; known: {', '.join(NewJobBody.model_fields)}")
+        ("priorty", f"is not a known field (did you mean 'priority'?); known: {', '.join(NewJobBody.model_fields)}")
     ]
     assert "items" in NewJobBody.model_fields
     with pytest.raises(InvalidItems, match="paused, request"):

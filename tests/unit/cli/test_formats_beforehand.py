@@ -50,9 +50,9 @@ KNOWN = "bvh, fbx, gif, glb, mp4, npz, smplx, usd, vrma, webp"
     ],
 )
 def test_a_format_that_is_not_known(marey: Command, tmp_path: Path, command: tuple[str, ...], hint: str) -> None:
-    ran = marey(*command, tmp_path / "out", "--format", "npz", "--format", "bwh")
+    ran = marey(*command, tmp_path / "out", "--format", "npz", "--format", "BHV")
     assert (ran.code, ran.out) == (2, "")
-    assert f"--format: 'bwh' is not a known motion format\n  {hint}" in ran.err
+    assert f"--format: 'BHV' is not a known motion format (did you mean 'bvh'?)\n  {hint}" in ran.err
     assert not (tmp_path / "out").exists()
 
 

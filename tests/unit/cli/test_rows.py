@@ -107,6 +107,21 @@ def test_a_setting_that_is_no_number_is_named(tmp_path: Path) -> None:
     assert problem == 'line 1: settings: is not an object: write {"guidance": 4.5}'
 
 
+def test_a_field_that_is_nearly_known_is_told_with_the_known_one(tmp_path: Path) -> None:
+    found = problems(tmp_path, "p.jsonl", '{"Prompt": "a person waves", "secnds": 3}\n')
+    assert [problem.partition(";")[0] for problem in found] == [
+        "line 1: Prompt: is not a known field (did you mean 'prompt'?)",
+        "line 1: secnds: is not a known field (did you mean 'seconds'?)",
+        "line 1: prompt: is missing: say what the person does",
+    ]
+    row = '{"start": 0, "end": 3, "promt": "walk"}'
+    (problem,) = problems(tmp_path, "p.jsonl", f'{{"timeline": [{row}]}}\n')
+    assert "row 1: 'promt' is not a known field (did you mean 'prompt'?)" in problem
+    constraint = '{"type": "root_path", "frame": [0]}'
+    (problem,) = problems(tmp_path, "p.jsonl", f'{{"prompt": "walk", "constraints": [{constraint}]}}\n')
+    assert "frame: unknown field of 'root_path' (did you mean 'frames'?)" in problem
+
+
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
     path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
     assert [item.prompt for item in items_of(path)] == ["a person waves", "a person bows"]
@@ -144,7 +159,7 @@ def test_broken_json_is_told_with_its_line_and_the_rest_is_still_read(tmp_path: 
         tmp_path, "p.jsonl", '{"prompt": "a person waves"}\n{"prompt": \n[1]\n{"prompt": "bows", "speed": 2}\n'
     )
     assert [line.split(":")[0] for line in found] == ["line 2", "line 3", "line 4"]
-    assert "speed: is not a known field; known: prompt," in found[2]
+    assert "speed: is not a known field (did you mean 'seed'?); known: prompt," in found[2]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import io
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +54,6 @@ def test_a_single_column_is_split_by_commas_whatever_its_rows_hold(table: Path) 
 
 
 def test_stdin_tells_a_table_by_any_delimiter(monkeypatch: pytest.MonkeyPatch) -> None:
-    import io
-    import sys
-
     class Stdin:
         buffer = io.BytesIO(b"seed;prompt\n3;a person walks\n")
 
@@ -71,6 +70,29 @@ def test_extra_columns_are_refused_become_tags_or_are_ignored(table: Path) -> No
     assert [item.tags for item in items(table, "ignore")] == [("day",), ()]
     with pytest.raises(InvalidItems, match="extra_columns tag or ignore"):
         items(table)
+
+
+@pytest.mark.parametrize("header", ["Prompt,secnds", "Prompt;secnds", " PROMPT ;secnds"])
+def test_a_column_that_is_nearly_known_is_told_with_the_known_one(table: Path, header: str) -> None:
+    table.write_text(f"{header}\na person walks{header[-7]}3\n")
+    prompt = header[:-7].strip()
+    known = f"known columns are {', '.join(COLUMNS)}"
+    assert read_lines(table) == [
+        f"line 1: {prompt!r} is not a known column (did you mean 'prompt'?); {known}",
+        f"line 1: 'secnds' is not a known column (did you mean 'seconds'?); {known}",
+        f"line 1: prompt: is not among the columns of the first line; {known}",
+    ]
+    (problem,) = read_lines(table, "ignore")
+    assert problem == f"line 1: prompt: is not among the columns of the first line (is {prompt!r} meant?); {known}"
+
+
+def test_a_table_on_stdin_is_one_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stdin:
+        buffer = io.BytesIO(b"Prompt,seconds\na person walks,3\n")
+
+    monkeypatch.setattr(sys, "stdin", Stdin)
+    with pytest.raises(InvalidItems, match="'Prompt' is not a known column"):
+        list(right_items(read_file("-")))
 
 
 def test_tags_of_extra_columns_keep_the_limits_of_tags(table: Path) -> None:

@@ -11,7 +11,6 @@ needs no code for it. What fields mean is read from the comments in its source.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 import tomllib
@@ -23,6 +22,7 @@ from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin,
 from marey.core.configs import Between, ModelConfig
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile, InvalidInput, MareyError
+from marey.core.suggestions import nearest
 
 C = TypeVar("C", bound=ModelConfig)
 MAX_BYTES = 2**20
@@ -150,8 +150,8 @@ def _tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
 
 
 def _near(name: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(name, known, 1)
-    return f"Did you mean {near[0]}?" if near else f"Known: {', '.join(known)}."
+    near = nearest(name, known)
+    return f"Did you mean {near}?" if near else f"Known: {', '.join(known)}."
 
 
 def _place(file: str, path: str) -> str:
