@@ -12,7 +12,7 @@ from marey.client.resources import Resource, identifier
 from marey.client.types.rigs import Rig, RigDetail
 from marey.core.documents import read_bytes, read_json
 from marey.core.errors import InvalidInput, MareyError
-from marey.motion.export_options import RIG_NAME
+from marey.motion.export_options import RIG_NAME, RIG_NAME_WORDS
 
 MAX_BYTES = 64 * 2**20
 """Of the file of a rig."""
@@ -35,18 +35,22 @@ class Rigs(Resource):
 
         Args:
             path: glb, gltf, vrm, fbx, bvh or JSON.
-            name: letters, digits, `_` and `-`; None = that of the file.
+            name: letters from A to Z, digits, `_` and `-`; None = that of the file.
             rig_map: joints of parts of the body that are not found, or a JSON file of them; None as a joint = no such
                 part.
 
         Raises:
+            InvalidInput: the name has other characters.
             InvalidFile, TooLarge: the file is broken, has no skeleton, or is over the limit of the server.
             Conflict: there are as many rigs as the server allows.
             QuotaUsedUp: the tenant's quota of bytes is exhausted.
         """
         path = Path(path)
-        if name is None and not re.fullmatch(RIG_NAME, path.stem):
-            hint = "Give the rig another one by name: letters, digits, `_` and `-`."
+        if not re.fullmatch(RIG_NAME, path.stem if name is None else name):
+            hint = f"Allowed are {RIG_NAME_WORDS}."
+            if name is not None:
+                raise InvalidInput(f"{name[:80]!r} cannot name a rig", where="name", hint=hint, argument="name")
+            hint = f"Give the rig another one by name. {hint}"
             raise InvalidInput("a rig cannot have the name of this file", where=str(path), hint=hint, argument="name")
         data = read_bytes(path, limit=MAX_BYTES, hint="Export the skeleton without the scene.")
         asked = {"name": path.stem if name is None else name, "format": path.suffix.removeprefix(".").lower()}

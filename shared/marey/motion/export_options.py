@@ -21,6 +21,7 @@ OWN_BODIES = (STANDARD, *REFERENCE_RIGS)
 """Names that `body` may give without a file."""
 RIG_NAME = r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}"
 """Pattern of the names of rigs on a server: without a dot, so that none looks like a file."""
+RIG_NAME_WORDS = "letters from A to Z, digits, _ and -, at most 63, of which the first is a letter or digit"
 
 
 @dataclass(frozen=True, kw_only=True)

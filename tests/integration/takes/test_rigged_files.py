@@ -199,6 +199,9 @@ def test_the_client_and_the_command_line(api: LiveApi, marey: Command, motion: s
     assert "version 2" in marey("rigs", "add", hero, "--name", "lead", "--map", rig_map).ok().err
     assert "lead" in marey("rigs", "list").ok().out
     marey("rigs", "add", odd).refused(2, "--name")
+    marey("rigs", "add", hero, "--name", "héro").refused(
+        2, "--name: 'héro' cannot name a rig\n  Allowed are letters from A to Z, digits, _ and -, at most 63"
+    )
     marey("rigs", "add", odd, "--name", "odd").refused(2, f"{odd}: is not a glb file")
     rig_map.write_text('{"left_hand": "nobody"}')
     marey("rigs", "add", hero, "--map", rig_map).refused(2, f"{rig_map}: left_hand")
