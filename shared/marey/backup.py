@@ -13,6 +13,7 @@ from sqlalchemy import exc
 from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Conflict, InvalidFile, InvalidInput
+from marey.core.validation import worded
 from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among
 from marey.items.constraints import named_motions, read_constraints
@@ -26,7 +27,7 @@ from marey.vocabulary.scope import ScopePolicy, Verdict
 
 CHUNK = 1000  # rows per statement
 Row = TypeVar("Row")
-Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Sha256 = Annotated[str, Field(pattern=worded(r"^[0-9a-f]{64}$", "64 digits of hexadecimal numbers"))]
 
 
 class _Record(BaseModel):

@@ -15,6 +15,8 @@ from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_g
 from tests.support.live_api import running_api, settings_of
 
 JSON = {"Content-Type": "application/json"}
+NOBODY = "00000000-0000-0000-0000-000000000000"
+AN_ID = "an id such as 01234567-89ab-cdef-0123-456789abcdef"
 PROMPTS = [{"prompt": "walk"}, {"prompt": "run"}]
 BROKEN = {
     "no JSON": b'{"prompt": ',
@@ -62,6 +64,58 @@ def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> Non
     assert refusal(http.post("/v1/jobs", content=b"\n \n", headers={"Content-Type": "application/x-ndjson"})) == (
         422, "body",
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "sent", "field", "message"),
+    [
+        ("POST", "/v1/motions/review", {"motions": [], "verdict": "kept"}, "motions", "is empty"),
+        ("POST", "/v1/motions/review", {"motions": ["walk"], "verdict": None}, "motions.0", f"'walk' is not {AN_ID}"),
+        (
+            *("POST", "/v1/motions/review", {"motions": [NOBODY], "verdict": "Kept"}, "verdict"),
+            "'Kept' is not known (did you mean 'kept'?); known: kept, rejected",
+        ),
+        (
+            *("POST", "/v1/motions/reroll", {"motions": [NOBODY] * 1001}, "motions"),
+            "has 1,001 elements: at most 1,000 are allowed",
+        ),
+        ("POST", f"/v1/motions/{NOBODY}/edits", {"ops": []}, "ops", "is empty"),
+        ("POST", f"/v1/motions/{NOBODY}/edits", {"ops": ["loop"]}, "ops.0", "'loop' is not an object"),
+        (
+            *("POST", f"/v1/motions/{NOBODY}/edits", {"ops": [{"op": "loop"}], "model": "../x"}, "model"),
+            "'../x' cannot be used: allowed are names of models and bundles: `marey models list` shows them",
+        ),
+        ("POST", "/v1/jobs", {"priority": 1001}, "priority", "1001 is above 1,000, the most that is allowed"),
+        ("POST", "/v1/jobs", {"priority": "high"}, "priority", "'high' is not a whole number"),
+        ("POST", "/v1/jobs", {"scope": "never"}, "scope", "'never' is not known; known: warn, refuse, ignore"),
+        ("POST", "/v1/jobs", {"name": "x" * 201}, "name", "has 201 characters: at most 200 are allowed"),
+        ("PATCH", f"/v1/jobs/{NOBODY}", {"fail_early": -1}, "fail_early", "-1 is below 0, the least that is allowed"),
+        ("POST", "/v1/evaluations", {"repeats": [1]}, "repeats", "is a list, not a whole number"),
+        (
+            *("PATCH", f"/v1/schedules/{NOBODY}", {"request": {"bundle": GENERATOR, "split": "test", "sed": 3}}, "sed"),
+            "is not a known field (did you mean 'seed'?); known: bundle, evaluator, split, source, settings, repeats,",
+        ),
+        ("POST", "/v1/webhooks", {}, "url", "is missing"),
+        ("POST", "/v1/texts/parse", {"prompts": []}, "prompts", "is empty"),
+        ("GET", "/v1/jobs?limit=0", None, "limit", "0 is below 1, the least that is allowed"),
+        ("GET", "/v1/motions?tag=", None, "tag.0", "is empty"),
+        (
+            *("POST", "/v1/rigs?name=h%C3%A9ro&format=bvh", None, "name"),
+            "'héro' cannot be used: allowed are letters from A to Z, digits, _ and -, at most 63, of which the first",
+        ),
+    ],
+)
+def test_a_wrong_value_is_told_in_our_words(
+    http: httpx2.Client, method: str, path: str, sent: dict[str, object] | None, field: str, message: str
+) -> None:
+    if path == "/v1/jobs" and sent is not None:
+        sent = {"items": PROMPTS, **sent}
+    elif path == "/v1/evaluations" and sent is not None:
+        sent = {"bundle": GENERATOR, "prompts": PROMPTS, **sent}
+    answer = http.request(method, path, json=sent)
+    told = {each["field"]: each["message"] for each in answer.json()["problems"]}
+    assert answer.status_code == 422
+    assert told[field].startswith(message)
 
 
 def test_of_too_many_items_the_first_that_is_one_too_many_is_named(http: httpx2.Client) -> None:

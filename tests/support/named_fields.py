@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,16 +15,21 @@ from marey.http.queries import LONGEST_NAME
 
 REFUSALS = (400, 409, 413, 415, 422)
 OF_ANY = {"body", "query", "content-type", "content-encoding", "content-length"}
+OF_PYDANTIC = re.compile(
+    r"\b(Input|String|Value|List|Dictionary|Tuple) should\b|Value error|Extra inputs|should match pattern"
+)
 
 
 def names_the_field(_context: CheckContext, response: Response, case: Case) -> None:
-    """Fail unless each problem names a parameter, a header, or a field of the body as sent or as documented."""
+    """Fail unless each problem names a parameter, a header, or a field of the body as sent or as documented, in words
+    that are not those of pydantic."""
     if response.status_code not in REFUSALS:
         return
     problem = json.loads(response.content)
     known = {name.lower() for name in (*OF_ANY, *_parameters(case), *_documented(case), *_sent(response.request))}
     told = problem.get("problems") or [{"field": name} for name in (problem.get("where") or "").split(", ")]
     assert problem["detail"], problem
+    assert not OF_PYDANTIC.search(response.text), problem
     for each in told:
         field, line = each.get("field"), each.get("line")
         named = line is not None if field is None else _leads(field.lower(), known)

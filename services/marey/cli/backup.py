@@ -22,6 +22,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 from marey.backup import JobBackup, announce, back_up, ended_jobs, restore
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
+from marey.core.validation import first_problem
 from marey.db import BACKUP, transaction
 from marey.jobs import asset_key
 from marey.motion.files import write_atomically
@@ -306,6 +307,4 @@ def _plain(path: Path) -> Path:
 
 
 def _invalid(path: Path, error: ValidationError) -> InvalidFile:
-    first = error.errors(include_url=False, include_input=False)[0]
-    field = ".".join(str(part) for part in first["loc"])
-    return InvalidFile(f"{field + ': ' if field else ''}{first['msg']}", where=str(path))
+    return InvalidFile(first_problem(error, quoted=False), where=str(path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import typer
@@ -32,18 +33,23 @@ from marey.cli.commands import (
 from marey.cli.operations import OperationsCommand
 from marey.core import tracing
 from marey.core.errors import MareyError
+from marey.core.validation import problem_of
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
-VALUE_ERROR = "Value error, "
-"""How pydantic, which reads the options, begins a message that it did not write."""
 
 HELP = """Text in, 3D human motion out.
 
 Exit codes: 0 all succeeded; 1 internal error; 2 usage or invalid input; 3 not found; 4 unreachable; 5 refused;
 6 ended with failed, dead or cancelled items; 7 --timeout passed; 8 evaluation regressed; 130 interrupted, or
 answered with no."""
+
+
+def _said(error: ValueError) -> str:
+    """Return what is wrong with the value of an option, which pydantic reads."""
+    errors: Callable[[], Sequence[Mapping[str, Any]]] | None = getattr(error, "errors", None)
+    return str(error) if errors is None else problem_of(errors()[0])
 
 
 class Commands(TyperGroup):
@@ -59,7 +65,8 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            error.message = error.message.removeprefix(VALUE_ERROR)
+            if isinstance(error.__cause__, ValueError):
+                error.message = _said(error.__cause__)
             raise
         except MareyError as error:
             if isinstance(ctx.obj, tracing.Span):

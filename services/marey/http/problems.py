@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
+import types
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
-from typing import Any
+from typing import Any, Union, get_args, get_origin
 
 import structlog
 from fastapi import FastAPI, Request
@@ -27,7 +27,7 @@ from marey.core.errors import (
     Unauthenticated,
     Unreachable,
 )
-from marey.core.suggestions import did_you_mean
+from marey.core.validation import problem_of
 from marey.items.problems import InvalidItems
 from marey.tenants import QuotaHeadroom
 
@@ -36,13 +36,10 @@ MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER = "2"
 """Seconds: typical restart of a database or store."""
 
-LONGEST_VALUE = 80
 OF_THE_REQUEST = ("body", "prompts")
 """Prefixes of locations that a caller knows: they are part of the request."""
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
-UNKNOWN_FIELD = "extra_forbidden"
-"""Type of pydantic's error for a field that a model does not have."""
-SUBJECT = re.compile(r"^\w+ should")
+UNIONS = (Union, types.UnionType)
 
 log = structlog.get_logger(__name__)
 
@@ -51,7 +48,9 @@ class FieldProblem(BaseModel):
     """One problem of a request."""
 
     line: int | None = Field(default=None, description="Line of the body, from 1; for `items`, the element's number.")
-    field: str | None = Field(default=None, description="Name of the field.")
+    field: str | None = Field(
+        default=None, description="Path of the field, as `motions.0`: elements of lists are counted from 0."
+    )
     message: str
 
 
@@ -226,18 +225,32 @@ def _body_model(request: Request) -> Any:
     return None if body is None else body.field_info.annotation
 
 
-def unknown_field(body_model: Any, path: Sequence[object]) -> str:
-    """Return the message for a field that a body may not have, with those that it may have.
+def known_fields(body_model: Any, path: Sequence[object]) -> tuple[str, ...]:
+    """Return the names of the fields beside one of a body; none where it is not in a model.
 
     Args:
-        body_model: type of the body; fields of other types than models are not listed.
-        path: of the field in the body; those beside a nested one are not listed.
+        body_model: type of the body.
+        path: of the field in the body.
     """
-    is_model = isinstance(body_model, type) and issubclass(body_model, BaseModel)
-    known = tuple(body_model.model_fields) if is_model and len(path) == 1 else ()
-    return f"is not a known field{did_you_mean(str(path[-1]), known)}" + (
-        f"; known: {', '.join(known)}" if known else ""
-    )
+    kind = body_model
+    for part in path[:-1]:
+        kind = _inner(kind, part)
+    return tuple(kind.model_fields) if _is_model(kind) else ()
+
+
+def _inner(kind: Any, part: object) -> Any:
+    """Return the type of a field of a model, or of the elements of a list or object; None of others."""
+    if _is_model(kind):
+        field = kind.model_fields.get(part)
+        found = None if field is None else field.annotation
+    else:
+        found = get_args(kind)[-1] if get_origin(kind) in (list, dict) else None
+    options = [each for each in get_args(found) if each is not type(None)] if get_origin(found) in UNIONS else [found]
+    return options[0] if len(options) == 1 else None
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
 def _field_problem(error: Mapping[str, Any], body_model: Any) -> FieldProblem:
@@ -246,21 +259,8 @@ def _field_problem(error: Mapping[str, Any], body_model: Any) -> FieldProblem:
     if error["type"] == "json_invalid":  # its path is a position
         return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
     field = ".".join(str(part) for part in path) or str(place)
-    unknown = error["type"] == UNKNOWN_FIELD
-    message = unknown_field(body_model, path) if unknown else _sentence(error)
+    message = problem_of(error, known_fields(body_model, path))
     return FieldProblem(field=_clean(field), message=_clean(message) or "")
-
-
-def _sentence(error: Mapping[str, Any]) -> str:
-    """Return pydantic's message, with the value it concerns, if that is short."""
-    kind, message, value = str(error["type"]), str(error["msg"]), error.get("input")
-    if kind == "missing":
-        return "is missing"
-    if not isinstance(value, str | int | float) or len(shown := repr(value)) > LONGEST_VALUE:
-        return message
-    if kind.startswith("uuid"):
-        return f"{shown} is not an id: use a UUID, such as 01234567-89ab-cdef-0123-456789abcdef"
-    return f"{shown} cannot be used: {SUBJECT.sub('it should', message)}"
 
 
 def _clean(text: str | None) -> str | None:

@@ -11,6 +11,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from marey.core.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text, normalize_newlines
 from marey.core.errors import InvalidInput
+from marey.core.validation import worded
 
 Row = TypeVar("Row")
 
@@ -54,7 +55,7 @@ IdempotencyKey = Annotated[
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
-        pattern=r"^[\x21-\x7e]+$",
+        pattern=worded(r"^[\x21-\x7e]+$", "letters, digits and signs of ASCII, no spaces"),
         description="The same key and body within 24 hours return the first result; another body is refused.",
     ),
 ]

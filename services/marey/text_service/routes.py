@@ -20,7 +20,7 @@ from marey.core.settings import Settings
 from marey.http.fields import PROMPT
 from marey.http.problems import RESPONSES
 from marey.items.prompts import check_prompt
-from marey.items.values import MODEL
+from marey.items.values import MODEL_PATTERN
 from marey.text.keys import as_served
 from marey.text_service.limits import Ticket, WordLimit
 from marey.vocabulary.scope import match_scope
@@ -48,9 +48,7 @@ class ParseBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     prompts: list[Annotated[str, Field(json_schema_extra=PROMPT)]] = Field(min_length=1, max_length=MAX_PROMPTS)
-    model: str = Field(
-        defaults.MODEL, pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use."
-    )
+    model: str = Field(defaults.MODEL, pattern=MODEL_PATTERN, description="Model or bundle whose labeller to use.")
 
 
 class ScopesView(BaseModel):

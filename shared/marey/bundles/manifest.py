@@ -18,6 +18,7 @@ from pydantic import (
 
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidBundle
+from marey.core.validation import place_of, problem_of, worded
 from marey.vocabulary.scope import ActionLists
 
 FORMAT = 2
@@ -33,8 +34,16 @@ NON_COMMERCIAL = re.compile(r"(^|[-_ ])NC($|[-_ ])", re.IGNORECASE)
 
 MAX_PROBLEMS = 1000  # characters
 
-Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-PlainName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")]
+Sha256 = Annotated[str, Field(pattern=worded(r"^[0-9a-f]{64}$", "64 digits of hexadecimal numbers"))]
+PlainName = Annotated[
+    str,
+    Field(
+        pattern=worded(
+            r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
+            "letters from A to Z, digits, `.`, `_` and `-`, at most 100, of which the first is a letter or digit",
+        )
+    ),
+]
 """A file or bundle name that cannot leave its folder."""
 
 
@@ -180,7 +189,7 @@ def parse_manifest(data: bytes, where: str, *, hint: str | None = None) -> Bundl
         return BundleManifest.model_validate(document)
     except ValidationError as error:
         found = error.errors(include_input=False, include_url=False)
-        problems = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in found[:5])
+        problems = "; ".join(f"{place_of(each) or 'file'}: {problem_of(each)}" for each in found[:5])
         raise InvalidBundle(
             f"is not a manifest this version reads: {problems[:MAX_PROBLEMS]}", where=where, hint=hint
         ) from None

@@ -14,6 +14,7 @@ from typing import cast
 
 from marey.core.characters import check_text, is_printable
 from marey.core.errors import InvalidInput
+from marey.core.validation import kind_of, worded
 
 MAX_SEED = 2**31 - 1
 MAX_VARIANTS = 100
@@ -28,6 +29,7 @@ derives the file name from it (`marey.client.names`)."""
 RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
 """Reserved device names of Windows."""
 MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
+MODEL_PATTERN = worded(f"^{MODEL.pattern}$", "names of models and bundles: `marey models list` shows them")
 
 
 def check_name(value: object) -> str:
@@ -100,14 +102,14 @@ def _tag(value: object) -> str:
 def check_string(value: object) -> str:
     """Return a text."""
     if not isinstance(value, str):
-        raise InvalidInput(f"is {_kind(value)}, not a text")
+        raise InvalidInput(f"is {kind_of(value)}, not a text")
     return value
 
 
 def check_number(value: object) -> float:
     """Return a finite number as float."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidInput(f"is {_kind(value)}, not a number")
+        raise InvalidInput(f"is {kind_of(value)}, not a number")
     try:
         number = float(value)
     except OverflowError:
@@ -122,17 +124,7 @@ def check_whole(value: object, low: int, high: int) -> int:
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise InvalidInput(f"is {_kind(value)}, not a whole number")
+        raise InvalidInput(f"is {kind_of(value)}, not a whole number")
     if not low <= value <= high:
         raise InvalidInput(f"{value if abs(value) < 10**20 else 'it'} is outside {low} to {high}")
     return value
-
-
-def _kind(value: object) -> str:
-    if isinstance(value, str):
-        return repr(value[:40])
-    if isinstance(value, bool):
-        return "true or false"
-    if isinstance(value, list):
-        return "a list"
-    return "an object" if isinstance(value, dict) else ascii(value)[:40]

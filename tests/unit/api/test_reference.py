@@ -25,8 +25,10 @@ from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
 from marey.api.streams.schemas import EndStreamBody, NewStreamBody
 from marey.api.takes.schemas import NewRerollBody, NewReviewBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
+from marey.core.characters import LINE_PATTERN, TEXT_PATTERN
 from marey.core.settings import Settings
-from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, TAGS
+from marey.core.validation import meaning_of
+from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, NAME_PATTERN, SAMPLING, TAG_PATTERN, TAGS
 from marey.items.expected import read_expected
 from marey.items.item import read_item
 from marey.items.settings import BEST_OF, OUTPUT_FPS, REDRAWS
@@ -77,6 +79,26 @@ def without_bounds(
         yield from without_bounds(schemas, schema["items"], f"{where}[]", seen)
     for name, each in schema.get("properties", {}).items():
         yield from without_bounds(schemas, each, f"{where}.{name}", seen)
+
+
+def patterns(schema: Any) -> Iterator[str]:
+    """Patterns in a part of the document, at any depth."""
+    if isinstance(schema, dict):
+        if isinstance(schema.get("pattern"), str):
+            yield schema["pattern"]
+        for value in schema.values():
+            yield from patterns(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            yield from patterns(value)
+
+
+def test_every_pattern_is_told_in_words_where_a_text_does_not_match(document: dict[str, Any]) -> None:
+    elsewhere = {LINE_PATTERN, TEXT_PATTERN, TAG_PATTERN, NAME_PATTERN, EXPECTED["pattern"], ITEM_MODEL["pattern"]}
+    elsewhere.add(SAMPLING["propertyNames"]["pattern"])  # checks of our own refuse these
+    found = set(patterns(document)) - elsewhere
+    assert len(found) >= 5
+    assert [pattern for pattern in found if meaning_of(pattern) is None] == []
 
 
 def test_every_field_and_parameter_of_a_request_has_its_range(document: dict[str, Any]) -> None:

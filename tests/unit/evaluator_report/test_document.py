@@ -133,7 +133,7 @@ def test_equal_reports_give_equal_bytes() -> None:
     [
         ({"schema": "other"}, "not a report of an evaluation"),
         ({"version": 2}, "version 2; this Marey reads version 1"),
-        ({"motions": "many"}, "`motions`: input should be a valid integer"),
+        ({"motions": "many"}, "motions: 'many' is not a whole number"),
         ({"rows": 3}, "`rows`"),
         ({"created": "yesterday"}, "`created`"),
     ],

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile, NotFound
+from marey.core.validation import first_problem
 from marey.data.licences import Terms, Tier
 from marey.data.rigs import CapturedRig
 from marey.motion.units import Unit, Up
@@ -94,9 +95,7 @@ def read_dataset(path: Path) -> Dataset:
     try:
         return Dataset.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"])) or "the table"
-        raise InvalidFile(f"{field}: {first['msg']}", where=where) from None
+        raise InvalidFile(first_problem(error), where=where) from None
 
 
 def known_sets() -> tuple[str, ...]:

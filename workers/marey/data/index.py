@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile
+from marey.core.validation import first_problem
 from marey.data.dataset import Dataset
 from marey.data.licences import Tier
 
@@ -124,8 +125,7 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
         try:
             row = Row.model_validate(made)
         except ValidationError as error:
-            first = error.errors()[0]
-            raise InvalidFile(f"`{'.'.join(map(str, first['loc']))}`: {first['msg']}", where=place) from None
+            raise InvalidFile(first_problem(error), where=place) from None
         row = _named(row, seen)
         if row.start is not None and row.end is not None and row.end <= row.start:
             raise InvalidFile("ends before it starts", where=place)

@@ -18,6 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from marey.core.arrays import check_array, read_npz, text_of
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.core.validation import first_problem
 from marey.data.licences import Terms
 
 MAX_BYTES = 8 * 2**30
@@ -146,7 +147,7 @@ class JointsPack:
                 TypeAdapter(dict[str, str]).validate_python(table.get(name)) for name in ("left_out", "caption_files")
             )
         except ValidationError as error:
-            raise InvalidFile(f"not a joints pack: {error.errors()[0]['msg']}", where=where) from error
+            raise InvalidFile(f"not a joints pack: {first_problem(error)}", where=where) from error
         rows = 0
         for clip in clips:
             if clip.start != rows or clip.frames < 1 or clip.split not in ("", *SPLITS):

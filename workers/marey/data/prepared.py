@@ -17,6 +17,7 @@ from marey.core.arrays import check_array, map_npy, read_npz
 from marey.core.documents import parse_json, read_json
 from marey.core.errors import InvalidFile, NotFound
 from marey.core.hashing import sha256_of
+from marey.core.validation import first_problem
 from marey.data import manifest as names
 from marey.data.manifest import Clip, Manifest
 from marey.data.pack import SPLITS, join
@@ -135,7 +136,7 @@ def read_manifest(path: Path) -> Manifest:
     try:
         manifest = Manifest.model_validate(document)
     except ValidationError as error:
-        raise InvalidFile(f"not a manifest: {error.errors()[0]['msg']}", where=str(file)) from error
+        raise InvalidFile(f"not a manifest: {first_problem(error)}", where=str(file)) from error
     if manifest.format != names.FORMAT:
         raise InvalidFile(f"format {manifest.format!r}", where=str(file), hint=f"This version reads {names.FORMAT}.")
     missing = [name for name in names.FILES if name not in manifest.files]
@@ -186,7 +187,7 @@ def _read_clips(path: Path) -> Iterable[Clip]:
                 try:
                     yield Clip.model_validate(parse_json(line, where))
                 except ValidationError as error:
-                    raise InvalidFile(f"not a clip: {error.errors()[0]['msg']}", where=where) from error
+                    raise InvalidFile(f"not a clip: {first_problem(error)}", where=where) from error
     except OSError as error:
         raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path), hint=HINT) from None
 

@@ -22,6 +22,7 @@ from marey.bundles import Bundle
 from marey.bundles.reference import expected_of
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.core.validation import first_problem
 from marey.data.prepared import PreparedData
 from marey.evaluations import BUNDLE_SOURCES
 from marey.evaluator.heat import heat_of, style_of
@@ -81,7 +82,7 @@ def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | N
     except NotFound:
         return None
     except ValidationError as error:
-        raise InvalidFile(f"is not a reconstruction: {error.errors()[0]['msg']}", where=str(file)) from error
+        raise InvalidFile(f"is not a reconstruction: {first_problem(error)}", where=str(file)) from error
     if (found.generator, found.evaluator) != (generator, evaluator.reference):
         raise InvalidFile(
             f"was measured of {found.generator} by {found.evaluator}, not of {generator} by {evaluator.reference}",

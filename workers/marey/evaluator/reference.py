@@ -14,6 +14,7 @@ from marey.bundles import Bundle, BundleWriter
 from marey.bundles.reference import FILE, PART, expected_of
 from marey.checks.quality import Quality
 from marey.core.errors import InvalidBundle, NotFound
+from marey.core.validation import first_problem
 from marey.data.manifest import Clip
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.measuring import check
@@ -132,7 +133,7 @@ class RealClips:
         try:
             clips = _CLIPS.validate_python(bundle.read_json(FILE))
         except ValidationError as error:
-            message = f"not a reference: {error.errors()[0]['msg']}"
+            message = f"not a reference: {first_problem(error)}"
             raise InvalidBundle(message, where=str(bundle.path / FILE)) from error
         motion = bundle.tensors(PART)
         if {name: len(rows) for name, rows in clips.items()} != {name: len(rows) for name, rows in motion.items()}:

@@ -25,6 +25,7 @@ from marey.core.children import end_with_parent
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
+from marey.core.validation import first_problem
 from marey.data.manifest import CLIPS, TEXTS
 from marey.data.prepared import PreparedData
 from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
@@ -227,7 +228,7 @@ class CaptionTexts:
         try:
             spec = TextSpec.model_validate(parse_json(text_of(arrays["spec"], "spec", where), f"{where}: spec"))
         except ValidationError as error:
-            message = f"not text features: {error.errors()[0]['msg']}"
+            message = f"not text features: {first_problem(error)}"
             raise InvalidFile(message, where=where, hint=hint) from error
         for name, kind in KINDS.items():
             width = {"strings": (spec.width,), "edges": (3,)}.get(name, ())

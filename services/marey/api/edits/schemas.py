@@ -12,7 +12,7 @@ from marey.api.jobs.schemas import SCOPE, CommonJobFields, ScopeReportView
 from marey.http.fields import MAX_MODEL, SAMPLING
 from marey.http.problems import QuotaBody
 from marey.http.schemas import View
-from marey.items.values import MODEL
+from marey.items.values import MODEL_PATTERN
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
 from marey.vocabulary.scope import ScopePolicy
@@ -39,7 +39,7 @@ class NewEditBody(CommonJobFields):
     model: str | None = Field(
         None,
         max_length=MAX_MODEL,
-        pattern=rf"^{MODEL.pattern}$",  # a path would be one of the server's
+        pattern=MODEL_PATTERN,  # a path would be one of the server's
         description="Model, bundle or exact bundle that generates frames, for operations that need one; default: the "
         "server's.",
     )

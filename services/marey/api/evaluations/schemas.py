@@ -15,10 +15,8 @@ from marey.evaluations import EvaluationEvent, EvaluationJob, EvaluationRequest,
 from marey.http.fields import EXPECTED, PROMPT, SAMPLING, TIMELINE
 from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
 from marey.items.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
-from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
+from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL_PATTERN
 from marey.jobs.states import JobState
-
-BUNDLE = rf"^{MODEL.pattern}$"
 
 
 class EvaluationPromptBody(BaseModel):
@@ -48,9 +46,14 @@ class EvaluationFields(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    bundle: str = Field(pattern=BUNDLE, max_length=200, description="Model, bundle or exact bundle that generates.")
+    bundle: str = Field(
+        pattern=MODEL_PATTERN, max_length=200, description="Model, bundle or exact bundle that generates."
+    )
     evaluator: str | None = Field(
-        None, pattern=BUNDLE, max_length=200, description="Bundle that measures; default: the only one on the server."
+        None,
+        pattern=MODEL_PATTERN,
+        max_length=200,
+        description="Bundle that measures; default: the only one on the server.",
     )
     split: Literal["test", "compositional", "test+compositional"] | None = Field(
         None, description="Captions that the evaluator's bundle carries, of a split or of both. Else give `prompts`."

@@ -17,7 +17,8 @@ from marey.api.jobs.schemas import JobFields, NewJobBody
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
-from marey.http.problems import UNKNOWN_FIELD, unknown_field
+from marey.core.validation import place_of, problem_of
+from marey.http.problems import known_fields
 from marey.items.item import Item, read_item, read_items, read_json
 from marey.items.problems import InvalidItems, Problem
 from marey.items.timeline import prompts_with_rows
@@ -287,13 +288,11 @@ def read_fields(model: type[Fields], values: Mapping[str, Any], whole: type[Base
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        problems = [_field_problem(e, whole or model) for e in error.errors()]
+        problems = [
+            Problem(None, place_of(each) or "body", problem_of(each, known_fields(whole or model, each["loc"])))
+            for each in error.errors()
+        ]
         raise InvalidItems(problems) from error
-
-
-def _field_problem(error: Mapping[str, Any], model: type[BaseModel]) -> Problem:
-    message = unknown_field(model, error["loc"]) if error["type"] == UNKNOWN_FIELD else error["msg"]
-    return Problem(None, ".".join(map(str, error["loc"])) or "body", message)
 
 
 def request_sha256(query: str, body: BinaryIO) -> str:

@@ -8,11 +8,12 @@ from typing import Annotated, Any, Self
 from fastapi import Path, Query
 from pydantic import Field
 
+from marey.core.validation import worded
 from marey.http.schemas import FreeText, View
-from marey.motion.export_options import RIG_NAME
+from marey.motion.export_options import RIG_NAME, RIG_NAME_WORDS
 from marey.takes import RigRow
 
-NAME = f"^{RIG_NAME}$"
+NAME = worded(f"^{RIG_NAME}$", RIG_NAME_WORDS)
 MAX_MAP = 8192
 """Characters of a map; all parts of the body with long names of joints take half of it."""
 
@@ -21,7 +22,11 @@ RigName = Annotated[
     str, Query(pattern=NAME, description="Letters, digits, `_` and `-`; not `standard`, nor that of a reference rig.")
 ]
 RigFormat = Annotated[
-    str, Query(pattern=r"^[a-z0-9]{1,8}$", description="Ending of the file's name: `glb`, `fbx`, `bvh`, `vrm`, …")
+    str,
+    Query(
+        pattern=worded(r"^[a-z0-9]{1,8}$", "endings of file names, as glb, fbx, bvh or vrm"),
+        description="Ending of the file's name: `glb`, `fbx`, `bvh`, `vrm`, …",
+    ),
 ]
 RigMap = Annotated[
     Annotated[str, Field(min_length=1, max_length=MAX_MAP), FreeText(lines=True)] | None,

@@ -39,11 +39,13 @@ from marey.api.takes.schemas import (
 )
 from marey.api.takes.service import file_stem, made_again
 from marey.core.disposition import download_name
+from marey.core.validation import worded
 from marey.exporters import extension_of
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
 from marey.items.values import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
+FORMAT = worded(r"^[a-z0-9]{1,16}$", "names of formats, as npz, bvh, glb or mp4")
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 
 
@@ -129,7 +131,7 @@ def get_motion(motion: UUID, conn: Connection, key: Reader) -> MotionDetailView:
 @router.get("/{motion}/files/{format}", response_class=Response, responses={**FILE_RESPONSES, **MAKING_RESPONSES})
 async def get_file(
     motion: UUID,
-    format: Annotated[str, Path(pattern=r"^[a-z0-9]{1,16}$", description="`npz`, `bvh`, `glb`, `mp4`, …")],
+    format: Annotated[str, Path(pattern=FORMAT, description="`npz`, `bvh`, `glb`, `mp4`, …")],
     shared: Shared,
     key: Reader,
     part: FileRequest,

@@ -19,6 +19,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from marey.core.errors import InvalidFile
+from marey.core.validation import first_problem
 from marey.evaluator.report.model import Report
 from marey.evaluator.report.parts import Exhibit
 from marey.measures.scores import SCHEMA, VERSION, check_document
@@ -57,9 +58,7 @@ def from_json(data: bytes, where: str = "report") -> Report:
     try:
         return _reader().validate_json(json.dumps(fields), strict=True)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise InvalidFile(f"`{field}`: {first['msg'].lower()}", where=where) from None
+        raise InvalidFile(first_problem(error), where=where) from None
 
 
 @cache
