@@ -39,6 +39,7 @@ OPTIONS = {
     "variants": "--variants",
 }
 """The option of each argument that an error may name."""
+_OPERATION = re.compile(r"^ops\.([0-9]{1,3})\b")
 
 
 def name_options(error: MareyError) -> MareyError:
@@ -52,6 +53,11 @@ def name_options(error: MareyError) -> MareyError:
     if error.hint is not None:
         error.hint = re.sub(rf"pass {argument}=True|\b{argument}\b", lambda found: _named(found, option), error.hint)
     return error
+
+
+def name_operation(where: str) -> str:
+    """Name an operation of an edit by its number, from 1, in the place of an item's error: `operation 1 (trim)`."""
+    return _OPERATION.sub(lambda found: f"operation {int(found[1]) + 1}", where)
 
 
 @contextmanager

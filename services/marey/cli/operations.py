@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from marey.cli.signatures import replace_parameter
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidInput, MareyError
 from marey.motion.edits.operation import value_of_text
 from marey.motion.edits.table import OPERATIONS
 
@@ -22,6 +24,8 @@ MOST = 2**20
 """Bytes of a file of operations."""
 GIVEN = "marey.operations"
 """Key of the context: the options of operations with their values, in order."""
+_PLACE = re.compile(r"\bops\.(?P<number>[0-9]{1,3})(\.(?P<parameter>\w+))?( \([a-z-]+\))?$")
+"""Place of an operation in an error, counted from 0: `ops.0.factor`, `ops.1 (trim)`."""
 
 
 class OperationsCommand(TyperCommand):
@@ -89,6 +93,40 @@ def given_operations(context: typer.Context, file: Path | None) -> Any:
             "no operation is given", hint=f"Name one, such as --loop; `{context.command_path} --help` lists them."
         )
     return steps
+
+
+@contextmanager
+def naming_operations(context: typer.Context, file: Path | None) -> Generator[None]:
+    """Let the errors of the block name the option of the operation that they concern, or its number in the file."""
+    try:
+        yield
+    except MareyError as error:
+        found = None if error.where is None else _PLACE.search(error.where)
+        if found is not None and error.where is not None:
+            given = _option_of(context, found) if file is None else _place_in(file, found)
+            error.where = error.where[: found.start()] + given
+        raise
+
+
+def _option_of(context: typer.Context, found: re.Match[str]) -> str:
+    """Return the option of an operation with its value, or that of its parameter."""
+    number, shown, own = -1, found.group(), set[str]()
+    for option, value in context.meta[GIVEN]:
+        operation = OPERATIONS.get(option.removeprefix("--"))
+        number += operation is not None
+        if number != int(found["number"]):
+            continue
+        if operation is not None:
+            shown = f"{option} {value}".strip()
+            own = {each.option for each in operation.parameters if each.option and each.name == found["parameter"]}
+        elif option in own:
+            return f"{option} {value}".strip()
+    return shown
+
+
+def _place_in(file: Path, found: re.Match[str]) -> str:
+    parameter = "" if found["parameter"] is None else f", {found['parameter']}"
+    return f"{file}: operation {int(found['number']) + 1}{parameter}"
 
 
 def _add(found: Sequence[dict[str, Any]], option: str, value: str) -> None:

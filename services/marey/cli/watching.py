@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console
-from marey.cli.hints import hint_of_timeout
+from marey.cli.hints import hint_of_timeout, name_operation
 from marey.core.errors import ItemsFailed
 
 if TYPE_CHECKING:
@@ -68,5 +68,5 @@ def _caption(now: Progress) -> str:
 def _show_event(bar: Bar, event: JobEvent) -> None:
     if event.item and event.reason:
         problem: Mapping[str, Any] = event.data.get("problem") or {}
-        place = f"{problem['where']}: " if problem.get("where") else ""
+        place = f"{name_operation(problem['where'])}: " if problem.get("where") else ""
         bar.console.print(f"item {event.item[-8:]}: {place}{event.reason}", markup=False)

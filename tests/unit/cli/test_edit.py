@@ -112,7 +112,33 @@ def test_of_several_motions_the_one_that_cannot_be_edited_is_named(walk: Path):
     short = walk.with_name("short.npz")
     run(walk, "-o", short, "--trim", ":0.3")
     said = run(walk, short, "-o", walk.with_name("cut"), "--trim", "1:", code=2)
-    assert f"{short}: --trim" in said or f"{short}: ops.0" in said
+    assert f"marey: {short}: --trim 1:: 1 s is after the end" in said
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--split", "99"), "marey: --split 99: 99 s is after the end of the motion"),
+        (("--mirror", "--trim=1:9"), "marey: --trim 1:9: 9 s is after the end of the motion"),
+        (("--trim", "0:0.1", "--loop"), "marey: --loop: "),
+        (("--mirror", "--speed", "99"), "marey: --speed 99: 99.0 is not a number from 0.1 to 10"),
+        (("--concat", "walk.npz", "--blend", "9"), "marey: --blend 9: 9.0 is not a number from 0 to 2"),
+    ],
+)
+def test_an_error_names_the_option_that_was_given(walk: Path, given: tuple[str, ...], said: str):
+    words = (walk if word == "walk.npz" else word for word in given)
+    assert said in run(walk, "-o", walk.with_name("out.npz"), *words, code=2)
+
+
+def test_an_error_names_the_number_in_a_file_of_operations(walk: Path):
+    ops = walk.with_name("ops.json")
+    for rows, said in (
+        ([{"op": "mirror"}, {"op": "trim", "to": 9}], "operation 2: 9 s is after the end of the motion"),
+        ([{"op": "speed", "factor": 99}], "operation 1, factor: 99 is not a number"),
+        ([{"op": "explode"}], "operation 1, op: unknown operation"),
+    ):
+        ops.write_text(json.dumps(rows))
+        assert f"marey: {ops}: {said}" in run(walk, "-o", walk.with_name("out.npz"), "--ops", ops, code=2)
 
 
 def test_a_motion_in_place_is_not_flagged_for_its_sliding_feet():

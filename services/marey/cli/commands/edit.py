@@ -9,7 +9,7 @@ import typer
 
 from marey.cli import console, options
 from marey.cli.exporting import with_export
-from marey.cli.operations import Ops, given_operations, with_operations
+from marey.cli.operations import Ops, given_operations, naming_operations, with_operations
 from marey.motion.export_options import PLAIN, ExportOptions
 
 
@@ -44,15 +44,19 @@ def edit(
 
     del operations  # `given_operations` has them in their order
     steps = given_operations(context, ops)
-    editor, warnings = model_for(steps, bundle or model, options.settings_of(sampling or ()), scope.value)
-    console.warn_all(warnings)
-    made = edit_files(sources, output, steps, model=editor, file_format=file_format, export=export, overwrite=overwrite)
-    for line in made:
-        _report(line)
-        if as_json:
-            console.result_json(line)
-        else:
-            console.result(console.home_relative(Path(line["file"])))
+    settings = options.settings_of(sampling or ())
+    with naming_operations(context, ops):
+        editor, warnings = model_for(steps, bundle or model, settings, scope.value)
+        console.warn_all(warnings)
+        made = edit_files(
+            sources, output, steps, model=editor, file_format=file_format, export=export, overwrite=overwrite
+        )
+        for line in made:
+            _report(line)
+            if as_json:
+                console.result_json(line)
+            else:
+                console.result(console.home_relative(Path(line["file"])))
 
 
 def _report(line: dict[str, Any]) -> None:

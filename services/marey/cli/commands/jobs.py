@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import bulk, console
+from marey.cli.hints import name_operation
 from marey.cli.references import FORMS, find, of_view
 from marey.core.errors import InvalidInput, NotFound
 
@@ -258,7 +259,7 @@ def _show_failures(client: Client, job: str, state: str, limit: int = 20) -> Non
     found = client.jobs.items(job, state=state, page_size=limit)
     for item in (each.raw for each in islice(found, limit)):
         error = item["error"] or {"message": item["reason"], "hint": None}
-        place = f"{error['where']}: " if error.get("where") else ""
+        place = f"{name_operation(error['where'])}: " if error.get("where") else ""
         reference = f"{console.short_id(job)}:{item['index']}.{item['variant']}"
         console.result(f"{state:<10} {reference} {item['prompt'][:60]!r}: {place}{error['message']}")
         if error.get("hint"):

@@ -12,7 +12,7 @@ import typer
 
 from marey.cli import console, options
 from marey.cli.exporting import ServerBody, ServerRig, with_export
-from marey.cli.operations import OperationsCommand, Ops, given_operations, with_operations
+from marey.cli.operations import OperationsCommand, Ops, given_operations, naming_operations, with_operations
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
 from marey.motion.edits.steps import read_steps
@@ -149,8 +149,9 @@ def edit(
     from marey.client import Client
 
     del operations  # `given_operations` has them in their order
-    given = read_steps(given_operations(context, ops))
-    with Client() as client:
+    listed = given_operations(context, ops)
+    with naming_operations(context, ops), Client() as client:
+        given = read_steps(listed)
         steps = [_with_id(client, step.as_json()) for step in given]
         found = find(client, "motion", motion).id
         settings = options.settings_of(sampling or ()) or None
