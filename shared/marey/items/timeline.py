@@ -1,7 +1,7 @@
 """Timelines: several prompts at stated times that become one motion, as rows and as a text.
 
-The text form is `0-3 a person walks forward; 3-5 a person waves`: a row is START-END in seconds and a prompt, and `;`
-separates rows. Standard library only.
+The text form is `0-3 a person walks forward; 3-5 a person waves`: a row is START-END in seconds, or as `0:03`, and a
+prompt, and `;` separates rows. Standard library only.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ SEPARATOR = ";"
 TIME_DIGITS = 3
 """Decimal places of times; more are rounded."""
 TIMELINE_HINT = "Choose a bundle of the default model, or submit each row as a prompt."
-_ROW = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*s)?\s*[-–]\s*(\d+(?:\.\d+)?)(?:\s*s)?(?![\w.-])[\s:,]*(.*)", re.DOTALL)
+_TIME = r"((?:\d{1,2}:[0-5])?\d+(?:\.\d+)?)(?:\s*s)?"
+_ROW = re.compile(rf"\s*{_TIME}\s*[-–]\s*{_TIME}(?![\w.-]|:\d)[\s:,]*(.*)", re.DOTALL)
 """Its time grows with the length of the text, not with its square: no two parts share a stretch of spaces."""
 _BETWEEN = " :,"
 """Characters between the times and the prompt, beside other whitespace."""
 _UNIT = re.compile(r"s(?![\w.-])")
 """A prompt that would be read as the unit of the time before it."""
-_FORM = "write START-END and a prompt, as 0-3 a person walks; 3-5 a person waves"
+_FORM = "write START-END (in seconds, or as m:ss) and a prompt, as 0-3 a person walks; 3-5 a person waves"
 _FIELDS = ("start", "end", "prompt")
 
 
@@ -140,8 +141,14 @@ def _rows_of_text(text: str) -> _Numbered:
         if match is None:
             raise InvalidInput(f"row {number}, {part.strip()[:60]!r}, has no times: {_FORM}")
         start, end, prompt = match.groups()
-        found.append((number, _row(number, float(start), float(end), prompt)))
+        found.append((number, _row(number, _seconds_of(start), _seconds_of(end), prompt)))
     return found
+
+
+def _seconds_of(time: str) -> float:
+    """Return the seconds of `3.5` or, in minutes and seconds, of `0:03.5`."""
+    minutes, _, seconds = time.rpartition(":")
+    return 60 * int(minutes or 0) + float(seconds)
 
 
 def _rows_of_list(values: Sequence[object]) -> _Numbered:

@@ -56,6 +56,8 @@ def test_anything_else_is_refused_in_words(value: object) -> None:
         "0-3 a person walks; 3-5 a person waves",
         " 0 - 3s: a person walks ;3.0–5.000, a  person waves;",
         "3-5 a person waves; 0-3 a person walks",
+        "0:00-0:03 a person walks; 0:03-0:05 a person waves",
+        "0:00 – 00:03.000: a person walks; 3-0:05: a person waves",
     ],
 )
 def test_times_are_read_in_any_way_that_they_are_written(text: str) -> None:
@@ -76,6 +78,9 @@ def test_times_are_read_in_any_way_that_they_are_written(text: str) -> None:
         ("0-3 walk; 5-4 wave", "row 2 (5-4) ends before it begins"),
         ("1-3 walk", "row 1 (1-3) is the first and begins at 1; begin at 0"),
         ("0-61 walk", "row 1 (0-61) ends after 60 s"),
+        ("0:00-1:01 walk", "row 1 (0-61) ends after 60 s"),
+        ("0:00-0:63 walk", "row 1, '0:00-0:63 walk', has no times"),
+        ("0:00:00-0:00:03 walk", "row 1, '0:00:00-0:00:03 walk', has no times"),
         ("0-3", "row 1 has no prompt"),
         ("0-3 走る", "row 1: the prompt has no English words"),
         ([{"start": 0, "end": 3, "prompt": "walk; wave"}], "row 1: the prompt holds ';'"),
@@ -96,6 +101,13 @@ def test_problems_name_the_row(value: object, message: str) -> None:
     with pytest.raises(InvalidInput) as error:
         read_timeline(value)
     assert error.value.message.startswith(message)
+
+
+def test_times_of_minutes_go_up_to_the_longest_timeline() -> None:
+    (row,) = read_timeline("0:00-1:00 a person walks")
+    assert (row["start"], row["end"]) == (0, 60)
+    (row,) = read_timeline("0-3: 30 steps are walked")
+    assert (row["end"], row["prompt"]) == (3, "30 steps are walked")
 
 
 def test_what_stands_between_times_and_prompt_is_no_part_of_it() -> None:
