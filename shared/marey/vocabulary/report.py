@@ -23,13 +23,17 @@ MAX_LEFT = 64
 MAX_BUNDLES = 3
 """Bundles whose actions a message names."""
 
+PART, RANGE = "length of a part", "length out of range"
+"""Notes on the two reasons of the flag `length`."""
+
 NOTES = {
     "tried": "named actions are unreliable with this model",
     "close": "read as another action",
     "negation": "what is not to be done may be done",
     "objects": "objects are mimed",
     "counts": "may be done another number of times",
-    "length": "a stated length is not used: it is that of a part, or out of the model's range",
+    PART: "a stated length is not used: it is that of a part of the motion",
+    RANGE: "a stated length is not used: it is out of the model's range",
     "several-people": "one person is shown",
     "subject": "its subject is read as a person",
     "other-language": "words in another language are not read: write in English",
@@ -83,9 +87,10 @@ class ScopeReport:
     decided: Mapping[tuple[str, str], Scope] = field(default_factory=dict[tuple[str, str], Scope])
     left: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     _noted: Counter[str] = field(default_factory=Counter[str])
-    """Prompts with each flag that warnings tell of: those of `unknown` prompts only where they are its reason."""
+    """Prompts with each flag that warnings tell of, by its note: those of `unknown` prompts only where they are its
+    reason."""
     _places: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
-    """Places of the first prompts of each verdict and with each flag, from 0 as in `JOB:INDEX`."""
+    """Places of the first prompts of each note, from 0 as in `JOB:INDEX`."""
     _examples: dict[str, list[ScopeExample]] = field(default_factory=dict[str, list[ScopeExample]])
 
     def judge(
@@ -142,18 +147,27 @@ class ScopeReport:
         for flag in scope.flags:
             self.flags[flag] += 1
             if verdict != "unknown" or flag in REASONS:
-                self._noted[flag] += 1
-                self._add(flag, index, *next(part for part in parts if flag in part[1].flags))
+                prompt, part = next(part for part in parts if flag in part[1].flags)
+                note = _note_of(flag, prompt)
+                self._noted[note] += 1
+                self._add(flag, index, prompt, part, note)
 
     def _leave(self, bundle: str, prompt: str) -> None:
         if sum(map(len, self.left.values())) < MAX_LEFT and prompt not in self.left.get(bundle, ()):
             self.left.setdefault(bundle, []).append(prompt)
 
-    def _add(self, kind: str, index: int, prompt: str, scope: Scope) -> None:
-        places = self._places.setdefault(kind, [])
+    def _add(self, kind: str, index: int, prompt: str, scope: Scope, note: str | None = None) -> None:
+        """Note an example.
+
+        Args:
+            kind: the verdict or the flag.
+            note: key of `NOTES`; None = `kind`.
+        """
+        note = note or kind
+        places = self._places.setdefault(note, [])
         if len(places) < MAX_PLACES:
             places.append(index)
-        examples = self._examples.setdefault(kind, [])
+        examples = self._examples.setdefault(note, [])
         if len(examples) < MAX_EXAMPLES:
             named = (each for each in scope.actions if each.verdict == kind)
             actions = tuple(action for each in named if (action := each.read_as or each.action) is not None)
@@ -193,6 +207,13 @@ class ScopeReport:
             return f"1 of {self.total} prompts, index {first.index} (from 0), {first.prompt!r}{what}"
         places = ", ".join(map(str, self._places[kind])) + (", …" if count > MAX_PLACES else "")
         return f"{count} of {self.total} prompts, indexes {places} (from 0), first {first.prompt!r}{what}"
+
+
+def _note_of(flag: str, prompt: str) -> str:
+    """Return the key in `NOTES` of a flag of a prompt."""
+    if flag != "length":
+        return flag
+    return PART if stated_length(prompt).is_partial else RANGE
 
 
 def with_length(scope: Scope, prompt: str, lengths: tuple[float, float]) -> Scope:

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 from marey.cli.commands.review import _caption, _facts
 from marey.client import Candidate, Motion, MotionQuality, Selection
+from marey.viz.render import facts_of
+from tests.support.walker import walker
 
 BOW = Motion(id="m", job="a", index=3, name="greet", prompt="a person bows", seed=7, frames=60, fps=20.0)
 
 
-def facts(*motions: Motion) -> list[str]:
-    return _facts(motions, {motion.job: f"day {motion.job}" for motion in motions})
+def facts(*motions: Motion, sheet: bool = False) -> list[str]:
+    return _facts(motions, {motion.job: f"day {motion.job}" for motion in motions}, sheet=sheet)
 
 
 def test_a_choice_is_counted_among_the_recorded_candidates() -> None:
@@ -26,6 +28,15 @@ def test_motions_of_several_jobs_name_their_job() -> None:
         "00003  ·  greet  ·  day a  ·  seed 7  ·  3.0 s",
         "00003  ·  greet  ·  day b  ·  seed 7  ·  3.0 s",
     ]
+
+
+def test_a_contact_sheet_tells_seed_length_and_bundle_once() -> None:
+    others = replace(BOW, job="b", bundle="hgm3-open@4b73363936fc"), replace(BOW, bundle="mogo-open@4b73363936fc")
+    assert facts(*others, sheet=True) == ["00003  ·  greet  ·  day b", "00003  ·  greet  ·  day a"]
+    assert facts(*others)[0] == "00003  ·  greet  ·  day b  ·  hgm3-open  ·  seed 7  ·  3.0 s"
+    clip = walker(seconds=3.0)
+    drawn = facts_of(replace(clip, manifest={**clip.manifest, "seed": 7, "bundle": "hgm3-open@4b73363936fc"}))
+    assert all(fact in drawn for fact in ("3.0 s", "seed 7", "hgm3-open@4b73363936fc"))
 
 
 def test_a_contact_sheet_names_the_flags_of_a_motion() -> None:

@@ -49,9 +49,26 @@ def test_a_length_out_of_the_range_is_warned_of() -> None:
     assert scope is not None
     assert scope.flags == ("length",)
     assert report.warnings() == [
-        "'a person walks for twenty seconds': a stated length is not used: it is that of a part, or out of the model's"
-        " range"
+        "'a person walks for twenty seconds': a stated length is not used: it is out of the model's range"
     ]
     within = report.judge("a person walks for six seconds", "tiny", LISTS, lengths=(1.0, 9.8))
     assert within is not None
     assert within.flags == ()
+
+
+def test_a_warning_tells_the_length_of_a_part_from_one_out_of_the_range() -> None:
+    report = ScopeReport()
+    for prompt in ("walks for twenty seconds", "walks, then waves for 3 seconds", "waves for a minute"):
+        report.judge(prompt, "tiny", LISTS, lengths=(1.0, 9.8))
+    assert [said for said in report.warnings() if "length" in said] == [
+        "1 of 3 prompts, index 1 (from 0), 'walks, then waves for 3 seconds': a stated length is not used: it is that "
+        "of a part of the motion",
+        "2 of 3 prompts, indexes 0, 2 (from 0), first 'walks for twenty seconds': a stated length is not used: it is "
+        "out of the model's range",
+    ]
+    found = report.as_json()
+    assert found["flags"]["length"] == 3
+    assert [each["index"] for each in found["examples"] if each["kind"] == "length"] == [0, 2, 1]
+    row = ScopeReport()
+    row.judge("0-5 …", "tiny", LISTS, rows=[("row 1 (0-5)", "walks, then waves for 3 seconds")])
+    assert row.warnings()[-1].endswith("it is that of a part of the motion")

@@ -127,8 +127,9 @@ class _Book:
         """
         with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
             files = self.client.motions.fetch_all(motions, folder)
-            facts = _facts(motions, self.names)
-            if path.suffix.lower() == ".png":
+            is_sheet = path.suffix.lower() == ".png"
+            facts = _facts(motions, self.names, sheet=is_sheet)
+            if is_sheet:
                 _sheet(motions, facts, files, path, ": ".join(heading), self.drawers, lambda: self.done(1))
             else:
                 cards = _cards(self.client, motions, facts, files, self.sources)
@@ -331,30 +332,32 @@ def _page(
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later, columns=columns)
 
 
-def _facts(motions: Sequence[Motion], jobs: Mapping[str, str]) -> list[str]:
+def _facts(motions: Sequence[Motion], jobs: Mapping[str, str], *, sheet: bool) -> list[str]:
     """Describe each motion in a line, with its job and its bundle where they are of several.
 
     Args:
         jobs: names of all jobs that are drawn, by their ids.
+        sheet: without seed, length and bundle, which a contact sheet draws beside the line.
     """
-    several = len({motion.bundle for motion in motions}) > 1
+    several = len({motion.bundle for motion in motions}) > 1 and not sheet
     return [
         _fact(
             motion,
             ([jobs[motion.job]] if len(jobs) > 1 else []) + ([motion.bundle.partition("@")[0]] if several else []),
+            [] if sheet else [f"seed {motion.seed}", f"{motion.seconds:.1f} s"],
         )
         for motion in motions
     ]
 
 
-def _fact(motion: Motion, made_by: Sequence[str]) -> str:
+def _fact(motion: Motion, made_by: Sequence[str], drawn: Sequence[str]) -> str:
     take = ["take of another"] if motion.replaces else []
     edit = [f"edit of {console.short_id(motion.edited_from[0])}"] if motion.edited_from else []
     name = [motion.name] if motion.name else []
     match = motion.quality.match if motion.quality else None
     shown = [f"match {match.value:g}"] if match and match.value is not None else []
     of = [_choice(motion.selection)] if motion.selection else []
-    place = [f"{motion.index:05}", *name, *made_by, f"seed {motion.seed}", f"{motion.seconds:.1f} s"]
+    place = [f"{motion.index:05}", *name, *made_by, *drawn]
     return "  ·  ".join([*place, *of, *shown, *take, *edit])
 
 
