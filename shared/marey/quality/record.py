@@ -38,7 +38,7 @@ class PromptMatch(BaseModel):
 
     value: float | None = Field(
         default=None,
-        description="0 to 1; from 0.5 on it shows them in their order. Null where an action has no rule.",
+        description="0 to 1; from 0.5 on it shows them in their order. Null where the prompt names no action.",
     )
     by: Literal["check"] = Field(default="check", description="`check`: by rules on the joints.")
     percentile: int | None = Field(

@@ -20,7 +20,7 @@ class Candidate(BaseModel):
     seed: int = Field(description="Candidate 0 has the item's seed.")
     flags: list[Flag] = Field(description="Those of its quality record.")
     ok: bool = Field(description="True without flags.")
-    match: float | None = Field(description="Value of its match; null where an action has no rule.")
+    match: float | None = Field(description="Value of its match; null where the prompt names no action.")
 
 
 class Selection(BaseModel):

@@ -27,7 +27,7 @@ class PromptMatch(Result):
     """How well a motion shows the actions of its prompt."""
 
     value: float | None = None
-    """0 to 1; from 0.5 on it shows them in their order. None where an action has no rule."""
+    """0 to 1; from 0.5 on it shows them in their order. None where the prompt names no action."""
     by: str = ""
     """`check`: by rules on the joints."""
     percentile: int | None = None
@@ -94,7 +94,7 @@ class Candidate(Result):
     ok: bool = False
     """True without flags."""
     match: float | None = None
-    """Value of its match; None where an action has no rule."""
+    """Value of its match; None where the prompt names no action."""
 
 
 @dataclass(frozen=True, kw_only=True)
