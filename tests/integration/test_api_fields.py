@@ -98,7 +98,7 @@ def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> Non
         ("POST", "/v1/webhooks", {}, "url", "is missing"),
         ("POST", "/v1/texts/parse", {"prompts": []}, "prompts", "is empty"),
         ("GET", "/v1/jobs?limit=0", None, "limit", "0 is below 1, the least that is allowed"),
-        ("GET", "/v1/motions?tag=", None, "tag.0", "is empty"),
+        ("GET", "/v1/motions?tag=", None, "tag", "is empty"),
         (
             *("POST", "/v1/rigs?name=h%C3%A9ro&format=bvh", None, "name"),
             "'héro' cannot be used: allowed are letters from A to Z, digits, _ and -, at most 63, of which the first",

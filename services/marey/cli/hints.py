@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from types import MappingProxyType
 
 from marey.core.errors import MareyError, TimedOut
+from marey.items.problems import InvalidItems
 
 OPTIONS = {
     "best_of": "--best-of",
@@ -39,20 +42,47 @@ OPTIONS = {
     "variants": "--variants",
 }
 """The option of each argument that an error may name."""
+NO_OPTIONS: Mapping[str, str] = MappingProxyType({})
+_FIELD = re.compile(r"([a-z][a-z_]*)(\.[0-9]+)?")
+"""A field of a request, or an element of one that is a list."""
 _OPERATION = re.compile(r"^ops\.([0-9]{1,3})\b")
 
 
-def name_options(error: MareyError) -> MareyError:
-    """Let an error name the option of the command line in place of the argument of the Python API."""
+def name_options(error: MareyError, given: Mapping[str, str] = NO_OPTIONS) -> MareyError:
+    """Let an error name the option of the command line in place of the argument of the Python API or of the field of a
+    request.
+
+    Args:
+        given: options and arguments of the command, by the names of fields and arguments.
+    """
     argument = error.argument
-    if argument is None or argument not in OPTIONS:
-        return error
-    option = OPTIONS[argument]
+    if argument is None or argument not in (OPTIONS.keys() | given.keys()):
+        return _name_fields(error, given)
+    option = given.get(argument) or OPTIONS[argument]
     if error.where == argument:
         error.where = option
     if error.hint is not None:
         error.hint = re.sub(rf"pass {argument}=True|\b{argument}\b", lambda found: _named(found, option), error.hint)
     return error
+
+
+def _name_fields(error: MareyError, given: Mapping[str, str]) -> MareyError:
+    """Let an error of the server, which names fields of its request, name the options that they are from."""
+    error.where = _option_of(error.where, given)
+    if isinstance(error, InvalidItems):
+        error.problems = tuple(
+            each if each.line is not None else replace(each, field=_option_of(each.field, given))
+            for each in error.problems
+        )
+    return error
+
+
+def _option_of(field: str | None, given: Mapping[str, str]) -> str | None:
+    found = None if field is None else _FIELD.fullmatch(field)
+    if found is None:
+        return field
+    option = OPTIONS.get(found[1])
+    return given.get(found[1]) or (option if option in given.values() else field)
 
 
 def name_operation(where: str) -> str:

@@ -36,6 +36,8 @@ from marey.core.errors import MareyError
 from marey.core.validation import problem_of
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
+CHOSEN = "marey.command"
+"""Key of the context: the command that was chosen."""
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
 
@@ -44,6 +46,17 @@ HELP = """Text in, 3D human motion out.
 Exit codes: 0 all succeeded; 1 internal error; 2 usage or invalid input; 3 not found; 4 unreachable; 5 refused;
 6 ended with failed, dead or cancelled items; 7 --timeout passed; 8 evaluation regressed; 130 interrupted, or
 answered with no."""
+
+
+def _options_of(command: Any) -> Mapping[str, str]:
+    """Return how a user names each parameter of a command (`--keep-days`, `PRIORITY`), by the names in errors."""
+    found: dict[str, str] = {}
+    for parameter in getattr(command, "params", ()):
+        option = max(parameter.opts, key=len)
+        shown = option if option.startswith("-") else parameter.metavar or parameter.name.upper()
+        for name in (parameter.name, option.lstrip("-").replace("-", "_"), shown.lower()):
+            found[name] = shown.rstrip("…")
+    return found
 
 
 def _said(error: ValueError) -> str:
@@ -60,6 +73,15 @@ class Commands(TyperGroup):
         with console.escaped_output():
             return super().main(*args, **options)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Return the group or command of the first word, and note the command of all words, for errors."""
+        name, command, rest = super().resolve_command(ctx, args)
+        chosen, words = command, list(rest)
+        while isinstance(chosen, TyperGroup) and words:
+            chosen = chosen.get_command(ctx, words.pop(0))
+        ctx.meta[CHOSEN] = chosen
+        return name, command, rest
+
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
         try:
@@ -71,7 +93,7 @@ class Commands(TyperGroup):
         except MareyError as error:
             if isinstance(ctx.obj, tracing.Span):
                 ctx.obj.fail(error)
-            console.say(f"marey: {hints.name_options(error)}")
+            console.say(f"marey: {hints.name_options(error, _options_of(ctx.meta.get(CHOSEN)))}")
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             console.say("marey: interrupted")

@@ -257,7 +257,11 @@ def _field_problem(error: Mapping[str, Any], body_model: Any) -> FieldProblem:
     """Convert one of pydantic's errors. `("query", "limit")` becomes `limit`: the prefix means nothing to a client."""
     place, *path = error["loc"]
     if error["type"] == "json_invalid":  # its path is a position
-        return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
+        return FieldProblem(
+            field=str(place), message=f"is not JSON: {error['ctx']['error']} at character {path[0] + 1}"
+        )
+    if place == "query":
+        path = path[:1]  # a repeated parameter has no numbers
     field = ".".join(str(part) for part in path) or str(place)
     message = problem_of(error, known_fields(body_model, path))
     return FieldProblem(field=_clean(field), message=_clean(message) or "")

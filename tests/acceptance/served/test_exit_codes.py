@@ -38,7 +38,9 @@ def test_not_found_is_3(marey: Marey) -> None:
 
 
 def test_usage_is_2(marey: Marey) -> None:
-    marey("submit", "walk", "--priority", 99999).refused(2, "priority: 99999 is above 1,000, the most that is allowed")
+    marey("submit", "walk", "--priority", 99999).refused(
+        2, "--priority: 99999 is above 1,000, the most that is allowed"
+    )
     marey("motions", "list", "--tag", "").refused(2, "tag", "is empty")
     marey("webhooks", "add", "https://x.example", "--event", "nope").refused(2, "events.0: 'nope'", "job.ended")
     marey("nonsense").refused(2, "nonsense")

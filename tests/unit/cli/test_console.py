@@ -113,12 +113,20 @@ def test_errors_that_quote_an_argument_escape_it(arguments: list[str]) -> None:
         ),
         (["motions", "list", "--review", "bogus"], "'--review': 'bogus' is not one of 'new', 'kept', "),
         (["generate", "x", "--scope", "bogus"], "'--scope': 'bogus' is not one of 'warn', 'refuse', 'ignore'."),
+        (["submit", "x", "--seed", "high"], "'--seed': 'high' is not a whole number"),
+        (["submit", "x", "--keep-days", "0"], "'--keep-days': 0 is below 1, the least that is allowed"),
+        (["jobs", "list", "--limit", "x"], "'--limit': 'x' is not a whole number"),
     ],
 )
 def test_a_value_that_an_option_does_not_have_is_named_with_those_it_has(arguments: list[str], said: str) -> None:
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 2
     assert f"Error: Invalid value for {said}" in done.output
+
+
+def test_an_error_names_an_argument_by_the_word_of_the_help() -> None:
+    done = CliRunner().invoke(app, ["rigs", "show", "nobody"])
+    assert (done.exit_code, done.stderr.startswith("marey: NAME|FILE: there is no rig 'nobody'")) == (2, True)
 
 
 def test_the_traceback_of_a_bug_is_escaped() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from marey.cli.hints import OPTIONS, hint_of_timeout, name_options
 from marey.client import Conflict, InvalidInput, MareyError, TimedOut
+from marey.items.problems import InvalidItems, Problem
 from tests.contracts.surfaces import command_line
 
 CLIENT = Path(__file__).resolve().parents[3] / "services" / "marey" / "client"
@@ -29,6 +30,34 @@ def test_an_error_names_the_option_in_place_of_the_argument() -> None:
 def test_an_error_without_an_argument_stays_as_it_is() -> None:
     error = InvalidInput("is empty", where="seed", hint="Is overwrite=True?")
     assert str(name_options(error)) == "seed: is empty\n  Is overwrite=True?"
+
+
+GIVEN = {"keep_days": "--keep-days", "value": "PRIORITY", "priority": "PRIORITY", "events": "--event", "tags": "--tag"}
+
+
+@pytest.mark.parametrize(
+    ("where", "named"),
+    [
+        ("keep_days", "--keep-days"),
+        ("priority", "PRIORITY"),
+        ("events.0", "--event"),
+        ("tags", "--tag"),
+        ("settings", "settings"),
+        ("events.0.kind", "events.0.kind"),
+        ("job 12", "job 12"),
+        (None, None),
+    ],
+)
+def test_an_error_of_the_server_names_the_option_of_its_field(where: str | None, named: str | None) -> None:
+    assert name_options(InvalidInput("no", where=where), GIVEN).where == named
+    problems = [Problem(None, where, "no"), Problem(3, where, "no")]
+    listed = name_options(InvalidItems(problems), GIVEN)
+    assert isinstance(listed, InvalidItems)
+    assert [each.field for each in listed.problems] == [named, where]
+
+
+def test_an_option_of_another_name_than_its_field_is_named_where_the_command_has_it() -> None:
+    assert name_options(InvalidInput("no", where="settings"), {"sampling": "--set"}).where == "--set"
 
 
 def test_each_option_exists() -> None:
