@@ -55,8 +55,8 @@ def asked_of(name: str, stored: Collection[str], export: ExportOptions) -> Mappi
 
 
 def check_body(export: ExportOptions) -> None:
-    """Read the body that an export names, so that an error comes before anything is fetched or submitted; one of the
-    server is left to `check_rig`.
+    """Read the body or the rig that an export names, so that an error comes before anything is fetched or submitted;
+    one of the server is left to `check_rig`.
 
     Raises:
         NotFound, InvalidFile, InvalidInput: the file is missing, or no human body; a map is given for a rig of the
@@ -76,6 +76,12 @@ def check_body(export: ExportOptions) -> None:
         except ImportError as error:
             raise needs_extra("motion", error) from error
         load_shape(export.body, export.rig_map)
+    elif export.rig is not None:
+        try:
+            from marey.motion.retarget import load_body
+        except ImportError as error:
+            raise needs_extra("motion", error) from error
+        load_body(export.rig, export.rig_map)
 
 
 def check_formats(formats: Sequence[str] | None, export: ExportOptions) -> None:

@@ -83,6 +83,10 @@ def test_fetch(marey: Command, api: LiveApi, hero: Path, tmp_path: Path) -> None
         job = client.submit([{"prompt": "a person walks", "name": "walk"}])["id"]
     api.work(CLIP.to_npz())
     formats = [word for format in FORMATS for word in ("--format", format)]
+    gone = marey("fetch", job, "-o", tmp_path / "none", "--rig", tmp_path / "none.fbx", "--format", "fbx")
+    gone.refused(3, "none.fbx: no such file")
+    assert "goes on" not in gone.err
+    assert not (tmp_path / "none").exists()
     marey("fetch", job, "-o", tmp_path, "--rig", hero, *formats, "--name-template", "{name}").ok()
     for format in FORMATS:
         check(tmp_path / f"walk.{format}", CLIP, hero)
