@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 FORMS = "its id, the last 8 digits of it, a name, or last"
 MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX or JOB:INDEX.VARIANT (both from 0), or last"
+LAST = "last"
 LISTED = 5
 LISTS = {
     "job": "marey jobs list",
@@ -95,7 +96,10 @@ def choose(kind: str, text: str, matches: Sequence[Mapping[str, Any]]) -> Refere
         NotFound, InvalidInput: as `find`.
     """
     if not matches:
-        raise NotFound(f"there is no such {kind}", where=f"{kind} {text[:80]!r}", hint=f"`{LISTS[kind]}` shows yours.")
+        where, hint = f"{kind} {text[:80]!r}", f"`{LISTS[kind]}` shows yours."
+        raise NotFound(
+            f"there is no {kind} yet" if text == LAST else f"there is no such {kind}", where=where, hint=hint
+        )
     if len(matches) > 1:
         lines = "\n".join(f"  {each['id']}  {describe(each)}, {console.moment(each['created'])}" for each in matches)
         raise InvalidInput(

@@ -330,7 +330,7 @@ class Streams(Resource):
             Busy: too many streams are open.
         """
         if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-            raise InvalidInput(f"{seconds:g} seconds is out of range", where="seconds", argument="seconds")
+            raise InvalidInput(f"{seconds:g} seconds is no length above 0", where="seconds", argument="seconds")
         values = {"prompt": prompt, "model": model, "seed": seed, "name": name}
         (item,) = read_items([(None, values)])
         body = item.as_json()

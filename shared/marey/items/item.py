@@ -113,6 +113,8 @@ def read_json(line: str | bytes) -> object:
         return json.loads(line, object_pairs_hook=_object)
     except _RepeatedKeyError as error:
         return Unreadable(f"gives {error.args[0]!r} twice")
+    except json.JSONDecodeError as error:  # which counts lines of its own
+        return Unreadable(f"is not JSON: {error.msg} at character {error.pos + 1}")
     except (ValueError, RecursionError) as error:
         return Unreadable(json_problem(error))
 

@@ -102,8 +102,12 @@ def test_an_item_of_another_tenant_is_no_motion(marey: Command, api: LiveApi) ->
         job = client.submit([{"prompt": "a person walks"}])["id"]
         (item,) = client.pages(f"/v1/jobs/{job}/items")
     other = Command({"MAREY_SERVER": api.url, "MAREY_KEY": key})
-    for reference in (item["id"], f"{job}:0", "last"):
+    for reference in (item["id"], f"{job}:0"):
         other("motions", "keep", reference).refused(3, "there is no such motion")
+    other("motions", "keep", "last").refused(3, "there is no motion yet")
+    marey("jobs", "priority", job, 5000).refused(2, "marey: PRIORITY: 5000 is above 1,000")
+    marey("submit", "a person walks", "--keep-days", 99999).refused(2, "marey: --keep-days: 99999 is above 36,500")
+    marey("motions", "list", "--tag", "").refused(2, "marey: --tag: is empty")
 
 
 def test_an_ambiguous_name_lists_its_candidates_and_nothing_is_done(marey: Command, api: LiveApi, job: str) -> None:
@@ -122,8 +126,9 @@ def test_another_tenants_job_is_not_there(api: LiveApi, job: str) -> None:
         create_tenant(conn, "elsewhere")
         key = create_key(conn, "ann", ["admin"], tenant="elsewhere").secret
     other = Command({"MAREY_SERVER": api.url, "MAREY_KEY": key})
-    for text in (job, short(job), "day 1", "last"):
+    for text in (job, short(job), "day 1"):
         other("jobs", "show", text).refused(3, "there is no such job")
+    other("jobs", "show", "last").refused(3, "there is no job yet")
 
 
 def drawn(api: LiveApi, *arguments: str) -> str:

@@ -122,6 +122,11 @@ def test_a_field_that_is_nearly_known_is_told_with_the_known_one(tmp_path: Path)
     assert "frame: unknown field of 'root_path' (did you mean 'frames'?)" in problem
 
 
+def test_a_line_that_is_no_json_is_told_with_the_place_in_it(tmp_path: Path) -> None:
+    (problem,) = problems(tmp_path, "p.jsonl", '{"prompt": "a person waves"}\n{bad\n')
+    assert problem == "line 2: is not JSON: Expecting property name enclosed in double quotes at character 2"
+
+
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
     path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
     assert [item.prompt for item in items_of(path)] == ["a person waves", "a person bows"]

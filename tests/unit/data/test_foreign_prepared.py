@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.data import manifest as names
 from marey.data.prepared import PreparedData
@@ -169,3 +169,10 @@ def test_text_features_that_are_none_are_told(folder: Path, changes: dict[str, A
     (folder / names.TEXTS).write_bytes(npz(**arrays | changes))
     with pytest.raises(InvalidFile, match=names.TEXTS):
         CaptionTexts.load(data)
+
+
+def test_a_folder_that_is_missing_is_told_from_one_without_data(tmp_path: Path) -> None:
+    with pytest.raises(NotFound, match="no prepared data in this folder"):
+        PreparedData.open(tmp_path)
+    with pytest.raises(NotFound, match=r"none: there is no such folder\n  `marey data prepare`"):
+        PreparedData.open(tmp_path / "none")

@@ -130,9 +130,8 @@ def read_manifest(path: Path) -> Manifest:
     try:
         document = read_json(file)
     except NotFound:
-        raise NotFound(
-            "no prepared data in this folder", where=str(path), hint="Make it with `marey data prepare`."
-        ) from None
+        message = "no prepared data in this folder" if path.is_dir() else "there is no such folder"
+        raise NotFound(message, where=str(path), hint="`marey data prepare` makes prepared data.") from None
     try:
         manifest = Manifest.model_validate(document)
     except ValidationError as error:
