@@ -33,6 +33,11 @@ class BatchThreads:
         self._inside = threading.local()
         self._pool: ThreadPoolExecutor | None = None
 
+    @classmethod
+    def on(cls, device: torch.device) -> BatchThreads:
+        """Return the threads for networks on a device: of a CPU as many as torch has, else one."""
+        return cls(torch.get_num_threads() if device.type == "cpu" else 1)
+
     def __deepcopy__(self, memo: object) -> BatchThreads:
         """Return itself: a copied network shares its threads."""
         return self

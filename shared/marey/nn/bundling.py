@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,6 +16,7 @@ from marey.bundles import Bundle, BundleWriter, TextSpec
 from marey.bundles.eight_bit import restore
 from marey.core.errors import InvalidBundle
 from marey.motion.features import layout
+from marey.nn.motion_tokenizer import MotionTokenizer
 
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
 """Tensors of a tokenizer: state of the codebooks' training, as large as the codebooks; and the bundle's statistics."""
@@ -86,6 +88,48 @@ def write_generator(
             text=text,
             **{"version": "1", **manifest},
         )
+
+
+@dataclass(frozen=True)
+class NetworkParts:
+    """Base class of the networks of a generator's bundle, a field each; None = its configuration has no such part."""
+
+    tokenizer: MotionTokenizer
+
+    def parts(self) -> dict[str, nn.Module]:
+        """Return the networks by part name."""
+        found = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: network for name, network in found.items() if network is not None}
+
+    def states(self) -> dict[str, dict[str, Tensor]]:
+        """Return the state dicts of the networks by part name."""
+        return {name: network.state_dict() for name, network in self.parts().items()}
+
+    def to(self, device: torch.device) -> None:
+        """Move the networks to a device."""
+        for network in self.parts().values():
+            network.to(device)
+
+    def fill(self, bundle: Bundle) -> None:
+        """Load the parts of a bundle into the networks (see `fill`), and its statistics into the tokenizer.
+
+        Raises:
+            InvalidBundle: the tensors do not fit a network.
+        """
+        for name, network in self.parts().items():
+            fill(network, bundle, name)
+        self.tokenizer.set_statistics(*(torch.tensor(values) for values in bundle.statistics()))
+
+
+def parameters_of(bundle: Bundle, model: str) -> dict[str, Any]:
+    """Return the plain values of the configuration of a model's bundle.
+
+    Raises:
+        InvalidBundle: of another model.
+    """
+    if bundle.manifest.model != model:
+        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {model}", where=str(bundle.path))
+    return bundle.manifest.parameters
 
 
 def fill(network: nn.Module, bundle: Bundle, part: str) -> None:

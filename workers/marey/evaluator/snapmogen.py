@@ -12,30 +12,17 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from marey.bundles import Bundle
-from marey.evaluator.config import EvaluatorConfig
-from marey.evaluator.model import MotionEncoder, SentenceEncoder
 from marey.evaluator.snapmogen_model import MAX_WORDS
 from marey.evaluator.tmr import TMREvaluator
 from marey.nn.packed import pack_linears
-from marey.text.encoders import TextEncoder
 from marey.text.truncation import truncated_tokens
 
 
 class SnapMoGenEvaluator(TMREvaluator):
     """A loaded bundle, as `marey models import snapmogen-evaluator` writes it. Not thread-safe."""
 
-    def __init__(
-        self,
-        bundle: Bundle,
-        config: EvaluatorConfig,
-        motion: MotionEncoder,
-        text: SentenceEncoder,
-        encoder: TextEncoder,
-        device: torch.device,
-    ) -> None:
-        """Create an evaluator from its parts; most callers use `load`."""
-        super().__init__(bundle, config, motion, text, encoder, device)
+    def _pack(self) -> None:
+        super()._pack()
         pack_linears(self.motion)  # the heads
         pack_linears(self.text)
 

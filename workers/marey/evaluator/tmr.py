@@ -45,6 +45,9 @@ class TMREvaluator(LoadedNetworks[EvaluatorConfig, MotionEncoder, SentenceEncode
         """Create an evaluator from its parts; most callers use `load`."""
         super().__init__(bundle, config, motion, text, device)
         self.encoder = encoder
+        self._pack()
+
+    def _pack(self) -> None:
         self.motion.encoder.pack()
         self.text.encoder.pack()
 

@@ -1,22 +1,25 @@
-"""Bases of the generators of Marey's models: reading of settings, open lengths, and passes over groups of equal
-length. A model may have its own instead: `marey.generation.port.Generator` is all that others know of it."""
+"""Bases of the generators of Marey's models: loading, reading of settings, open lengths, and passes over groups of
+equal length. A model may have its own instead: `marey.generation.port.Generator` is all that others know of it."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
+import numpy as np
 import torch
+from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, read_settings
+from marey.generation.groups import MAX_ROWS, RowWatcher, StepCounter, group_rows, to_bucket
+from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle, read_settings
 from marey.motion.features import FeatureLayout
 from marey.nn.batch_threads import BatchThreads
+from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.registry import ModelSpec
 
 if TYPE_CHECKING:
@@ -54,9 +57,11 @@ P = TypeVar("P", bound=Sampling[Any])
 """Sampling settings of a model."""
 G = TypeVar("G")
 """One motion as a model generates it."""
+Draw = Callable[[RowWatcher], Sequence[G]]
+"""Generates the rows of a group, and returns those that its watcher still has at the end."""
 
 
-class SampledGenerator(Generic[P]):
+class SampledGenerator(ABC, Generic[P]):
     """A generator whose bundle holds a value of every setting.
 
     Attributes:
@@ -66,6 +71,29 @@ class SampledGenerator(Generic[P]):
 
     sampling: type[P]
     inference: DataclassInstance
+
+    @classmethod
+    def load(
+        cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
+    ) -> Self:
+        """Load a bundle.
+
+        Args:
+            bundle: a verified bundle, or its name or path.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            threads: of torch; 0 leaves torch's own choice.
+            dtype: of the transformers' matrices; None = bfloat16 where the device multiplies it fast, else float32.
+
+        Raises:
+            InvalidBundle: of another model, or damaged.
+            InvalidInput: unknown device.
+        """
+        return cls._of(*open_bundle(bundle, device, threads, dtype))
+
+    @classmethod
+    @abstractmethod
+    def _of(cls, bundle: Bundle, device: torch.device, dtype: torch.dtype) -> Self:
+        """Return the generator of a verified bundle on a device; `dtype` of its transformers' matrices."""
 
     def settings(self, values: Mapping[str, Any]) -> P:
         """Check an item's settings: numbers that both the model's settings and the bundle's values have.
@@ -84,7 +112,7 @@ class SampledGenerator(Generic[P]):
         return asdict(settings.inference(self.inference))
 
 
-class GroupedGenerator(SampledGenerator[P], ABC, Generic[P, G]):
+class GroupedGenerator(SampledGenerator[P], Generic[P, G]):
     """A generator that knows lengths beforehand, and draws motions of one bucket of lengths in one pass."""
 
     def __init__(
@@ -92,6 +120,7 @@ class GroupedGenerator(SampledGenerator[P], ABC, Generic[P, G]):
         bundle: Bundle,
         limits: Limits,
         inference: DataclassInstance,
+        tokenizer: MotionTokenizer,
         device: torch.device,
         dtype: torch.dtype,
         batch_threads: BatchThreads,
@@ -100,27 +129,40 @@ class GroupedGenerator(SampledGenerator[P], ABC, Generic[P, G]):
         self.layout: FeatureLayout = layout_of(bundle.manifest)
         self.limits = limits
         self.inference = inference
+        self.tokenizer = tokenizer
         self.device = device
         self.dtype = dtype
         self.batch = MAX_ROWS
         self.batch_threads = batch_threads
 
     @property
-    @abstractmethod
     def frames_per_token(self) -> int:
-        """Return N/n, the frames of a token."""
+        """Return N/n, the frames of a token; where a model has several scales, of the finest."""
+        return self.tokenizer.frames_per_token
 
     @abstractmethod
     def _estimate(self, request: Request) -> int:
         """Return the frames of a request that names no length, drawn with its seed."""
 
     @abstractmethod
+    def _drawing(self, requests: Sequence[Request], frames: Sequence[int], settings: P) -> tuple[int, Draw[G]]:
+        """Prepare the drawing of motions of these numbers of frames.
+
+        Returns:
+            the steps of a group, the last of which is counted when it is drawn, and the function that draws a group.
+        """
+
     def _bucket(self, frames: int) -> int:
         """Return the tokens of a length, rounded up to its bucket."""
+        return to_bucket(self._tokens(frames))
 
     def _tokens(self, frames: int) -> int:
         """Return the tokens that a length takes."""
         return -(-frames // self.frames_per_token)
+
+    def _sentence(self, request: Request) -> Tensor:
+        """Return the feature (1, W) of the whole prompt."""
+        return torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
 
     def frames(self, request: Request) -> int:
         """Return the feature frames: as requested, or drawn with the request's seed.
@@ -142,21 +184,20 @@ class GroupedGenerator(SampledGenerator[P], ABC, Generic[P, G]):
         """Return the tokens rounded up to the bucket; items of one bucket share a forward pass."""
         return self._bucket(self.frames(request))
 
-    def _in_groups(
-        self,
-        frames: Sequence[int],
-        steps: int,
-        control: GenerationControl | None,
-        draw: Callable[[RowWatcher], Sequence[G]],
+    @torch.inference_mode()
+    def generate(
+        self, requests: Sequence[Request], settings: P | None = None, *, control: GenerationControl | None = None
     ) -> list[G | None]:
-        """Draw motions in groups of one bucket, on the batch threads; None where `control` dropped one.
+        """Generate one motion per request, in groups of one bucket on the batch threads; None where `control` dropped
+        it.
 
-        Args:
-            frames: of each motion.
-            steps: of a group, the last of which is counted after `draw`.
-            control: of the batch; None = it reports nothing and drops nothing.
-            draw: function that generates the rows of a group, and returns those that its watcher still has at the end.
+        The tokens of an item do not depend on the number or order of the others.
+
+        Raises:
+            InvalidInput: a length or seed out of range, or features of another encoder.
         """
+        frames = [self.frames(request) for request in requests]
+        steps, draw = self._drawing(requests, frames, settings or self.sampling())
         results: list[G | None] = [None] * len(frames)
         groups = group_rows([self._bucket(count) for count in frames], self.batch_threads.count)
         counter = StepCounter(control or NoControl(), len(groups) * steps)

@@ -6,7 +6,6 @@ candidate depends on the seed of its request and its own number alone: results d
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,8 +19,8 @@ from marey.generation.port import GenerationControl, Generator, MotionFeatures, 
 from marey.generation.shots.dispatch import generate_any
 from marey.generation.shots.provenance import with_selections
 from marey.generation.shots.timelines import check_timelines, generate_timelines, row_requests
+from marey.generation.timed import part_seed
 from marey.items.settings import BEST_OF, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
-from marey.items.values import MAX_SEED
 from marey.motion.body import NamedBody
 from marey.motion.clip import SELECTION, MotionClip
 from marey.quality.record import SHOWN, Flag, read_quality
@@ -64,10 +63,7 @@ def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], DrawPlan]
 
 def candidate_seed(seed: int, number: int) -> int:
     """Return the seed of a candidate: the item's own for candidate 0, else one derived from both."""
-    if number == 0:
-        return seed
-    digest = hashlib.sha256(f"marey candidate {seed} {number}".encode()).digest()
-    return int.from_bytes(digest[:8], "little") % (MAX_SEED + 1)
+    return seed if number == 0 else part_seed(seed, "candidate", number)
 
 
 def best_clips(

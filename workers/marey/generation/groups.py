@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -13,6 +15,25 @@ from marey.generation.port import GenerationControl
 
 MAX_ROWS = 32
 """Items of a forward pass; a larger batch is no faster on a CPU and needs more memory."""
+BUCKET = 8
+"""Tokens; an item is padded to a multiple of this, not to the longest of its batch."""
+
+KeepRows = Callable[[], Tensor | None]
+"""Called after each pass of a group (`RowWatcher.step`): bool (B,) rows to go on with, or None for all."""
+
+
+@dataclass(frozen=True)
+class GroupItems:
+    """Base class of the items of a group while they are decoded: tensors with a row an item."""
+
+    def select(self, rows: Tensor) -> Self:
+        """Return the items at `rows`."""
+        return type(self)(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+
+
+def to_bucket(tokens: int) -> int:
+    """Return the bucket of a length: its tokens rounded up to a multiple of BUCKET."""
+    return -(-tokens // BUCKET) * BUCKET
 
 
 def group_rows(buckets: Sequence[int], threads: int) -> list[list[int]]:

@@ -15,6 +15,7 @@ from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix
 from marey.data.prepared import PreparedData
+from marey.nn.bundling import GeneratorConfig, write_generator
 from marey.training.parts import TrainedPart, save_part
 from marey.training.staging import TrainableConfig, TrainingRecipe, bundle_terms
 from marey.training.texts import CaptionTexts
@@ -29,6 +30,36 @@ class Gathered:
     parts: dict[str, TrainedPart]
     text: TextSpec
     manifest: dict[str, Any]
+
+    def write(
+        self,
+        path: Path,
+        model: str,
+        config: GeneratorConfig,
+        *,
+        states: Mapping[str, Mapping[str, Tensor]] | None = None,
+        text: TextSpec | None = None,
+        card: str | None = None,
+        overwrite: bool = False,
+    ) -> Bundle:
+        """Write the bundle of a generator; its statistics are those of the part `tokenizer`.
+
+        Args:
+            path: the bundle's folder.
+            model: name of the model that reads it.
+            config: configuration of the networks.
+            states: state dict of each part of the bundle; None = those of the parts of the run.
+            text: encoder, labeller and caps; None = those of the captions.
+            card: the model card.
+            overwrite: replace an existing bundle.
+        """
+        states = {name: part.state for name, part in self.parts.items()} if states is None else states
+        tokenizer = dict(states["tokenizer"])
+        statistics = (tokenizer.pop("mean").numpy(), tokenizer.pop("std").numpy())
+        return write_generator(
+            path, model, config, {**states, "tokenizer": tokenizer}, statistics,
+            text=text or self.text, card=card, overwrite=overwrite, **self.manifest,
+        )  # fmt: skip
 
 
 def gather(prepared: Path, run: Path, recipe: TrainingRecipe[C], config: C) -> Gathered:

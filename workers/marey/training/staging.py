@@ -44,6 +44,7 @@ class TrainableConfig(Protocol):
 
 
 C = TypeVar("C", bound=TrainableConfig)
+N = TypeVar("N", bound=nn.Module)
 Contra = TypeVar("Contra", contravariant=True)
 
 
@@ -152,6 +153,12 @@ class TrainingRecipe(Generic[C]):
             InvalidInput: its networks were built from other values than `config`'s.
         """
         return self._part(name, config, run, grows=None)
+
+    def trained(self, name: str, network: N, options: TrainOptions[C]) -> N:
+        """Return a stage's network, built from the configuration, with the weights of its finished part, in evaluation
+        mode. See `part` for what is raised."""
+        network.load_state_dict(self.part(name, options.config, options.run).state)
+        return network.eval().requires_grad_(False)
 
     def _part(self, name: str, config: C, run: Path, *, grows: str | None) -> TrainedPart:
         part = load_part(run / name / "part")

@@ -10,7 +10,6 @@ from torch import Tensor
 from marey.bundles import Bundle
 from marey.models.hgm3.bundle import MODEL, load_networks
 from marey.models.hgm3.config import HGM3Config
-from marey.nn.bundling import write_generator
 from marey.training.assembly import gather, scatter
 from marey.training.staging import TrainingRecipe
 
@@ -41,19 +40,16 @@ def assemble(
     parts = gathered.parts
     masked = parts["masked"].state
     states = {
-        "tokenizer": dict(parts["tokenizer"].state),
+        "tokenizer": parts["tokenizer"].state,
         "masked": _under(masked, "masked."),
         "predictor": _under(masked, "teacher."),
         "residual": parts["residual"].state,
         "length": parts["length"].state,
     }
-    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
     condition = config.condition
     caps = {"max_actions": condition.max_actions, "max_specifics": condition.max_specifics}
     text = gathered.text.model_copy(update={"in_order": config.in_order, "plain_action": config.plain_action, **caps})
-    return write_generator(
-        bundle, MODEL, config, states, statistics, text=text, card=card, overwrite=overwrite, **gathered.manifest,
-    )  # fmt: skip
+    return gathered.write(bundle, MODEL, config, states=states, text=text, card=card, overwrite=overwrite)
 
 
 def unpack(bundle: Bundle, run: Path) -> HGM3Config:

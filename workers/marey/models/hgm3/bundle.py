@@ -6,21 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from torch import nn
 
 from marey.bundles import Bundle, TextSpec
-from marey.core.errors import InvalidBundle
 from marey.models.hgm3.config import HGM3Config, named_config
 from marey.models.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
 from marey.models.hgm3.tokenizer import Tokenizer
-from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.bundling import NetworkParts, parameters_of, random_parts, standing, write_generator
 from marey.nn.motion_tokenizer import biased_std
 
 MODEL = "hgm3"
 
 
 @dataclass(frozen=True)
-class Networks:
+class Networks(NetworkParts):
     """All networks of a bundle."""
 
     tokenizer: Tokenizer
@@ -40,10 +38,6 @@ class Networks:
             LengthEstimator(config),
         )
 
-    def parts(self) -> dict[str, nn.Module]:
-        """Return the networks by part name."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
     """Build and fill the networks of a bundle, float32, in evaluation mode.
@@ -51,14 +45,9 @@ def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
     Raises:
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
-    if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
-    config = HGM3Config.from_dict(bundle.manifest.parameters)
+    config = HGM3Config.from_dict(parameters_of(bundle, MODEL))
     networks = Networks.build(config)
-    for name, network in networks.parts().items():
-        fill(network, bundle, name)
-    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
-    networks.tokenizer.set_statistics(mean, std)
+    networks.fill(bundle)
     networks.residual.set_codebooks(networks.tokenizer.quantizer.codebooks)
     return config, networks
 

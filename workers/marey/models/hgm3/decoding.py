@@ -6,12 +6,12 @@ multiple of 8 tokens) and both branches of guidance; each sequence has its reada
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from marey.generation.groups import GroupItems, KeepRows
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from marey.models.hgm3.config import InferenceConfig
 from marey.models.hgm3.model import MaskedTransformer, ResidualTransformer, SeparateTransformers
@@ -22,9 +22,6 @@ from marey.nn.sampling import sample_top_k, uniform
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
 """Streams of random numbers; see `marey.nn.sampling.uniform`."""
-
-KeepRows = Callable[[], Tensor | None]
-"""Called after each pass: bool (B,) rows to go on with, or None for all."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class DecodeOptions:
 
 
 @dataclass(frozen=True)
-class Items:
+class Items(GroupItems):
     """The items of one bucket."""
 
     lengths: Tensor  # (B,) own tokens n
@@ -49,11 +46,6 @@ class Items:
     tokens: Tensor  # (B, n_bucket, V) int64, NO_TOKEN where not decoded
     kept: Tensor  # (B, n_bucket) bool: tokens that stay as they are, at all levels
     decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
-
-    def select(self, rows: Tensor) -> Items:
-        """Return the items at `rows`."""
-        fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
-        return Items(**fields)
 
 
 def condition_level(step: int, config: InferenceConfig) -> int:

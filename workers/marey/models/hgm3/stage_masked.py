@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -58,8 +58,7 @@ class MaskedSample:
 
     def at_level(self, level: int) -> MaskedSample:
         """Return the same samples, noise and τ under another condition."""
-        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return MaskedSample(**{**fields, "level": torch.full_like(self.level, level)})
+        return replace(self, level=torch.full_like(self.level, level))
 
 
 class MaskedModule(nn.Module):

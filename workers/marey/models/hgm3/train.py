@@ -43,7 +43,7 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     texts = CaptionTexts.load(data.prepared)
     check_texts(texts, options.config)
     captions = CaptionData.of(texts, data.prepared.caption_counts, options.config.condition, device)
-    tokenizer = load_tokenizer(options, data)
+    tokenizer = RECIPE.trained("tokenizer", Tokenizer(options.config).to(device), options)
     tokens = load_tokens(options.run, tokenizer, data)
     codebooks = tokenizer.quantizer.codebooks
     torch.manual_seed(options.seed)
@@ -70,16 +70,3 @@ def _train_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> dic
     metrics = RECIPE.train(stage, options) | stage.test()
     finish(stage.module, options, stage.name, metrics, data.prepared.sha256)
     return metrics
-
-
-def load_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> Tokenizer:
-    """Load the run's trained tokenizer, with the statistics of the data it was trained on.
-
-    Raises:
-        NotFound: not trained yet.
-        InvalidInput: trained with another configuration.
-    """
-    part = RECIPE.part("tokenizer", options.config, options.run)
-    tokenizer = Tokenizer(options.config).to(data.features.device)
-    tokenizer.load_state_dict(part.state)
-    return tokenizer.eval().requires_grad_(False)

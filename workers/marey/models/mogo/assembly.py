@@ -7,7 +7,6 @@ from pathlib import Path
 from marey.bundles import Bundle
 from marey.models.mogo.bundle import MODEL, load_networks
 from marey.models.mogo.config import MOGOConfig
-from marey.nn.bundling import write_generator
 from marey.training.assembly import gather, scatter
 from marey.training.staging import TrainingRecipe
 
@@ -31,13 +30,8 @@ def assemble(
         InvalidInput: parts of different configurations.
     """
     gathered = gather(prepared, run, RECIPE, config)
-    states = {name: dict(part.state) for name, part in gathered.parts.items()}
-    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
     text = gathered.text.model_copy(update={"split_actions": config.split_actions})
-    return write_generator(
-        bundle, MODEL, config, states, statistics,
-        text=text, card=card, overwrite=overwrite, **gathered.manifest,
-    )  # fmt: skip
+    return gathered.write(bundle, MODEL, config, text=text, card=card, overwrite=overwrite)
 
 
 def unpack(bundle: Bundle, run: Path) -> MOGOConfig:
@@ -50,7 +44,6 @@ def unpack(bundle: Bundle, run: Path) -> MOGOConfig:
         InvalidInput: the run has parts already.
         InvalidBundle: of another model, or damaged.
     """
-    config, tokenizer, transformer = load_networks(bundle)
-    states = {"tokenizer": tokenizer.state_dict(), "transformer": transformer.state_dict()}
-    scatter(bundle, run, RECIPE, states, config)
+    config, networks = load_networks(bundle)
+    scatter(bundle, run, RECIPE, networks.states(), config)
     return config

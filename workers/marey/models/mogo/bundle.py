@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
 from marey.bundles import Bundle, TextSpec
-from marey.core.errors import InvalidBundle
 from marey.models.mogo.config import MOGOConfig, named_config
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.tokenizer import Tokenizer
-from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.bundling import NetworkParts, parameters_of, random_parts, standing, write_generator
 
 MODEL = "mogo"
 
 
-def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Tokenizer, RQHCTransformer]:
+@dataclass(frozen=True)
+class Networks(NetworkParts):
+    """All networks of a bundle."""
+
+    tokenizer: Tokenizer
+    transformer: RQHCTransformer
+
+    @classmethod
+    def build(cls, config: MOGOConfig) -> Networks:
+        """Build freshly initialised networks."""
+        return cls(Tokenizer(config), RQHCTransformer(config))
+
+
+def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Networks]:
     """Build and fill the networks of a bundle, float32, in evaluation mode.
 
     Raises:
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
-    if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
-    config = MOGOConfig.from_dict(bundle.manifest.parameters)
-    tokenizer, transformer = Tokenizer(config), RQHCTransformer(config)
-    fill(tokenizer, bundle, "tokenizer")
-    fill(transformer, bundle, "transformer")
-    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
-    tokenizer.set_statistics(mean, std)
-    return config, tokenizer, transformer
+    config = MOGOConfig.from_dict(parameters_of(bundle, MODEL))
+    networks = Networks.build(config)
+    networks.fill(bundle)
+    return config, networks
 
 
 def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int = 0) -> Bundle:
@@ -40,9 +46,7 @@ def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config
-    parts = random_parts(
-        lambda: {"tokenizer": Tokenizer(config), "transformer": RQHCTransformer(config)}, ("transformer",), seed
-    )
+    parts = random_parts(lambda: Networks.build(config).parts(), ("transformer",), seed)
     width = config.condition.text_width
     text = TextSpec(
         encoder="minilm" if width == 384 else "clip-vit-l14", width=width, split_actions=config.split_actions

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import torch
@@ -13,15 +14,13 @@ from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
 from marey.generation.base import SampledGenerator, Sampling
-from marey.generation.port import GenerationControl, Limits, NoControl, Request, open_bundle
-from marey.models.mogo.bundle import load_networks
+from marey.generation.port import GenerationControl, Limits, NoControl, Request
+from marey.models.mogo.bundle import Networks, load_networks
 from marey.models.mogo.config import InferenceConfig, MOGOConfig
-from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel, sessions_of_product
 from marey.models.mogo.spec import SPEC
 from marey.models.mogo.state import NEVER
 from marey.models.mogo.streaming import StreamBatch
-from marey.models.mogo.tokenizer import Tokenizer
 from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
 
@@ -60,14 +59,13 @@ class Generator(SampledGenerator[SamplingSettings]):
         self,
         bundle: Bundle,
         config: MOGOConfig,
-        tokenizer: Tokenizer,
-        transformer: RQHCTransformer,
+        networks: Networks,
         dtype: torch.dtype,
     ) -> None:
         """Create a generator from its parts; most callers use `load`."""
         self.bundle, self.config, self.inference = bundle, config, config.inference
-        self.tokenizer, self.transformer = tokenizer, transformer
-        self.device, self.dtype = transformer.head.weight.device, dtype
+        self.tokenizer, self.transformer = networks.tokenizer, networks.transformer
+        self.device, self.dtype = self.transformer.head.weight.device, dtype
         self.layout: FeatureLayout = layout_of(bundle.manifest)
         self.limits = Limits(config.min_frames, config.longest, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
@@ -75,24 +73,10 @@ class Generator(SampledGenerator[SamplingSettings]):
         self._streams: tuple[InferenceConfig, StreamBatch] | None = None
 
     @classmethod
-    def load(
-        cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
-    ) -> Generator:
-        """Load a bundle.
-
-        Args:
-            bundle: a verified bundle, or its name or path.
-            device: `auto`, `cpu`, `cuda`, `cuda:N`.
-            threads: of torch; 0 = torch's default.
-            dtype: of the matrices on a CPU; None = bfloat16 where that is fast, else float32.
-
-        Raises:
-            InvalidBundle: not MOGO, or damaged.
-            InvalidInput: unknown device.
-        """
-        verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
-        config, tokenizer, transformer = load_networks(verified)
-        return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
+    def _of(cls, bundle: Bundle, device: torch.device, dtype: torch.dtype) -> Self:
+        config, networks = load_networks(bundle)
+        networks.to(device)
+        return cls(bundle, config, networks, dtype)
 
     def packed(self, sessions: int = MAX_SESSIONS) -> PackedModel:
         """Return the packed model for up to `sessions` motions in parallel, built once per shape; its products have the

@@ -67,9 +67,8 @@ def transformer_stage(
     """
     data = _data(options)
     device = data.features.device
-    tokenizer = Tokenizer(options.config).to(device)
-    tokenizer.load_state_dict(RECIPE.part("tokenizer", options.config, options.run).state)
-    tokens = load_tokens(options.run, tokenizer.eval().requires_grad_(False), data)
+    tokenizer = RECIPE.trained("tokenizer", Tokenizer(options.config).to(device), options)
+    tokens = load_tokens(options.run, tokenizer, data)
     texts, width = CaptionTexts.load(data.prepared), options.config.condition.text_width
     captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
     torch.manual_seed(options.seed)
@@ -96,7 +95,6 @@ def _steers(
     clips, weights = pairs.train[single].tolist(), pairs.weights[single].tolist()
     rollouts = None
     if options.warm and options.config.rollouts:
-        model = RQHCTransformer(options.config).to(data.features.device)
-        model.load_state_dict(RECIPE.part("transformer", options.config, options.run).state)
+        model = RECIPE.trained("transformer", RQHCTransformer(options.config).to(data.features.device), options)
         rollouts = Rollouts(model, tokenizer, captions)
     return load_steers(options.run, options.config, tokenizer, data, clips, weights, rollouts)

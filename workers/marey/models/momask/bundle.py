@@ -8,23 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
 from marey.bundles import Bundle, TextSpec
-from marey.core.errors import InvalidBundle
 from marey.models.momask.config import MoMaskConfig, named_config
 from marey.models.momask.model import LengthEstimator, MaskedTransformer, ResidualTransformer
 from marey.models.momask.tokenizer import Tokenizer
-from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.bundling import NetworkParts, parameters_of, random_parts, standing, write_generator
 from marey.text.keys import NO_LABELLER
 
 MODEL = "momask"
 
 
 @dataclass(frozen=True)
-class Networks:
+class Networks(NetworkParts):
     """All networks of a bundle."""
 
     tokenizer: Tokenizer
@@ -36,10 +34,6 @@ class Networks:
     def build(cls, config: MoMaskConfig) -> Networks:
         """Build freshly initialised networks."""
         return cls(Tokenizer(config), MaskedTransformer(config), ResidualTransformer(config), LengthEstimator(config))
-
-    def parts(self) -> dict[str, nn.Module]:
-        """Return the networks by part name."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 def write_bundle(
@@ -70,14 +64,9 @@ def load_networks(bundle: Bundle) -> tuple[MoMaskConfig, Networks]:
     Raises:
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
-    if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
-    config = MoMaskConfig.from_dict(bundle.manifest.parameters)
+    config = MoMaskConfig.from_dict(parameters_of(bundle, MODEL))
     networks = Networks.build(config)
-    for name, network in networks.parts().items():
-        fill(network, bundle, name)
-    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
-    networks.tokenizer.set_statistics(mean, std)
+    networks.fill(bundle)
     return config, networks
 
 

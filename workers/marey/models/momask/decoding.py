@@ -8,12 +8,13 @@ law as the public Gumbel and categorical draws.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from marey.generation.groups import GroupItems, KeepRows
 from marey.models.momask.config import InferenceConfig
 from marey.models.momask.model import MaskedTransformer, ResidualTransformer, SentenceProjection
 from marey.nn.convolution import frame_mask
@@ -24,12 +25,9 @@ from marey.nn.sampling import sample_top_k, uniform
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
 """Streams of random numbers; see `marey.nn.sampling.uniform`."""
 
-KeepRows = Callable[[], Tensor | None]
-"""Called after each pass: bool (B,) rows to go on with, or None for all."""
-
 
 @dataclass(frozen=True)
-class Items:
+class Items(GroupItems):
     """The items of one bucket."""
 
     lengths: Tensor  # (B,) own tokens n
@@ -37,11 +35,6 @@ class Items:
     masked_sentence: Tensor  # (B, w) condition of the masked transformer
     residual_sentence: Tensor  # (B, w') condition of the residual transformer
     tokens: Tensor  # (B, n_bucket, V) int64, NO_TOKEN where not decoded
-
-    def select(self, rows: Tensor) -> Items:
-        """Return the items at `rows`."""
-        fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
-        return Items(**fields)
 
 
 def masked_counts(lengths: Sequence[int], steps: int) -> Tensor:

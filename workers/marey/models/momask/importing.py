@@ -81,11 +81,10 @@ def import_momask(request: ImportRequest) -> Bundle:
     names.length_names(config).fill(networks.length, download.checkpoint(folder.length).section("estimator"))
     statistics = download.statistics(folder.tokenizer.parent.parent / "meta", config.features)
     accounts = download.finish()
-    parts = {name: network.state_dict() for name, network in networks.parts().items()}
     with text_encoder_of(request, "clip-vit-b32") as text:
         card = make_card(request, accounts, about=ABOUT[config.name], normalisation=NORMALISATION, text=text)
         return write_bundle(
-            request.output, config, parts, statistics, text=text, card=card, overwrite=request.overwrite,
+            request.output, config, networks.states(), statistics, text=text, card=card, overwrite=request.overwrite,
             licence=request.licence, training=provenance(request, accounts),
             data=(DataSource(**DATA[config.name], licence=request.licence),),
         )  # fmt: skip

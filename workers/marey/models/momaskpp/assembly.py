@@ -7,7 +7,6 @@ from pathlib import Path
 from marey.bundles import Bundle
 from marey.models.momaskpp.bundle import MODEL, load_networks
 from marey.models.momaskpp.config import MoMaskPPConfig
-from marey.nn.bundling import write_generator
 from marey.training.assembly import gather, scatter
 from marey.training.staging import TrainingRecipe
 
@@ -53,12 +52,7 @@ def assemble(
         InvalidInput: parts of different configurations.
     """
     gathered = gather(prepared, run, recipe_of(config), config)
-    states = {name: dict(part.state) for name, part in gathered.parts.items()}
-    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
-    return write_generator(
-        bundle, MODEL, config, states, statistics, text=gathered.text, card=card, overwrite=overwrite,
-        **gathered.manifest,
-    )  # fmt: skip
+    return gathered.write(bundle, MODEL, config, card=card, overwrite=overwrite)
 
 
 def unpack(bundle: Bundle, run: Path) -> MoMaskPPConfig:
@@ -72,6 +66,5 @@ def unpack(bundle: Bundle, run: Path) -> MoMaskPPConfig:
         InvalidBundle: of another model, or damaged.
     """
     config, networks = load_networks(bundle)
-    states = {name: network.state_dict() for name, network in networks.parts().items()}
-    scatter(bundle, run, recipe_of(config), states, config)
+    scatter(bundle, run, recipe_of(config), networks.states(), config)
     return config

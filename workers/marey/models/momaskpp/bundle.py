@@ -6,21 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from torch import nn
 
 from marey.bundles import Bundle, TextSpec
-from marey.core.errors import InvalidBundle
 from marey.models.momaskpp.config import MoMaskPPConfig, named_config
 from marey.models.momaskpp.model import LengthHead, RootRefiner, ScaleTransformer
 from marey.models.momaskpp.tokenizer import Tokenizer
-from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.bundling import NetworkParts, parameters_of, random_parts, standing, write_generator
 from marey.nn.motion_tokenizer import biased_std
 
 MODEL = "momaskpp"
 
 
 @dataclass(frozen=True)
-class ScaleNetworks:
+class ScaleNetworks(NetworkParts):
     """All networks of a bundle."""
 
     tokenizer: Tokenizer
@@ -38,11 +36,6 @@ class ScaleNetworks:
             LengthHead(config) if config.has_length else None,
         )
 
-    def parts(self) -> dict[str, nn.Module]:
-        """Return the networks by part name."""
-        found = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {name: network for name, network in found.items() if network is not None}
-
 
 def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, ScaleNetworks]:
     """Build and fill the networks of a bundle, float32, in evaluation mode.
@@ -50,14 +43,9 @@ def load_networks(bundle: Bundle) -> tuple[MoMaskPPConfig, ScaleNetworks]:
     Raises:
         InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
-    if bundle.manifest.model != MODEL:
-        raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {MODEL}", where=str(bundle.path))
-    config = MoMaskPPConfig.from_dict(bundle.manifest.parameters)
+    config = MoMaskPPConfig.from_dict(parameters_of(bundle, MODEL))
     networks = ScaleNetworks.build(config)
-    for name, network in networks.parts().items():
-        fill(network, bundle, name)
-    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
-    networks.tokenizer.set_statistics(mean, std)
+    networks.fill(bundle)
     return config, networks
 
 

@@ -7,12 +7,12 @@ with the same positions, and both branches of guidance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from marey.generation.groups import GroupItems, KeepRows, to_bucket
 from marey.models.momaskpp.config import InferenceConfig
 from marey.models.momaskpp.model import ScaleTransformer
 from marey.models.momaskpp.scales import Scales
@@ -22,12 +22,9 @@ from marey.nn.sampling import sample_top_k, uniform
 TOKEN_STREAM, LENGTH_STREAM = 1, 2
 """Streams of random numbers; see `marey.nn.sampling.uniform`."""
 
-KeepRows = Callable[[], Tensor | None]
-"""Called after each pass: bool (B,) rows to go on with, or None for all."""
-
 
 @dataclass(frozen=True)
-class ScaleItems:
+class ScaleItems(GroupItems):
     """The items of one bucket, at S of the N positions."""
 
     lengths: Tensor  # (B,) own tokens n of the full scale
@@ -37,10 +34,6 @@ class ScaleItems:
     present: Tensor  # (B, L) bool
     tokens: Tensor  # (B, N) int64, NO_TOKEN where not decoded
     kept: Tensor  # (B, N) bool: tokens that stay as they are
-
-    def select(self, rows: Tensor) -> ScaleItems:
-        """Return the items at `rows`."""
-        return ScaleItems(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
 
 def remaining_counts(total: int, steps: int) -> list[int]:
@@ -92,17 +85,8 @@ def bucket_positions(scales: Scales, bucket: int) -> Tensor:
     return scales.valid(torch.tensor([bucket]))[0].nonzero().squeeze(1)
 
 
-def bucket_of(length: int, size: int, longest: int) -> int:
-    """Return a length in tokens rounded up to a multiple of `size`, at most the longest clip's."""
-    return min(-(-length // size) * size, longest)
-
-
-BUCKET = 8
-"""Tokens of the full scale; an item is padded to a multiple of this, not to the longest of its batch."""
-
-
 def _positions(items: ScaleItems, scales: Scales) -> Tensor:
-    longest = bucket_of(int(items.lengths.max()), BUCKET, scales.longest)
+    longest = min(to_bucket(int(items.lengths.max())), scales.longest)
     return bucket_positions(scales, longest).to(items.tokens.device)
 
 

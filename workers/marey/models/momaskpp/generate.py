@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import torch
@@ -12,13 +13,13 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.base import GroupedGenerator, Sampling
+from marey.generation.base import Draw, GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import bridged, whole_tokens
-from marey.generation.port import GenerationControl, Limits, Request, open_bundle
+from marey.generation.port import Limits, Request
 from marey.models.momaskpp.bundle import ScaleNetworks, load_networks
 from marey.models.momaskpp.config import InferenceConfig, MoMaskPPConfig
-from marey.models.momaskpp.decoding import BUCKET, LENGTH_STREAM, ScaleItems, bucket_of, decode
+from marey.models.momaskpp.decoding import LENGTH_STREAM, ScaleItems, decode
 from marey.models.momaskpp.model import ROOT_VELOCITY, RootRefiner, inputs_of
 from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.words import WordReader, pad_states
@@ -64,17 +65,16 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
         limits = Limits(
             config.min_frames, config.max_frames, config.fps, config.text.width, keeps=config.tokenizer.frames_per_token
         )
-        super().__init__(bundle, limits, config.inference, device, torch.float32, batch_threads)
+        super().__init__(bundle, limits, config.inference, networks.tokenizer, device, torch.float32, batch_threads)
         self.config = config
         self.networks = networks
-        self.tokenizer = networks.tokenizer
         self.reader = reader
         self.scales = networks.tokenizer.scales
 
     @classmethod
     def load(
         cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
-    ) -> Generator:
+    ) -> Self:
         """Load a bundle, and the text encoder that it names: words are encoded here (docs/decisions/0026).
 
         Args:
@@ -84,45 +84,29 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
             dtype: float32 alone: published weights are compared in it.
 
         Raises:
-            InvalidBundle: not MoMask++, damaged, or made with another text encoder than is installed.
+            InvalidBundle: of another model, damaged, or made with another text encoder than is installed.
             InvalidInput: unknown device, or another dtype.
             NotFound: the encoder is not installed.
         """
         if dtype not in (None, torch.float32):
             raise InvalidInput(f"runs in float32, not {dtype}", where="dtype")
-        verified, chosen, _ = open_bundle(bundle, device, threads, torch.float32)
-        config, networks = load_networks(verified)
-        spec = verified.manifest.text
+        return super().load(bundle, device=device, threads=threads, dtype=torch.float32)
+
+    @classmethod
+    def _of(cls, bundle: Bundle, device: torch.device, dtype: torch.dtype) -> Self:
+        config, networks = load_networks(bundle)
+        spec = bundle.manifest.text
         if spec is None:
-            raise InvalidBundle("names no text encoder", where=str(verified.path))
-        for part in networks.parts().values():
-            part.to(chosen)
-        batch_threads = BatchThreads(torch.get_num_threads() if chosen.type == "cpu" else 1)
+            raise InvalidBundle("names no text encoder", where=str(bundle.path))
+        networks.to(device)
+        batch_threads = BatchThreads.on(device)
         networks.masked.prepare_inference(batch_threads)
-        return cls(verified, config, networks, WordReader(spec, config.text.max_words), chosen, batch_threads)
+        return cls(bundle, config, networks, WordReader(spec, config.text.max_words), device, batch_threads)
 
-    @property
-    def frames_per_token(self) -> int:
-        """Return N/n, the frames of a token of the full scale."""
-        return self.config.tokenizer.frames_per_token
-
-    @torch.inference_mode()
-    def generate(
-        self,
-        requests: Sequence[Request],
-        settings: SamplingSettings | None = None,
-        *,
-        control: GenerationControl | None = None,
-    ) -> list[Generated | None]:
-        """Generate one motion per request; None where `control` dropped it.
-
-        The tokens of an item do not depend on the number or order of the others.
-
-        Raises:
-            InvalidInput: a length or seed out of range, or features of another encoder.
-        """
-        inference = (settings or SamplingSettings()).inference(self.config.inference)
-        frames = [self.frames(request) for request in requests]
+    def _drawing(
+        self, requests: Sequence[Request], frames: Sequence[int], settings: SamplingSettings
+    ) -> tuple[int, Draw[Generated]]:
+        inference = settings.inference(self.config.inference)
         words = self.reader.states([request.text.rewritten for request in requests])
 
         def draw(watcher: RowWatcher) -> list[Generated]:
@@ -131,7 +115,7 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
             items = decode(self.networks.masked, items, self.scales, inference, watcher.step)
             return [self._generated(items, position, frames[row]) for position, row in enumerate(watcher.rows)]
 
-        return self._in_groups(frames, inference.steps + 1, control, draw)
+        return inference.steps + 1, draw
 
     def _estimate(self, request: Request) -> int:
         """Return frames drawn by the length estimator, or, where the bundle has none, one of its `open_frames`."""
@@ -141,12 +125,12 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
             choices = self.config.open_frames
             return choices[min(int(draw * len(choices)), len(choices) - 1)]
         # From the middle third of the estimated distribution (ours): seeds differ, without extremes.
-        sentence = torch.from_numpy(request.text.sentence[None].astype(np.float32)).to(self.device)
-        tokens = draw_class(self.networks.length(sentence), request.seed, LENGTH_STREAM, middle=True) + 1
+        logits = self.networks.length(self._sentence(request))
+        tokens = draw_class(logits, request.seed, LENGTH_STREAM, middle=True) + 1
         return self.limits.within(tokens * self.frames_per_token)
 
     def _bucket(self, frames: int) -> int:
-        return bucket_of(self._tokens(frames), BUCKET, self.scales.longest)
+        return min(super()._bucket(frames), self.scales.longest)
 
     def _items(
         self, requests: Sequence[Request], frames: Sequence[int], words: Sequence[NDArray[np.float32]]

@@ -98,7 +98,7 @@ def import_momaskpp(request: ImportRequest, sets: Sequence[PublishedSet] = SETS)
             request.output,
             MODEL,
             config,
-            {name: network.state_dict() for name, network in networks.parts().items()},
+            networks.states(),
             statistics,
             text=text,
             card=make_card(request, accounts, about=ABOUT, normalisation=published.normalisation, text=text),

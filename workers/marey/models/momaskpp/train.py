@@ -52,22 +52,11 @@ def _stage(name: str, options: TrainOptions[MoMaskPPConfig], data: MotionData) -
         return ScaleTokenizerStage(config, data, Tokenizer(config))
     if name == "refiner":
         return RefinerStage(config, data)
-    tokens = load_scale_tokens(options.run, load_tokenizer(options, data), data)
-    words = WordData.load(data.prepared, config.text, data.features.device)
+    device = data.features.device
+    tokenizer = recipe_of(config).trained("tokenizer", Tokenizer(config).to(device), options)
+    tokens = load_scale_tokens(options.run, tokenizer, data)
+    words = WordData.load(data.prepared, config.text, device)
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
     kind = ScaleStage if name == "masked" else length_stage
     return kind(config, clips, tokens, words)
-
-
-def load_tokenizer(options: TrainOptions[MoMaskPPConfig], data: MotionData) -> Tokenizer:
-    """Load the run's trained tokenizer, with the statistics of the data it was trained on.
-
-    Raises:
-        NotFound: not trained yet.
-        InvalidInput: trained with another configuration.
-    """
-    part = recipe_of(options.config).part("tokenizer", options.config, options.run)
-    tokenizer = Tokenizer(options.config).to(data.features.device)
-    tokenizer.load_state_dict(part.state)
-    return tokenizer.eval().requires_grad_(False)
