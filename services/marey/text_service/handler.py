@@ -20,7 +20,7 @@ from marey.text.meaning import MeaningJudge
 from marey.text.pipeline import TextPipeline
 from marey.text.several import SeveralTexts, several_key
 from marey.vocabulary.report import refusal, says_known, with_length
-from marey.vocabulary.scope import ScopePolicy, match_scope, scope_of_prompts, scope_of_rows
+from marey.vocabulary.scope import ScopePolicy, scope_of_prompts, scope_of_rows
 
 BATCH = 64
 """Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""
@@ -92,9 +92,11 @@ class ScopeStage:
         bundle = self._bundle(item.bundle)
         lists = bundle.manifest.actions
         prompts = _examined(item)
-        if lists is None or all(match_scope(prompt, lists).left is None for _, prompt in prompts):
+        if lists is None:
             return None
         scopes = [self.judge.judge(prompt, lists) for _, prompt in prompts]
+        if all(scope.by == "words" for scope in scopes):
+            return None
         for (row, _), scope in zip(prompts, scopes, strict=True):
             if policy == "refuse" and (message := refusal(scope)) is not None:
                 hint = says_known(bundle.manifest.name, lists.known)

@@ -35,6 +35,8 @@ Left = Literal["noun", "verb"]
 VERSION = 1
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
+KEPT_READINGS = 1024
+"""Prompts whose words are kept as read: jobs, the text stage and manifests ask for the scope of the same ones."""
 _OFF_FEET = ("seat", "whole-body")
 """Supports from which the body rises by different actions."""
 _LEAST_SAID = 4
@@ -141,6 +143,29 @@ def scope_of_prompts(prompts: Sequence[Scope]) -> Scope:
     return prompts[0] if len(prompts) == 1 else scope_of_rows(prompts)
 
 
+@dataclass(frozen=True)
+class _Phrase:
+    """The words for one action, and what they may mean."""
+
+    text: str
+    meanings: tuple[Meaning, ...]
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What a prompt says, whatever a bundle supports.
+
+    Attributes:
+        phrases: that name its actions; none = it names none.
+        flags: see `Scope`.
+        left: what the words leave undecided, where a bundle knows the actions.
+    """
+
+    phrases: tuple[_Phrase, ...]
+    flags: tuple[Flag, ...]
+    left: Left | None
+
+
 class ScopeMatcher:
     """Matches prompts against a vocabulary."""
 
@@ -165,9 +190,17 @@ class ScopeMatcher:
         self._movements = Movements(lists, vocabulary)
         self._negations = Negations(lexicon, lists)
         self._flagger = Flagger(lexicon, lists, travels, handling)
+        self._read = lru_cache(maxsize=KEPT_READINGS)(self._read_words)
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
+        read = self._read(prompt)
+        if not read.phrases:
+            return Scope((_nothing(prompt),), read.flags, left=read.left)
+        scope = Scope(tuple(_unique(self._named(phrase, lists) for phrase in read.phrases)), read.flags)
+        return scope if scope.verdict == "unknown" else replace(scope, left=read.left)
+
+    def _read_words(self, prompt: str) -> _Reading:
         words = self._phrases.words(prompt)
         named = self._phrases.find(words)
         denied = self._denied(words, named)
@@ -181,13 +214,14 @@ class ScopeMatcher:
         foreign = self._flagger.foreign(words, found)
         if foreign is not None or not found:
             left = "verb" if foreign is None and self._may_act(words, denied) else None
-            return Scope((_nothing(prompt),), (*flags, foreign or "no-action"), left=left)
+            return _Reading((), (*flags, foreign or "no-action"), left)
         if self._flagger.has_other_script(words):
             flags.append("other-language")
-        named = tuple(_unique(self._named(words, match, lists) for match in self._in_context(found)))
-        scope = Scope(named, tuple(flags))
-        ambiguous = scope.verdict != "unknown" and self._phrases.may_be_things(words, found)
-        return replace(scope, left="noun") if ambiguous else scope
+        phrases = tuple(
+            _Phrase(" ".join(word.text for word in words[match.start : match.end]), match.meanings)
+            for match in self._in_context(found)
+        )
+        return _Reading(phrases, tuple(flags), "noun" if self._phrases.may_be_things(words, found) else None)
 
     def _may_act(self, words: list[Word], denied: Sequence[Span]) -> bool:
         """Return True if a person is named, and more than what is not done: not "he never sits down"."""
@@ -228,10 +262,9 @@ class ScopeMatcher:
         name = meaning.action
         return "" if name is None or name == "kneel" else self._vocabulary.actions[name].support
 
-    def _named(self, words: list[Word], match: Match, lists: ActionLists) -> NamedAction:
+    def _named(self, phrase: _Phrase, lists: ActionLists) -> NamedAction:
         """Return the best of a phrase's meanings."""
-        text = " ".join(word.text for word in words[match.start : match.end])
-        candidates = [self._judged(text, meaning, lists) for meaning in match.meanings]
+        candidates = [self._judged(phrase.text, meaning, lists) for meaning in phrase.meanings]
         return min(candidates, key=lambda named: _ORDER[named.verdict])
 
     def _judged(self, text: str, meaning: Meaning, lists: ActionLists) -> NamedAction:

@@ -149,8 +149,9 @@ def _check_complete(captures: CaptureSet, missing: Collection[str]) -> None:
 
 def _counted(passed_over: Counter[str]) -> str:
     """Say how many members were passed over, and of which kinds, the most frequent first."""
-    kinds = [f"{count:,} {kind}" for kind, count in passed_over.most_common(MOST_KINDS)]
-    if others := passed_over.total() - sum(count for _, count in passed_over.most_common(MOST_KINDS)):
+    frequent = passed_over.most_common(MOST_KINDS)
+    kinds = [f"{count:,} {kind}" for kind, count in frequent]
+    if others := passed_over.total() - sum(count for _, count in frequent):
         kinds.append(f"{others:,} others")
     return f"{passed_over.total():,} members that are not BVH files were passed over ({', '.join(kinds)})"
 
