@@ -153,7 +153,7 @@ class _Phrase:
 
 @dataclass(frozen=True)
 class _Reading:
-    """What a prompt says, whatever a bundle supports.
+    """The words of a prompt as they are read, whatever a bundle supports.
 
     Attributes:
         phrases: that name its actions; none = it names none.
