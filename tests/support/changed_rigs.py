@@ -14,9 +14,9 @@ from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import about, conjugate, from_rotvec, multiply, rotate, to_matrix
+from marey.motion.rotations import Z_TO_Y, about, conjugate, from_rotvec, multiply, rotate, to_matrix
 from marey.motion.skeleton import HUMANML3D
-from marey.motion.units import Z_TO_Y, Up
+from marey.motion.units import Up
 
 TRUNK = ("spine1", "spine2", "spine3")
 

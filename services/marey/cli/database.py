@@ -20,13 +20,11 @@ def settings_here() -> Settings:
     Raises:
         InvalidInput: the extra `server` is not installed.
     """
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.core.settings import settings
         from marey.embedded import postgres_url
-    except ImportError as error:
-        raise needs_extra("server", error) from error
     from pydantic import SecretStr
 
     config = settings()

@@ -11,8 +11,9 @@ import typer
 
 from marey.cli import console
 from marey.cli.hints import hint_of_timeout
-from marey.cli.options import ExtraColumns, settings_of
+from marey.cli.options import settings_of
 from marey.cli.references import FORMS, find
+from marey.client.tables import ExtraColumns
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed
 from marey.items.evaluation_prompts import PromptCheck
 from marey.items.problems import Problem
@@ -85,7 +86,7 @@ class EvaluationArguments:
     repeats: int | None
     seed: int | None
     baseline: str | None
-    extra_columns: ExtraColumns = ExtraColumns.REFUSE
+    extra_columns: ExtraColumns = "refuse"
 
     def options(self) -> EvaluationOptions:
         """Return the arguments of the client, with the prompts of a file, but without the baseline.
@@ -112,7 +113,7 @@ class EvaluationArguments:
     def _prompts(self) -> PromptSet:
         from marey.client.evaluation_requests import read_prompt_set
 
-        if self.extra_columns is ExtraColumns.TAG:
+        if self.extra_columns == "tag":
             raise InvalidInput("prompts of an evaluation have no tags", where="--extra-columns", hint="Choose ignore.")
         if self.split != "-" and not Path(self.split).suffix and not Path(self.split).exists():
             raise NotFound(
@@ -121,7 +122,7 @@ class EvaluationArguments:
                 hint=f"Splits are {', '.join(SPLITS)}; a file of prompts ends in .csv, .jsonl or .txt.",
             )
         check = _range_check(self.bundle)
-        return read_prompt_set(self.split, extra_columns=self.extra_columns.value, check=check)
+        return read_prompt_set(self.split, extra_columns=self.extra_columns, check=check)
 
 
 def _range_check(bundle: str) -> PromptCheck:

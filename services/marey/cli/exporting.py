@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Collection, Mapping
-from enum import Enum, StrEnum
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -12,49 +11,11 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli.signatures import replace_parameter
+from marey.motion import export_options
 from marey.motion.export_options import ExportOptions
 
-
-class BvhRootOption(StrEnum):
-    """The OFFSET of a BVH file's root."""
-
-    ZERO = "zero"
-    OFFSET = "offset"
-
-
-class InPlaceOption(StrEnum):
-    """Parts of a motion's way that are removed."""
-
-    TRAVEL = "travel"
-    HEADING = "heading"
-
-
-class RestPoseOption(StrEnum):
-    """Rest poses of a rig."""
-
-    T = "t"
-    A = "a"
-
-
-class PlacementOption(StrEnum):
-    """Places of a motion in a file."""
-
-    ORIGIN = "origin"
-    KEEP = "keep"
-
-
-class NamesOption(StrEnum):
-    """Spellings of joint names."""
-
-    MIXAMO = "mixamo"
-    UE5 = "ue5"
-    HUMANIK = "humanik"
-    SMPLX = "smplx"
-    VRM = "vrm"
-
-
 BvhRoot = Annotated[
-    BvhRootOption,
+    export_options.BvhRoot,
     typer.Option(
         "--bvh-root",
         help="OFFSET of the root in BVH files: zero, or offset = the pelvis height, for programs in which position "
@@ -66,7 +27,7 @@ RootBone = Annotated[
     typer.Option("--root-bone", help="Add a bone `root` on the floor with X, Z and heading; the pelvis has the rest."),
 ]
 InPlace = Annotated[
-    InPlaceOption | None,
+    export_options.InPlace | None,
     typer.Option(
         "--in-place", help="Remove the travel (X and Z), or with `heading` the turning too; default: neither."
     ),
@@ -75,13 +36,13 @@ TPoseFrame = Annotated[
     bool, typer.Option("--tpose-frame", help="Put the T-pose in frame 0; the motion begins in frame 1.")
 ]
 RestPose = Annotated[
-    RestPoseOption,
+    export_options.RestPose,
     typer.Option(
         "--rest-pose", help="Rest pose of BVH, FBX and USD files: T-pose, or the A-pose of a rig whose A-pose is known."
     ),
 ]
 Placement = Annotated[
-    PlacementOption,
+    export_options.Placement,
     typer.Option("--placement", help="Begin at the origin, or keep the place that the motion was cut from."),
 ]
 Mesh = Annotated[
@@ -105,7 +66,7 @@ RigMap = Annotated[
     ),
 ]
 JointNames = Annotated[
-    NamesOption | None,
+    export_options.Names | None,
     typer.Option(
         "--names",
         help="Rename the joints, and nothing else, for tools that retarget by name. A renamed clip put straight onto a "
@@ -143,12 +104,12 @@ ServerBody = Annotated[
     ),
 ]
 OPTIONS: Mapping[str, tuple[Any, object]] = {
-    "bvh_root": (BvhRoot, BvhRootOption.ZERO),
+    "bvh_root": (BvhRoot, "zero"),
     "root_bone": (RootBone, False),
     "in_place": (InPlace, None),
     "tpose_frame": (TPoseFrame, False),
-    "rest_pose": (RestPose, RestPoseOption.T),
-    "placement": (Placement, PlacementOption.ORIGIN),
+    "rest_pose": (RestPose, "t"),
+    "placement": (Placement, "origin"),
     "mesh": (Mesh, False),
     "rig": (Rig, None),
     "rig_map": (RigMap, None),
@@ -187,6 +148,4 @@ def with_export(
 
 
 def _plain(value: object) -> Any:
-    if isinstance(value, Enum):
-        return value.value
     return str(value) if isinstance(value, Path) else value

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from marey.client.names import DEFAULT_TEMPLATE
+from marey.client.rows import Format
+from marey.client.tables import ExtraColumns
 from marey.core.errors import InvalidInput, PluginError
 from marey.items.settings import MAX_BEST_OF, MAX_REDRAWS, OUTPUT_FPS, PLATFORM_SETTINGS, read_setting
 
@@ -42,38 +43,6 @@ def _allowed(setting: str) -> str:
     return f"Allowed: {ranges}." if ranges else "`marey models show NAME` lists the settings of a model."
 
 
-class InputFormat(StrEnum):
-    """Formats of files of prompts."""
-
-    CSV = "csv"
-    JSONL = "jsonl"
-    TXT = "txt"
-
-
-class ExtraColumns(StrEnum):
-    """The treatment of unknown columns of a CSV."""
-
-    REFUSE = "refuse"
-    TAG = "tag"
-    IGNORE = "ignore"
-
-
-class ScopeOption(StrEnum):
-    """Treatment of prompts with actions that the model does not know."""
-
-    WARN = "warn"
-    REFUSE = "refuse"
-    IGNORE = "ignore"
-
-
-class VarietyOption(StrEnum):
-    """Levels of how much motions of one prompt differ."""
-
-    LOW = "low"
-    NORMAL = "normal"
-    HIGH = "high"
-
-
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
 PromptFile = Annotated[
     str | None,
@@ -90,9 +59,7 @@ Timelines = Annotated[
         "repeated.",
     ),
 ]
-PromptFormat = Annotated[
-    InputFormat | None, typer.Option("--input-format", help="Format of -f; default: by its extension.")
-]
+PromptFormat = Annotated[Format | None, typer.Option("--input-format", help="Format of -f; default: by its extension.")]
 Extra = Annotated[
     ExtraColumns,
     typer.Option("--extra-columns", help="Unknown CSV columns: an error, a tag column=value of the row, or ignored."),
@@ -136,7 +103,7 @@ Redraws = Annotated[
     typer.Option("--redraws", help=f"Further rounds of candidates while none is good. 0 to {MAX_REDRAWS}, default 0."),
 ]
 Variety = Annotated[
-    VarietyOption | None,
+    Literal["low", "normal", "high"] | None,
     typer.Option("--variety", help="How much motions of one prompt differ; default: normal, as the bundle ships."),
 ]
 Sampling = Annotated[
@@ -149,7 +116,7 @@ Sampling = Annotated[
     ),
 ]
 Scope = Annotated[
-    ScopeOption,
+    Literal["warn", "refuse", "ignore"],
     typer.Option("--scope", help="Prompts that the model does not know: a warning, an error, or not examined."),
 ]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]

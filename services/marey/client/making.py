@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from marey.client.rigs import Rigs
 from marey.core.errors import Conflict, InvalidInput, NotFound
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.exporters import exporters
 from marey.exporters.exporter import EVERYWHERE
 from marey.exporters.making import FileRecipe
@@ -71,10 +71,8 @@ def check_body(export: ExportOptions) -> None:
                 argument="rig_map",
             )
     elif export.body is not None:
-        try:
+        with extra("motion"):
             from marey.motion.change_body import load_shape
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
         load_shape(export.body, export.rig_map)
     elif export.rig is not None:
         try:

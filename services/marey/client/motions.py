@@ -16,7 +16,7 @@ from marey.client.rigs import Rigs
 from marey.client.types.jobs import Job
 from marey.client.types.motions import Motion, MotionDetail, Reroll
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.exporters import extension_of
 from marey.motion.export_options import PLAIN, ExportOptions
 
@@ -226,10 +226,8 @@ class Motions(Resource):
             NotFound: the motion has no npz.
             InvalidInput: numpy is not installed.
         """
-        try:
+        with extra("motion"):
             from marey.motion.clip import load_npz
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
         with tempfile.TemporaryDirectory(prefix="marey-") as folder:
             try:
                 return load_npz(self.fetch(motion, Path(folder) / "motion.npz"))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from marey.client.frames import Frame
 from marey.client.types.streams import StreamDetail
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 
 if TYPE_CHECKING:
     from marey.motion.io.bvh_live import LiveBVH
@@ -87,8 +87,6 @@ def check_recording(path: Path, *, overwrite: bool) -> None:
             where=str(path),
             hint="Fetch the other formats from the stream's job after its end.",
         )
-    try:
+    with extra("motion"):
         from marey.motion.io.bvh_live import check_place
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     check_place(path, overwrite=overwrite)

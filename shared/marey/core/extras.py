@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
+
 from marey.core.errors import InvalidInput
 
 
@@ -25,3 +28,16 @@ class MissingExtra(InvalidInput):
 def needs_extra(extra: str, error: ImportError) -> MissingExtra:
     """Return the error for what the installed extras cannot run."""
     return MissingExtra(extra, error.name or str(error))
+
+
+@contextmanager
+def extra(name: str) -> Generator[None]:
+    """Import, in the block, what an extra installs.
+
+    Raises:
+        MissingExtra: something that is imported in the block is not installed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise needs_extra(name, error) from error

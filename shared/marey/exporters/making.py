@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.exporters.exporter import Coordinates
 from marey.exporters.registry import CANONICAL, exporter_of, exporters, version_of
 from marey.motion.export_options import PLAIN, ExportOptions
@@ -97,12 +97,10 @@ class FileRecipe:
             PluginError: the format is not installed.
         """
         exporter = exporter_of(self.format)
-        try:
+        with extra("motion"):
             import_module("numpy")
             if exporter.check is not None:
                 exporter.check(self.export)
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
 
     def make(self, npz: bytes, where: str, rig: bytes = b"") -> bytes:
         """Return the content of the file; equal arguments give equal bytes.
@@ -121,14 +119,12 @@ class FileRecipe:
         exporter = exporter_of(self.format)
         decode = exporters()[CANONICAL].decode
         assert decode is not None
-        try:
+        with extra("motion"):
             named = None if self.rig is None else self.rig.body(rig)
             clip = decode(npz, where, Coordinates())
             if self.fps is not None:
                 clip = _at_rate(clip, self.fps)
             return exporter.write(clip, Coordinates.of(self.export), named)
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
 
 
 def _at_rate(clip: Any, fps: float) -> Any:

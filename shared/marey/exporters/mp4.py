@@ -30,12 +30,10 @@ def check(options: ExportOptions) -> None:
     Raises:
         MissingExtra: it is not.
     """
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("video"):
         import_module("av")
-    except ImportError as error:
-        raise needs_extra("video", error) from error
 
 
 EXPORTER: Exporter[MotionClip] = Exporter(

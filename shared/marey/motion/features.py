@@ -28,7 +28,7 @@ from marey.core.errors import InvalidInput, NotFound
 from marey.motion.filters import smooth
 from marey.motion.kinematics import across, facing, mirror_joints
 from marey.motion.mirrored_features import mirror_features
-from marey.motion.rig_features import SNAPMOGEN_296
+from marey.motion.rig_features import SNAPMOGEN_296, columns
 from marey.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
 from marey.motion.skeleton import HUMANML3D, KIT, Skeleton
 
@@ -157,17 +157,7 @@ class HeadingLayout:
     def slices(self) -> Mapping[str, slice]:
         """yaw, velocity, height, positions, rotations, velocities, contacts."""
         joints = len(self.skeleton)
-        sizes = {
-            "yaw": 1,
-            "velocity": 2,
-            "height": 1,
-            "positions": 3 * (joints - 1),
-            "rotations": 6 * (joints - 1),
-            "velocities": 3 * joints,
-            "contacts": 4,
-        }
-        ends = np.cumsum(list(sizes.values())).tolist()
-        return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        return columns(positions=3 * (joints - 1), rotations=6 * (joints - 1), velocities=3 * joints)
 
     def with_facing(
         self,

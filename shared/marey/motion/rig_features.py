@@ -50,6 +50,13 @@ FLOOR_SHARE = 0.1
 """Share of the heights of all foot joints, the lowest ones, whose mean is the floor."""
 
 
+def columns(**joints: int) -> dict[str, slice]:
+    """Return the columns of a frame: those of the root, numbers of each kind for the joints, and the four contacts."""
+    sizes = {"yaw": 1, "velocity": 2, "height": 1, **joints, "contacts": 4}
+    ends = np.cumsum(list(sizes.values())).tolist()
+    return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+
 @dataclass(frozen=True, eq=False)
 class RigLayout:
     """A layout with the rotations of a rig: 4 + 12 J + 4 numbers a frame.
@@ -82,17 +89,7 @@ class RigLayout:
     def slices(self) -> Mapping[str, slice]:
         """yaw, velocity, height, rotations, positions, velocities, contacts."""
         joints = len(self.skeleton)
-        sizes = {
-            "yaw": 1,
-            "velocity": 2,
-            "height": 1,
-            "rotations": 6 * joints,
-            "positions": 3 * joints,
-            "velocities": 3 * joints,
-            "contacts": 4,
-        }
-        ends = np.cumsum(list(sizes.values())).tolist()
-        return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        return columns(rotations=6 * joints, positions=3 * joints, velocities=3 * joints)
 
     def with_offsets(self, offsets: Array) -> RigLayout:
         """Return the same layout of a body with other offsets (J, 3), metres; features stay as they are."""

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.floating[Any]]
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+Z_TO_Y = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
+"""From Z up to Y up: a quarter turn about X."""
 AXES = "XYZ"
 _TINY = 1e-12
 _YZX = np.array([1, 2, 0])

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 Unit = Literal["m", "cm", "mm", "in", "ft"]
 Up = Literal["y", "z"]
-# Z up to Y up: a quarter turn about X
-Z_TO_Y = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])

@@ -22,7 +22,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.files import write_atomically
 from marey.viz.pages import asset, whole_page
 from marey.viz.paper import Colour, Paper, Theme, blend, one_line, theme_named
-from marey.viz.render import CELL, COLUMNS, check_png, draw_row, save_png, stack_rows
+from marey.viz.render import CELL, COLUMNS, draw_row, save_png, stack_rows
 from marey.viz.strip import chosen_frames
 
 HARD: Colour = (158, 38, 24)
@@ -49,7 +49,7 @@ def normalized(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return (values - low) / spread if spread > 0 else np.zeros_like(values)
 
 
-def difficulty_sheet(
+def draw_difficulty(
     clips: Sequence[MotionClip],
     difficulties: Sequence[TokenDifficulty],
     path: Path,
@@ -59,48 +59,26 @@ def difficulty_sheet(
     title: str | None = None,
     theme: str = "light",
 ) -> Path:
-    """Draw clips as strips of poses with the difficulty of their tokens below, into a PNG.
+    """Draw clips as strips of poses with the difficulty of their tokens below, into a PNG, or into a page where each
+    token shows its time and difficulty under the pointer.
 
     Raises:
-        InvalidInput: nothing to draw, an unknown theme, or a path that is not a writable PNG.
+        InvalidInput: nothing to draw, an unknown theme, or a path that is not a writable PNG or HTML file.
     """
-    check_png(path)
-    paper = theme_named(theme)
-    rows = [
-        _row(clip, difficulty, caption, columns, paper)
-        for clip, difficulty, caption in zip(clips, difficulties, captions, strict=True)
-    ]
-    if not rows:
-        raise InvalidInput("no clip to draw", hint="Give at least one.")
-    return save_png(stack_rows(rows, title, theme=paper), path)
-
-
-def difficulty_page(
-    clips: Sequence[MotionClip],
-    difficulties: Sequence[TokenDifficulty],
-    path: Path,
-    *,
-    captions: Sequence[str],
-    columns: int = COLUMNS,
-    title: str | None = None,
-    theme: str = "light",
-) -> Path:
-    """Write a page with the same rows, where each token shows its time and difficulty under the pointer.
-
-    Raises:
-        InvalidInput: nothing to draw, an unknown theme, or a path that is not a writable HTML file.
-    """
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InvalidInput(f"a page is an .html, not {path.suffix or 'a name without ending'}", where=str(path))
+    ending = path.suffix.lower()
+    if ending not in (".png", ".html", ".htm"):
+        raise InvalidInput(
+            f"difficulty is drawn into a .png or .html, not {ending or 'a name without ending'}", where=str(path)
+        )
     if not clips:
         raise InvalidInput("no clip to draw", hint="Give at least one.")
     paper = theme_named(theme)
-    sections = [
-        _section(clip, difficulty, caption, columns, paper)
-        for clip, difficulty, caption in zip(clips, difficulties, captions, strict=True)
-    ]
+    motions = list(zip(clips, difficulties, captions, strict=True))
+    if ending == ".png":
+        return save_png(stack_rows([_row(*each, columns, paper) for each in motions], title, theme=paper), path)
     head = one_line(title or captions[0]) or "Marey"
-    body = f"<body>\n<h1>{_text(head)}</h1>\n<p>{LABEL}</p>\n{''.join(sections)}</body>\n"
+    sections = "".join(_section(*each, columns, paper) for each in motions)
+    body = f"<body>\n<h1>{_text(head)}</h1>\n<p>{LABEL}</p>\n{sections}</body>\n"
     page = whole_page(body, title=head, styles=[asset("difficulty.css")], theme=theme)
     write_atomically(path, page.encode())
     return path

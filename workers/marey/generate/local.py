@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.generate.oneshot import OneShot, Wanted
 from marey.items.item import Item, read_items
 from marey.items.problems import Problem
@@ -185,12 +185,10 @@ def load(
         NotFound, InvalidBundle: the bundle is unknown, damaged, or not a generator.
         NotFound, InvalidInput, InvalidFile: the file of the body is missing, or no human body.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.body import read_body_for
         from marey.core.settings import settings
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     changes = {"device": device, "threads": threads}
     config = settings().model_copy(update={name: value for name, value in changes.items() if value is not None})
     found = choose_bundle(os.fspath(bundle), config=config)

@@ -10,7 +10,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.items.timeline import prompts_with_rows
 from marey.registry import get_model, resolve
 from marey.vocabulary.scope import ActionLists, Scope, match_scope, scope_of_rows
@@ -50,15 +50,13 @@ class OneShot:
             InvalidInput: the extra `worker` is not installed, or the device is unknown.
             NotFound, InvalidBundle: weights are missing or damaged.
         """
-        try:
+        with extra("worker"):
             from marey.bundles.scope import judges_meaning
             from marey.text.keys import as_served
             from marey.text.meaning import MeaningJudge
             from marey.text.pipeline import TextPipeline
 
             load = resolve(get_model(bundle.manifest.model, where=str(bundle.path)).load)
-        except ImportError as error:
-            raise needs_extra("worker", error) from error
         if bundle.manifest.text is None:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 from marey.api.making.messages import read_message, write_message
 from marey.core.characters import check_text
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
-from marey.core.extras import MissingExtra, needs_extra
+from marey.core.extras import MissingExtra, extra
 from marey.exporters.making import FileRecipe, RigFile
 from marey.motion.export_options import ExportOptions
 
@@ -83,12 +83,10 @@ def _make(request: dict[str, Any], sources: bytes) -> bytes:
 
 def _report(request: dict[str, Any], data: bytes) -> bytes:
     """Return what is found in a rig, as JSON that the database can hold."""
-    try:
+    with extra("motion"):
         from marey.motion.retarget.load import parse_body
         from marey.motion.rigs.read import READERS
         from marey.motion.rigs.report import describe
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     if request["format"] not in READERS:
         raise InvalidInput("is not a rig format", where="format", hint=f"Known: {', '.join(READERS)}.")
     body = parse_body(data, f"{request['name']}.{request['format']}", request["map"])
@@ -102,11 +100,9 @@ def _report(request: dict[str, Any], data: bytes) -> bytes:
 
 def _poses(request: dict[str, Any], npz: bytes) -> bytes:
     """Return frames of an npz as JSON: fields of pose keyframes, in the order asked for."""
-    try:
+    with extra("motion"):
         from marey.motion.clip import parse_npz
         from marey.motion.keyframes import beyond, pose_of
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     clip = parse_npz(npz, request["where"])
     for frame in request["frames"]:
         if frame >= clip.frames:

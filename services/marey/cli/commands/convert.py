@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from marey.cli import console, options
-from marey.cli.exporting import RestPoseOption, with_export
+from marey.cli.exporting import with_export
 from marey.core.errors import InvalidInput
-from marey.motion.export_options import PLAIN, ExportOptions
+from marey.motion.export_options import PLAIN, ExportOptions, RestPose
+from marey.motion.units import Unit, Up
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
-
-
-class Unit(StrEnum):
-    """Units of files, such as BVH, that do not name theirs."""
-
-    METRE = "m"
-    CENTIMETRE = "cm"
-    MILLIMETRE = "mm"
-    INCH = "in"
-    FOOT = "ft"
-
-
-class Up(StrEnum):
-    """Axes that may point up in files that do not name it."""
-
-    Y = "y"
-    Z = "z"
-
 
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="A motion file, such as .bvh or .npz.")]
 FromUnit = Annotated[Unit, typer.Option("--from-unit", help="Unit of a BVH source.")]
@@ -46,34 +28,32 @@ def convert(
         Path, typer.Argument(metavar="TARGET", help="A motion file or a film, such as .bvh, .fbx or .mp4.")
     ],
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
-    unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH, FBX or USD result.")] = Unit.CENTIMETRE,
-    up: Annotated[Up, typer.Option("--up", help="Axis of a BVH, FBX or USD result that points up.")] = Up.Y,
+    unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH, FBX or USD result.")] = "cm",
+    up: Annotated[Up, typer.Option("--up", help="Axis of a BVH, FBX or USD result that points up.")] = "y",
     export: ExportOptions = PLAIN,
-    from_unit: FromUnit = Unit.CENTIMETRE,
-    from_up: FromUp = Up.Y,
+    from_unit: FromUnit = "cm",
+    from_up: FromUp = "y",
     from_rest_pose: Annotated[
-        RestPoseOption,
+        RestPose,
         typer.Option("--from-rest-pose", help="Rest pose of a BVH source whose A-pose is known."),
-    ] = RestPoseOption.T,
+    ] = "t",
     overwrite: options.Overwrite = False,
 ) -> None:
     """Convert a motion between BVH, FBX, glb, npz and other formats, with another rate, unit, axis, root or pose."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("motion"):
         from marey.exporters.convert import convert as convert_file
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     notes = convert_file(
         source,
         target,
         fps=fps,
-        unit=unit.value,
-        up=up.value,
+        unit=unit,
+        up=up,
         export=export,
-        source_unit=from_unit.value,
-        source_up=from_up.value,
-        source_rest_pose=from_rest_pose.value,
+        source_unit=from_unit,
+        source_up=from_up,
+        source_rest_pose=from_rest_pose,
         overwrite=overwrite,
     )
     for note in notes:
@@ -102,28 +82,25 @@ def render(
             help="Show how hard each token of a motion is for this bundle's model, over time.",
         ),
     ] = None,
-    from_unit: FromUnit = Unit.CENTIMETRE,
-    from_up: FromUp = Up.Y,
+    from_unit: FromUnit = "cm",
+    from_up: FromUp = "y",
 ) -> None:
     """Draw motions: a contact sheet as PNG, or a page with a 3D player; with --difficulty both show a heat map."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("motion"):
         from marey.viz.player import html_player
         from marey.viz.render import contact_sheet
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     named = [each for source in sources for each in _read_all(source, clip or [], from_unit, from_up)]
     names, clips = [name for name, _ in named], [motion for _, motion in named]
     captions = [str(motion.manifest.get("prompt") or Path(name).stem) for name, motion in named]
     ending = output.suffix.lower()
     if difficulty is not None and ending in (".png", ".html", ".htm"):
         from marey.cli.roles.drawing import difficulties_of
-        from marey.viz.difficulty import difficulty_page, difficulty_sheet
+        from marey.viz.difficulty import draw_difficulty
 
         found = difficulties_of(difficulty, clips, names)
-        draw = difficulty_sheet if ending == ".png" else difficulty_page
-        draw(clips, found, output, captions=captions, columns=columns, title=title, theme=theme)
+        draw_difficulty(clips, found, output, captions=captions, columns=columns, title=title, theme=theme)
     elif ending == ".png":
         contact_sheet(clips, output, columns=columns, title=title, captions=captions, theme=theme)
     elif ending in (".html", ".htm"):
@@ -148,4 +125,4 @@ def _read(source: Path, unit: Unit, up: Up) -> MotionClip:
     from marey.exporters import Coordinates
     from marey.exporters.convert import read_motion
 
-    return read_motion(source, Coordinates(unit.value, up.value))
+    return read_motion(source, Coordinates(unit, up))

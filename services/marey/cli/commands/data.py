@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console
-from marey.cli.commands.convert import FromUnit, Unit
+from marey.cli.commands.convert import FromUnit
 from marey.core.errors import InvalidInput
 
 app = typer.Typer(help="Training data from capture archives.", no_args_is_help=True)
@@ -210,12 +210,12 @@ def segment(
         float, typer.Option("--sigma", help="Smoothing of the speed: standard deviation in seconds.")
     ] = 0.25,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the draws.")] = 0,
-    from_unit: FromUnit = Unit.CENTIMETRE,
+    from_unit: FromUnit = "cm",
 ) -> None:
     """Cut long captures at still moments: writes an index.csv of the pieces, and a picture of each capture's speed."""
     from marey.cli.roles import data
 
-    options = data.SegmentOptions(shortest, longest, share, sigma, seed, from_unit.value)
+    options = data.SegmentOptions(shortest, longest, share, sigma, seed, from_unit)
     with _progress() as progress:
         lines = data.segment_captures(files, output, options, progress)
     for line in lines:

@@ -32,7 +32,7 @@ def edit(
     model: options.Model = None,
     bundle: options.BundleOrFolder = None,
     sampling: options.Sampling = None,
-    scope: options.Scope = options.ScopeOption.WARN,
+    scope: options.Scope = "warn",
     export: ExportOptions = PLAIN,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
@@ -46,7 +46,7 @@ def edit(
     steps = given_operations(context, ops)
     settings = options.settings_of(sampling or ())
     with naming_operations(context, ops):
-        editor, warnings = model_for(steps, bundle or model, settings, scope.value)
+        editor, warnings = model_for(steps, bundle or model, settings, scope)
         console.warn_all(warnings)
         made = edit_files(
             sources, output, steps, model=editor, file_format=file_format, export=export, overwrite=overwrite

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -29,30 +28,17 @@ Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prom
 Threads = Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")]
 ReportFolder = Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")]
 JudgedBundle = Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")]
-
-
-class EvaluationStateOption(StrEnum):
-    """States of evaluations."""
-
-    PLANNED = "planned"
-    GENERATING = "generating"
-    SCORING = "scoring"
-    DONE = "done"
-    FAILED = "failed"
-    CANCELLED = "cancelled"
-
-
-class ProtocolOption(StrEnum):
-    """Published protocols; that of HumanML3D is KIT-ML's as well."""
-
-    HUMANML3D = "humanml3d"
+State = Annotated[
+    Literal["planned", "generating", "scoring", "done", "failed", "cancelled"] | None,
+    typer.Option("--state", help="Only runs in this state."),
+]
 
 
 @app.command()
 def run(
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
-    extra_columns: evaluating.Extra = options.ExtraColumns.REFUSE,
+    extra_columns: evaluating.Extra = "refuse",
     evaluator: evaluating.Evaluators = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
@@ -65,7 +51,7 @@ def run(
     fail_on_regression: evaluating.FailOnRegression = False,
     timeout: evaluating.Timeout = None,
     protocol: Annotated[
-        ProtocolOption | None,
+        Literal["humanml3d"] | None,  # KIT-ML's as well
         typer.Option(
             "--protocol",
             help="Measure in this process by a published protocol, without a server: the test captions of --data, "
@@ -167,7 +153,7 @@ def wait_for(
 
 @app.command("list")
 def list_runs(
-    state: Annotated[EvaluationStateOption | None, typer.Option("--state", help="Only runs in this state.")] = None,
+    state: State = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
@@ -176,8 +162,7 @@ def list_runs(
     from marey.client import Client
 
     with Client() as client:
-        wanted = state.value if state else None
-        found = client.evaluations.list(state=wanted, page_size=console.page_size(limit))
+        found = client.evaluations.list(state=state, page_size=console.page_size(limit))
         evaluating.show_runs(found, limit, as_json, full_ids=full_ids)
 
 

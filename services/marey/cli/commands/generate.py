@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from marey.exporters import Exporter
     from marey.motion.body import NamedBody
     from marey.motion.clip import MotionClip
+    from marey.vocabulary.scope import ScopePolicy
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def generate(
     timelines: options.Timelines = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
-    extra_columns: options.Extra = options.ExtraColumns.REFUSE,
+    extra_columns: options.Extra = "refuse",
     model: options.Model = None,
     bundle: options.BundleOrFolder = None,
     seconds: options.Seconds = None,
@@ -68,7 +69,7 @@ def generate(
     variety: options.Variety = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
-    scope: options.Scope = options.ScopeOption.WARN,
+    scope: options.Scope = "warn",
     loop: options.Loop = False,
     constraints: options.Constraints = None,
     formats: options.Formats = None,
@@ -94,7 +95,7 @@ def generate(
         fps=fps,
         best_of=best_of,
         redraws=redraws,
-        variety=None if variety is None else variety.value,
+        variety=variety,
         tags=tags,
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns, timelines)
@@ -103,7 +104,7 @@ def generate(
     shaped = _body_of(chosen, export)
     if export.body is not None:  # motions are solved onto it: files have it already
         export = replace(export, body=None, rig_map=None)
-    if scope is options.ScopeOption.REFUSE:
+    if scope == "refuse":
         _refuse(reader, items, chosen)
     planned = _plan(items, chosen, output, name_template, kinds, read_constraints_file(constraints))
     check_folder(output, hint="Choose another folder with -o.")
@@ -271,15 +272,15 @@ def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, st
     refuse_unknown(lines, where=reader.where, unit=reader.unit, match=match)
 
 
-def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: options.ScopeOption) -> None:
+def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: ScopePolicy) -> None:
     """Refuse prompts that the bundle does not know, or warn of them, by words and meaning."""
     from marey.bundles.limits import seconds_of
     from marey.vocabulary.report import ScopeReport
 
     manifest = studio.bundle.manifest
-    if policy is options.ScopeOption.IGNORE:
+    if policy == "ignore":
         return
-    if policy is options.ScopeOption.REFUSE:
+    if policy == "refuse":
         _refuse(reader, items, studio.bundle, studio)
     report, lengths = ScopeReport(), seconds_of(studio.bundle)
     if manifest.actions is not None:

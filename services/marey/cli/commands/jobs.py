@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from enum import StrEnum
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -33,23 +32,15 @@ FIELDS = (
 )
 COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
-
-
-class JobStateOption(StrEnum):
-    """States of jobs."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    PAUSED = "paused"
-    SUCCEEDED = "succeeded"
-    PARTIAL = "partial"
-    FAILED = "failed"
-    CANCELLED = "cancelled"
+State = Annotated[
+    Literal["queued", "running", "paused", "succeeded", "partial", "failed", "cancelled"] | None,
+    typer.Option("--state", help="Only jobs in this state."),
+]
 
 
 @app.command("list")
 def list_jobs(
-    state: Annotated[JobStateOption | None, typer.Option("--state", help="Only jobs in this state.")] = None,
+    state: State = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
@@ -58,7 +49,7 @@ def list_jobs(
     from marey.client import Client
 
     with Client() as client:
-        found = client.jobs.list(state=state.value if state else None, page_size=console.page_size(limit))
+        found = client.jobs.list(state=state, page_size=console.page_size(limit))
         console.listing((each.raw for each in found), COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 

@@ -66,13 +66,11 @@ def quantize(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing folder.")] = False,
 ) -> None:
     """Write a copy of a generator with its matrices in 8 bits: half the size, and slightly other motions."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.eight_bit import write_eight_bit
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     made = write_eight_bit(choose_bundle(name), output, overwrite=overwrite)
     console.result(made.reference)
 
@@ -133,26 +131,22 @@ def _server_model(name: str) -> Mapping[str, Any]:
 
 
 def _local_models() -> dict[str, Any]:
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.api.models.schemas import ModelsView
         from marey.core.settings import settings
         from marey.jobs.generators import list_generators
-    except ImportError as error:
-        raise needs_extra("server", error) from error
     return ModelsView.of(list_generators(settings())).model_dump(mode="json")
 
 
 def _local_model(name: str) -> dict[str, Any]:
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.api.catalogue import Catalogue
         from marey.api.models.schemas import ModelView
         from marey.core.settings import settings
-    except ImportError as error:
-        raise needs_extra("server", error) from error
     return ModelView.of(Catalogue(settings()).capabilities(name)).model_dump(mode="json")
 
 

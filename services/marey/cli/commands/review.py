@@ -68,12 +68,10 @@ def review(
     """
     from marey.cli.drawing import Drawers
     from marey.client import Client
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("motion"):
         import marey.viz.gallery  # noqa: F401
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .html or .png.")
     with Client() as client:

@@ -79,13 +79,11 @@ def show(
     as_json: console.Json = False,
 ) -> None:
     """Show which joint of a rig is which part of the body, how it was found, and what the other joints do."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("motion"):
         from marey.motion.retarget.load import load_body
         from marey.motion.rigs.report import describe
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     body = load_body(rig, rig_map)
     about = describe(body)
     if as_json:

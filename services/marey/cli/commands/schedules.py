@@ -10,7 +10,6 @@ from typer.core import TyperGroup
 
 from marey.cli import bulk, console, evaluating
 from marey.cli.evaluating import EvaluationArguments
-from marey.cli.options import ExtraColumns
 from marey.cli.references import FORMS, find, of_view
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def add(
     ],
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
-    extra_columns: evaluating.Extra = ExtraColumns.REFUSE,
+    extra_columns: evaluating.Extra = "refuse",
     evaluator: evaluating.Evaluator = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,

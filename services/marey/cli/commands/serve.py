@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -30,13 +29,11 @@ def serve(
     os.umask(UMASK)
     from marey.cli.ports import try_port
     from marey.cli.roles.serving import default_roles, parse_roles
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("worker"):
         from marey.cli.supervisor import Supervisor
         from marey.core.settings import Settings, settings
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     changes: dict[str, object] = {}
     if host is not None:
         changes["host"] = host
@@ -44,13 +41,6 @@ def serve(
         changes["port"] = port or try_port(host or settings().host, 0)
     config: Settings = settings().model_copy(update=changes)
     Supervisor(config, parse_roles(roles or default_roles(config))).run()
-
-
-class WorkerPart(StrEnum):
-    """The role of a worker."""
-
-    QUEUE = "queue"
-    LIVE = "live"
 
 
 def worker(
@@ -64,7 +54,7 @@ def worker(
         ),
     ] = None,
     only: Annotated[
-        WorkerPart | None,
+        Literal["queue", "live"] | None,
         typer.Option(
             "--only", help="A model that streams has two processes, its queue and its live streams: one of them."
         ),
@@ -73,14 +63,12 @@ def worker(
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL name the database and the queue."""
     os.umask(UMASK)
     from marey.cli.roles.serving import expand, live_models, parse_roles, role_of
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("worker"):
         from marey.cli.children import SupervisedProcess, keep_all, marey, metrics_port
         from marey.core.settings import settings
         from marey.runtime.worker import worker_main
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     where = "MODEL" if model else "MAREY_ROLE"
     model = model or settings().role
     if not model:
@@ -90,7 +78,7 @@ def worker(
     model = expand(model.replace(",", "+"), settings())
     queues = parse_roles(model, where)[0]
     shown = live_models(queues)
-    if only is WorkerPart.LIVE:
+    if only == "live":
         from marey.runtime.live.main import live_main
 
         if len(shown) != 1:
@@ -100,7 +88,7 @@ def worker(
         (factory,) = shown.values()
         raise typer.Exit(live_main(factory, settings()))
     role = role_of(queues, settings())
-    if only is WorkerPart.QUEUE or not shown or not settings().live_slots:
+    if only == "queue" or not shown or not settings().live_slots:
         raise typer.Exit(worker_main(role, settings()))
     parts = [(f"{model} queue", [model, "--only", "queue"])]
     parts += [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
@@ -113,46 +101,33 @@ def worker(
 def scheduler() -> None:
     """Run relay, sweeper, evaluations and schedules; several schedulers can run at once."""
     os.umask(UMASK)
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.core.settings import settings
         from marey.scheduler.main import scheduler_main
-    except ImportError as error:
-        raise needs_extra("server", error) from error
     raise typer.Exit(scheduler_main(settings()))
 
 
 def api() -> None:
     """Run the HTTP API alone; MAREY_HOST and MAREY_PORT set its address."""
     os.umask(UMASK)
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.api.app import serve as serve_api
-    except ImportError as error:
-        raise needs_extra("server", error) from error
     serve_api()
-
-
-class Health(StrEnum):
-    """The check of a probe."""
-
-    LIVE = "live"
-    READY = "ready"
 
 
 def probe(
     health: Annotated[
-        Health, typer.Argument(help="live = none is stuck; ready = their models are loaded as well.")
-    ] = Health.LIVE,
+        Literal["live", "ready"], typer.Argument(help="live = none is stuck; ready = their models are loaded as well.")
+    ] = "live",
 ) -> None:
     """Check the workers and schedulers of this machine; exit 4 if one is unhealthy. For health checks of containers."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("server"):
         from marey.core.settings import settings
         from marey.runtime.status import check_health
-    except ImportError as error:
-        raise needs_extra("server", error) from error
-    check_health(settings().home, ready=health is Health.READY)
+    check_health(settings().home, ready=health == "ready")

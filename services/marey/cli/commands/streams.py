@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -17,13 +16,6 @@ if TYPE_CHECKING:
     from marey.client import Client, LiveStream
 
 COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
-
-
-class Slow(StrEnum):
-    """Policy for a client that cannot keep up."""
-
-    SKIP = "skip"
-    PAUSE = "pause"
 
 
 def stream(
@@ -40,8 +32,9 @@ def stream(
         Path | None, typer.Option("-o", "--output", help="A .bvh that grows while the stream runs.")
     ] = None,
     slow: Annotated[
-        Slow, typer.Option("--slow", help="If this client cannot keep up: skip frames, or pause the stream.")
-    ] = Slow.SKIP,
+        Literal["skip", "pause"],
+        typer.Option("--slow", help="If this client cannot keep up: skip frames, or pause the stream."),
+    ] = "skip",
     fetch: Annotated[
         Path | None,
         typer.Option("--fetch", help="Wait for the clip after the end, and fetch its files into this folder."),
@@ -86,7 +79,7 @@ def stream(
         pose = None if end_pose is None else read_end_pose(client, end_pose)
         with Interrupts() as interrupts:
             live = client.streams.open(
-                prompt, model=model, seed=seed, seconds=seconds, name=name, slow=slow.value, record=output,
+                prompt, model=model, seed=seed, seconds=seconds, name=name, slow=slow, record=output,
                 overwrite=overwrite,
             )  # fmt: skip
             result, error = _follow(live, interrupts, pose, as_json=as_json)

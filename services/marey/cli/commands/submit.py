@@ -12,6 +12,7 @@ from marey.cli.exporting import FetchedBody
 from marey.cli.poses import StoredMotions
 from marey.client import rows
 from marey.client.names import check_template
+from marey.client.tables import ExtraColumns
 from marey.core.errors import InvalidInput, MareyError
 from marey.items.problems import InvalidItems
 from marey.items.timeline import timeline_gaps
@@ -36,7 +37,7 @@ def submit(
     constraints: options.Constraints = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
-    extra_columns: options.Extra = options.ExtraColumns.REFUSE,
+    extra_columns: options.Extra = "refuse",
     name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
     priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
     fail_early: Annotated[
@@ -58,7 +59,7 @@ def submit(
     variety: options.Variety = None,
     tags: options.Tags = None,
     sampling: options.Sampling = None,
-    scope: options.Scope = options.ScopeOption.WARN,
+    scope: options.Scope = "warn",
     watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
     fetch: Annotated[
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
@@ -101,7 +102,7 @@ def submit(
         fps=fps,
         best_of=best_of,
         redraws=redraws,
-        variety=None if variety is None else variety.value,
+        variety=variety,
         tags=tags,
     )
     motions = StoredMotions()
@@ -115,7 +116,7 @@ def submit(
             check_rig(client.rigs, export)
             wanted: JobOptions = {
                 "name": name, "priority": priority, "fail_early": fail_early, "keep_days": keep_days,
-                "scope": scope.value,
+                "scope": scope,
             }  # fmt: skip
             if dry_run:
                 with reader.in_source():
@@ -256,9 +257,9 @@ def row_defaults(sampling: list[str] | None, **given: Unpack[Defaults]) -> Mappi
 def read_prompts(
     prompts: list[str] | None,
     file: str | None,
-    input_format: options.InputFormat | None,
+    input_format: rows.Format | None,
     defaults: Mapping[str, object] = rows.NO_DEFAULTS,
-    extra_columns: options.ExtraColumns = options.ExtraColumns.REFUSE,
+    extra_columns: ExtraColumns = "refuse",
     timelines: list[str] | None = None,
 ) -> rows.PromptReader:
     """The items of PROMPT…, of --timeline or of -f.
@@ -276,8 +277,7 @@ def read_prompts(
     if timelines:
         return rows.read_timelines(timelines, defaults)
     if file:
-        file_format = None if input_format is None else input_format.value
-        return rows.read_file(file, file_format, defaults, extra_columns.value)
+        return rows.read_file(file, input_format, defaults, extra_columns)
     for prompt in prompts or ():
         if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and " " not in prompt:
             raise InvalidInput("is a file name, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")

@@ -121,7 +121,7 @@ def edit(
     model: options.Model = None,
     bundle: options.Bundle = None,
     sampling: options.Sampling = None,
-    scope: options.Scope = options.ScopeOption.WARN,
+    scope: options.Scope = "warn",
     name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
     priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
     keep_days: Annotated[
@@ -156,7 +156,7 @@ def edit(
         found = find(client, "motion", motion).id
         settings = options.settings_of(sampling or ()) or None
         if dry_run:
-            checked = client.check_edit(found, steps, model=bundle or model, settings=settings, scope=scope.value)
+            checked = client.check_edit(found, steps, model=bundle or model, settings=settings, scope=scope)
             show_capacity(checked)
             console.warn_all(checked.warnings)
             if as_json:
@@ -165,7 +165,7 @@ def edit(
         job = client.edit(
             found, steps,
             model=bundle or model, settings=settings, name=name, priority=priority, keep_days=keep_days,
-            scope=scope.value,
+            scope=scope,
         )  # fmt: skip
         console.warn_all(job.warnings)
         if not wait:

@@ -33,17 +33,15 @@ def parse(
     as_json: console.Json = False,
 ) -> None:
     """Show the graph of a prompt. Needs no server."""
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
     texts = [item.prompt for item in right_items(read_prompts(prompts, file, input_format))]
-    try:
+    with extra("worker"):
         for graph in _graphs(texts, model):
             if as_json:
                 console.result_json(graph)
             else:
                 draw(graph)
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
 
 
 @app.command()
@@ -54,12 +52,10 @@ def serve(
 ) -> None:
     """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is their shared secret."""
     os.umask(UMASK)
-    from marey.core.extras import needs_extra
+    from marey.core.extras import extra
 
-    try:
+    with extra("worker"):
         from marey.text_service.server import serve_text
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     serve_text(path)
 
 

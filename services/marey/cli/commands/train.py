@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, MutableMapping
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
@@ -133,7 +132,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         recompute: Recompute = False,
         record: Record = True,
         as_json: console.Json = False,
-        **choices: StrEnum | None,
+        **choices: str | None,
     ) -> None:
         from marey.cli.roles.training import train_stage
 
@@ -159,7 +158,7 @@ def _bundle_command(training: Training) -> Callable[..., None]:
         config: Config = "starter",
         card: Card = None,
         overwrite: Overwrite = False,
-        **choices: StrEnum | None,
+        **choices: str | None,
     ) -> None:
         from marey.cli.roles.training import assemble_bundle
 
@@ -212,8 +211,8 @@ def _config_command(training: Training) -> Callable[..., None]:
     return command
 
 
-def _given(choices: Mapping[str, StrEnum | None]) -> dict[str, str]:
-    return {name: value.value for name, value in choices.items() if value is not None}
+def _given(choices: Mapping[str, str | None]) -> dict[str, str]:
+    return {name: value for name, value in choices.items() if value is not None}
 
 
 def _with_choices(command: Callable[..., None], training: Training) -> Callable[..., None]:
@@ -221,7 +220,7 @@ def _with_choices(command: Callable[..., None], training: Training) -> Callable[
     own: dict[str, tuple[Any, object]] = {
         choice.name: (
             Annotated[
-                StrEnum(choice.name.title(), {value.upper(): value for value in choice.values}) | None,  # pyright: ignore[reportArgumentType]
+                Literal[choice.values] | None,  # pyright: ignore[reportInvalidTypeForm]
                 typer.Option(f"--{choice.name}", help=choice.help),
             ],
             None,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import StrEnum
 from operator import getitem
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -26,16 +25,9 @@ DELIVERY_COLUMNS = ("event", "kind", "state", "attempts", "status", "created", "
 ATTEMPT_COLUMNS = ("number", "at", "status", "seconds", "error")
 DELIVERIES = "Deliveries: the id of the event, its last 8 digits, or last."
 
+DeliveryState = Literal["pending", "delivered", "failed"]
 Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help=f"The webhook: {FORMS}.")]
 Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help=f"Webhooks: of each {FORMS}.")]
-
-
-class DeliveryStateOption(StrEnum):
-    """State of a delivery."""
-
-    PENDING = "pending"
-    DELIVERED = "delivered"
-    FAILED = "failed"
 
 
 @app.command()
@@ -132,7 +124,7 @@ def deliveries(
     event: Annotated[
         str | None, typer.Argument(metavar="[EVENT]", help="Show every attempt of this delivery.", show_default=False)
     ] = None,
-    state: Annotated[DeliveryStateOption | None, typer.Option("--state", help="Only deliveries in this state.")] = None,
+    state: Annotated[DeliveryState | None, typer.Option("--state", help="Only deliveries in this state.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
@@ -146,8 +138,7 @@ def deliveries(
             found = client.webhooks.delivery(webhook, find(client, "delivery", event, webhook=webhook).id)
             _show_attempts(found, as_json)
             return
-        wanted = state.value if state else None
-        pages = client.webhooks.deliveries(webhook, state=wanted, page_size=console.page_size(limit))
+        pages = client.webhooks.deliveries(webhook, state=state, page_size=console.page_size(limit))
         console.listing(
             (each.raw for each in pages), DELIVERY_COLUMNS, getitem, as_json=as_json, limit=limit, full_ids=full_ids
         )
@@ -171,9 +162,7 @@ def replay(
     with Client() as client:
         webhook = find(client, "webhook", webhook).id
         given = [each.id for each in find_all(client, "delivery", events or (), webhook=webhook)]
-        wanted = given or [
-            each.event for each in client.webhooks.deliveries(webhook, state=DeliveryStateOption.FAILED.value)
-        ]
+        wanted = given or [each.event for each in client.webhooks.deliveries(webhook, state="failed")]
         for event in wanted:
             found = client.webhooks.replay(webhook, event)
             if as_json:
@@ -204,9 +193,9 @@ def send_test(
         console.result_json(found.raw)
     else:
         console.result(found.event)
-    if found.state == DeliveryStateOption.FAILED:
+    if found.state == "failed":
         raise ItemsFailed(f"it did not arrive: {found.error}", where=f"webhook {webhook}")
-    if found.state == DeliveryStateOption.DELIVERED:
+    if found.state == "delivered":
         console.say(f"it arrived: {found.status}")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:
@@ -241,11 +241,9 @@ class _Run:
 
     @classmethod
     def of(cls, bundle: str, options: MeasureOptions) -> _Run:
-        try:
+        with extra("worker"):
             from marey.bundles import choose_bundle
             from marey.bundles.limits import check_settings
-        except ImportError as error:
-            raise needs_extra("worker", error) from error
         found = choose_bundle(bundle)
         values = check_settings(found, options.settings)
         load = resolve(get_model(found.manifest.model, where=bundle).load)

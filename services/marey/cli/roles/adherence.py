@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import ModelSpec, get_model, resolve
 
 
@@ -54,13 +54,11 @@ def judge_adherence(
         NotFound, InvalidBundle: of the bundle.
         InvalidInput: no such set or setting, or live sessions of a model that does not stream.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.limits import check_settings
         from marey.checks.prompts import PromptSet, evaluation_prompts
         from marey.training import adherence
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     sets = get_args(PromptSet)
     if prompts not in sets:
         raise InvalidInput(f"there is no set {prompts!r}", where="--prompts", hint=f"Known: {', '.join(sets)}.")

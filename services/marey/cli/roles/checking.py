@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 
 
 def check_file(path: Path, expect: str | None) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def check_file(path: Path, expect: str | None) -> dict[str, Any]:
         NotFound, InvalidFile: of the file.
         InvalidInput: another skeleton, under 4 frames, or an unknown action.
     """
-    try:
+    with extra("motion"):
         from marey.exporters import Coordinates
         from marey.exporters.convert import read_motion
         from marey.quality.clips import quality_of
@@ -33,8 +33,6 @@ def check_file(path: Path, expect: str | None) -> dict[str, Any]:
         from marey.referee import Body, shows_in_order
         from marey.selector import RULES, WantedAction
         from marey.selector.records import match_steps
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     actions = actions_of(expect)
     clip = read_motion(path, Coordinates())
     quality = quality_of(clip, expected_of(actions))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.cli.roles.actions import MeasureOptions, RefereeReport
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 
 if TYPE_CHECKING:
     from marey.evaluator.constraints.cases import Case
@@ -26,15 +26,13 @@ def measure_constraints(bundle: str, data: Path | None, captured: int, options: 
         NotFound, InvalidFile: of the prepared folder.
         InvalidInput: no such setting.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.limits import check_settings
         from marey.core.settings import settings
         from marey.evaluator.constraints.measuring import constraints_document, constraints_markdown, read_case
         from marey.generate.oneshot import OneShot, Wanted
         from marey.training.adherence import write_report
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     found = choose_bundle(bundle)
     values = check_settings(found, options.settings)
     config = settings().model_copy(update={"threads": options.threads} if options.threads else {})

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 
 if TYPE_CHECKING:
     from marey.bundles import TextSpec
@@ -46,13 +46,11 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
         InvalidInput: an unknown source.
         NotFound, InvalidFile, TooLarge: from reading.
     """
-    try:
+    with extra("worker"):
         from marey.data.dataset import known_sets
         from marey.data.feature_sets import FEATURE_SETS
         from marey.data.pack import JointsPack
         from marey.data.prepare import CaptureSet, pack_set
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     known = known_sets()
     for name, _ in sources.named:
         if name in FEATURE_SETS:
@@ -97,10 +95,8 @@ def prepare_data(
         InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`; or `speed` with published features.
         Conflict: the folder is in use.
     """
-    try:
+    with extra("worker"):
         from marey.data.feature_sets import FEATURE_SETS
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     report = partial(progress, "building")
     if len(sources.named) == 1 and sources.named[0][0] in FEATURE_SETS:
         name, path = sources.named[0]
@@ -125,11 +121,9 @@ class ProposedFiles:
 
 def is_unprepared(folder: Path) -> bool:
     """Return True for a folder with BVH files that is not a prepared one."""
-    try:
+    with extra("worker"):
         from marey.data.manifest import MANIFEST
         from marey.data.propose import bvh_files
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     return not (folder / MANIFEST).exists() and any(bvh_files(folder))
 
 
@@ -144,12 +138,10 @@ def propose_dataset(folder: Path, *, write: bool) -> ProposedFiles:
         Conflict: there is a `dataset.toml` already.
         InvalidFile: no rig is recognised.
     """
-    try:
+    with extra("worker"):
         from marey.data.dataset import DATASET, INDEX
         from marey.data.propose import index_of, propose
         from marey.motion.files import write_atomically
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     if write and (folder / DATASET).exists():
         raise Conflict("already exists", where=str(folder / DATASET), hint="Move it away, or leave out --write.")
     text = propose(folder).toml()
@@ -167,11 +159,9 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
     Raises:
         NotFound, InvalidFile: no such folder or clip, or a changed file.
     """
-    try:
+    with extra("worker"):
         from marey.data.inspect import summarize
         from marey.data.prepared import PreparedData
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     data = PreparedData.open(folder)
     if clip is None:
         return summarize(data).model_dump(mode="json")
@@ -208,12 +198,10 @@ def encode_captions(folder: Path, choice: TextChoice, progress: Callable[[int, i
         InvalidInput: options that exclude each other, an unknown encoder, or captions that another encoder has read.
         NotFound, InvalidBundle, InvalidFile: the data or the weights; see `TextPipeline.load`.
     """
-    try:
+    with extra("worker"):
         from marey.data.prepared import PreparedData
         from marey.text.pipeline import TextPipeline
         from marey.training.texts import CHUNK, CaptionTexts, KnownCaptions
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     spec = _text_spec(choice)
     data = PreparedData.open(folder)
     captions = [clip.all_captions for clip in data.clips]
@@ -239,13 +227,11 @@ def paraphrase_captions(folder: Path, times: int, progress: Callable[[int, int],
         NotFound, InvalidFile: the folder is not a set.
         Unreachable: the language model gives no usable answers.
     """
-    try:
+    with extra("worker"):
         from marey.core.settings import settings
         from marey.data.paraphrase import paraphrase
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
         from marey.text.wordings import PARAPHRASES
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     if not 1 <= times <= len(PARAPHRASES):
         raise InvalidInput(f"is {times}; captions are rephrased 1 to {len(PARAPHRASES)} times", where="--times")
     endpoint = Endpoint.of(settings())
@@ -296,11 +282,9 @@ def segment_captures(
     Raises:
         InvalidInput, Conflict, NotFound, InvalidFile, TooLarge: see `marey.data.segment_files.segment_files`.
     """
-    try:
+    with extra("worker"):
         from marey.data.segment import SegmentRule
         from marey.data.segment_files import segment_files
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     rule = SegmentRule(options.shortest, options.longest, options.share, options.sigma, options.seed)
     done = segment_files(files, output, rule, unit=options.unit, progress=partial(progress, "segmenting"))
     lines: list[str] = []

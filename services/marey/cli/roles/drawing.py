@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import find_model, model_names, resolve
 
 if TYPE_CHECKING:
@@ -26,11 +26,9 @@ def prepared_clip(folder: Path, number: int) -> MotionClip:
         InvalidInput: there is no such clip.
         NotFound, InvalidFile: no prepared folder, or a damaged one.
     """
-    try:
+    with extra("train"):
         from marey.data.prepared import PreparedData
         from marey.motion.finish import finish_motion
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     data = PreparedData.open(folder)
     if not 0 <= number < len(data.clips):
         raise InvalidInput(
@@ -52,11 +50,9 @@ def difficulties_of(bundle: str, clips: Sequence[MotionClip], names: Sequence[st
     Raises:
         InvalidInput: the model does not know difficulty, or a clip has no prompt or no features for it.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.body import layout_of
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     found = choose_bundle(bundle)
     spec = find_model(found.manifest.model)
     if spec is None or spec.difficulty is None:
@@ -69,10 +65,8 @@ def difficulties_of(bundle: str, clips: Sequence[MotionClip], names: Sequence[st
     space = layout_of(found.manifest)
     motions = [_features(clip, space, name) for clip, name in zip(clips, names, strict=True)]
     prompts = [_prompt(clip, name) for clip, name in zip(clips, names, strict=True)]
-    try:
+    with extra("worker"):
         difficulty = resolve(spec.difficulty)
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     return difficulty(found, motions, prompts)
 
 

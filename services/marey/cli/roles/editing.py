@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import Conflict, InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.motion.export_options import ExportOptions
 
 if TYPE_CHECKING:
@@ -45,13 +45,11 @@ def edit_files(
         Conflict: a file exists.
         NotFound, InvalidFile, TooLarge: of a source.
     """
-    try:
+    with extra("motion"):
         from marey.editing.judge import judged
         from marey.exporters import Coordinates, check_writers
         from marey.motion.edits.editing import edit
         from marey.motion.files import write_atomically
-    except ImportError as error:
-        raise needs_extra("motion", error) from error
     writer, is_file = _writer(output, file_format)
     if is_file and len(sources) > 1:
         raise InvalidInput(f"is one file for {len(sources)} motions", where=str(output), hint="Name a folder with -o.")
@@ -94,14 +92,12 @@ def model_for(
     steps = read_steps(ops)
     if not any(step.operation.needs_model for step in steps):
         return None, ()
-    try:
+    with extra("worker"):
         from marey.bundles import choose_bundle
         from marey.bundles.limits import edit_settings
         from marey.bundles.scope import examine_prompts
         from marey.core.settings import settings as settings_of_process
         from marey.generate.oneshot import OneShot
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     config = settings_of_process()
     chosen = choose_bundle(bundle or config.default_model, config=config)
     given, prompts = edit_settings(chosen, settings), prompts_of_steps(steps)

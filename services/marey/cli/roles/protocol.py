@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:
@@ -64,15 +64,13 @@ def run_protocol(request: ProtocolRequest, progress: Callable[[int, int, int], N
         NotFound, InvalidBundle, InvalidFile: of the bundles and the data.
         InvalidInput: they do not belong together, or the folder is of another run.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import find_bundle
         from marey.data.prepared import PreparedData
         from marey.evaluator import protocol
         from marey.evaluator.loading import load_evaluator
         from marey.evaluator.protocol.report import document_of, markdown_of
         from marey.motion.files import write_atomically
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     if not request.evaluators:
         raise InvalidInput("the protocol needs an evaluator", where="--evaluator", hint="Import one: t2m-evaluator.")
     data = PreparedData.open(request.data)

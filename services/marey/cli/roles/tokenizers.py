@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import find_model, model_names, resolve
 
 if TYPE_CHECKING:
@@ -32,15 +32,13 @@ def reconstruct(
         NotFound, InvalidBundle, InvalidFile: of the bundles and the data.
         InvalidInput: they do not belong together, or the report's file has another ending.
     """
-    try:
+    with extra("worker"):
         from marey.bundles import find_bundle
         from marey.data.prepared import PreparedData
         from marey.evaluator import report, tokenizers
         from marey.evaluator.loading import load_evaluator
         from marey.evaluator.reconstruction import reconstruct
         from marey.evaluator.reference import RealClips
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
     writers = {".html": report.to_html, ".json": report.to_json, ".md": report.to_markdown}
     if output is not None and output.suffix not in writers:
         raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(writers)}.")

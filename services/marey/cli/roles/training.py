@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.registry import Training, find_model, model_names, resolve
 
 
@@ -32,15 +32,13 @@ def train_stage(
         origin: name or path of a bundle whose weights are begun from.
         options: of `marey.training.staging.TrainOptions`.
     """
-    try:
+    with extra("train"):
         from marey.bundles import find_bundle
         from marey.training.config_file import open_config
         from marey.training.optimisation import with_learning_rate
         from marey.training.staging import TrainOptions, choose_budget
 
         named_config, train = resolve(training.config), resolve(training.train)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     chosen = with_learning_rate(open_config(named_config, config, choices), name, rate)
     options["origin"] = None if origin is None else find_bundle(origin)
     return train(name, TrainOptions(data, run, chosen, choose_budget(chosen, name, data, steps, minutes), **options))
@@ -48,12 +46,10 @@ def train_stage(
 
 def show_config(training: Training, config: str) -> str:
     """Return a configuration file with every field, from a preset or another file."""
-    try:
+    with extra("train"):
         from marey.training.config_file import open_config, preset_of, write_toml
 
         named_config = resolve(training.config)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     return write_toml(open_config(named_config, config), preset_of(config))
 
 
@@ -70,14 +66,12 @@ def estimate_memory(
         stage, samples a pass, samples of a batch, and GiB of each part and their sum.
     """
     assert training.memory is not None  # else there is no such command
-    try:
+    with extra("train"):
         from marey.nn.devices import choose_device
         from marey.training.config_file import open_config
         from marey.training.memory import GIB, device_memory
 
         named_config, memory_model = resolve(training.config), resolve(training.memory)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     model = memory_model(open_config(named_config, config), bf16=bf16)
     if samples == "auto":
         room = device_memory(choose_device("auto")) if gigabytes is None else 1e9 * gigabytes
@@ -100,12 +94,10 @@ def assemble_bundle(
     choices: Mapping[str, str] | None = None,
 ) -> str:
     """Write the bundle of a run, and return its exact reference."""
-    try:
+    with extra("train"):
         from marey.training.config_file import open_config
 
         named_config, assemble = resolve(training.config), resolve(training.assemble)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
     chosen = open_config(named_config, config, choices)
     return assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
@@ -113,10 +105,8 @@ def assemble_bundle(
 
 def mean_of_runs(stage: str, runs: Sequence[Path], run: Path) -> None:
     """Write the mean of the finished parts of a stage in several runs into a run folder."""
-    try:
+    with extra("train"):
         from marey.training.parts import load_part, mean_part, save_part
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     folders = [each / stage / "part" for each in runs]
     mean = mean_part({str(folder): load_part(folder) for folder in folders})
     save_part(run / stage / "part", mean)
@@ -125,22 +115,18 @@ def mean_of_runs(stage: str, runs: Sequence[Path], run: Path) -> None:
 def unpack_bundle(training: Training, bundle: str, run: Path) -> str:
     """Write the parts of a bundle into a run folder, and return the name of its configuration."""
     assert training.unpack is not None  # else there is no such command
-    try:
+    with extra("train"):
         from marey.bundles import find_bundle
 
         unpack = resolve(training.unpack)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     return unpack(find_bundle(bundle), run).name
 
 
 def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -> str:
     """Write an evaluator's networks with a reference of these data; the new bundle's exact reference."""
-    try:
+    with extra("train"):
         from marey.bundles import find_bundle
         from marey.evaluator.assembly import renew_reference
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     return renew_reference(find_bundle(bundle), data, output, overwrite=overwrite).reference
 
 
@@ -159,12 +145,10 @@ def self_train(
     Raises:
         InvalidInput: the bundle's model cannot be trained on its own motions.
     """
-    try:
+    with extra("train"):
         from marey.bundles import choose_bundle
         from marey.data.prepared import PreparedData
         from marey.training.adherence import pipeline_of
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     found = choose_bundle(bundle)
     spec = find_model(found.manifest.model)
     if spec is None or spec.self_train is None:
@@ -200,10 +184,8 @@ def ablate(
     Raises:
         InvalidInput: the model has no such ablation, or several and none is named.
     """
-    try:
+    with extra("train"):
         from marey.bundles import choose_bundle
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     found = choose_bundle(bundle)
     spec = find_model(found.manifest.model)
     known = {each.name: each for each in (spec.ablations if spec else ())}
@@ -217,10 +199,8 @@ def ablate(
             where="--what",
             hint=f"Known: {'; '.join(f'{each.name} ({each.help})' for each in known.values()) or 'none'}.",
         )
-    try:
+    with extra("train"):
         from marey.training.ablation import AblationRequest
 
         run = resolve(known[name].run)
-    except ImportError as error:
-        raise needs_extra("train", error) from error
     return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads))

@@ -19,9 +19,9 @@ from marey.motion.files import read_limited
 from marey.motion.io.bvh_header import LARGEST, BvhHeader, Joint
 from marey.motion.io.bvh_write import format_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
-from marey.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
+from marey.motion.rotations import AXES, Z_TO_Y, Array, angle_between, from_euler, multiply, rotate, unroll
 from marey.motion.skeleton import Skeleton, mirror_by_name
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.units import METRES, Unit, Up
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "read_bvh", "write_bvh"]
 

@@ -14,9 +14,18 @@ from marey.core.errors import InvalidInput
 from marey.motion.arrange import Posed, arrange
 from marey.motion.export_options import PLAIN, BvhRoot, ExportOptions, InPlace, Placement
 from marey.motion.files import write_atomically
-from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
+from marey.motion.rotations import (
+    Z_TO_Y,
+    Array,
+    conjugate,
+    continuous_euler,
+    multiply,
+    normalize,
+    rotate,
+    to_euler,
+)
 from marey.motion.skeleton import Skeleton
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.units import METRES, Unit, Up
 
 
 def write_bvh(

@@ -8,8 +8,8 @@ from marey.motion.io.fbx_document import FbxDocument
 from marey.motion.io.fbx_nodes import FbxNode, Long, node
 from marey.motion.io.fbx_templates import prop
 from marey.motion.io.mesh import Mesh
-from marey.motion.rotations import Array, conjugate, rotate
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.rotations import Z_TO_Y, Array, conjugate, rotate
+from marey.motion.units import METRES, Unit, Up
 
 NAME = "body"
 

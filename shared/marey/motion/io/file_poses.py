@@ -8,8 +8,8 @@ import numpy as np
 
 from marey.motion.arrange import Arranged
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import IDENTITY, Array, conjugate, multiply, rotate, to_matrix
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.rotations import IDENTITY, Z_TO_Y, Array, conjugate, multiply, rotate, to_matrix
+from marey.motion.units import METRES, Unit, Up
 
 CENTIMETRE = 0.01
 

@@ -15,8 +15,8 @@ from marey.motion.io.fbx_skeleton import bones_of, skeleton_order
 from marey.motion.io.fbx_transforms import world_transforms
 from marey.motion.rigs.make_rig import RigNode, make_rig
 from marey.motion.rigs.rig import Rig
-from marey.motion.rotations import to_matrix
-from marey.motion.units import Z_TO_Y, Up
+from marey.motion.rotations import Z_TO_Y, to_matrix
+from marey.motion.units import Up
 
 
 def parse_fbx_rig(data: bytes, where: str = "fbx") -> Rig:

@@ -20,8 +20,7 @@ from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, TooLarge
 from marey.motion.rigs.make_rig import RigNode, check_count, make_rig
 from marey.motion.rigs.rig import Rig
-from marey.motion.rotations import Array, conjugate, multiply, rotate, to_matrix
-from marey.motion.units import Z_TO_Y
+from marey.motion.rotations import Z_TO_Y, Array, conjugate, multiply, rotate, to_matrix
 
 FORMAT, VERSION = "marey-rig", 1
 SHAPE = "See `Rig files` in docs/reference/formats.md."

@@ -13,9 +13,9 @@ from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.io.bvh_write import Layout
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import IDENTITY, Array, continuous_euler, multiply, rotate
+from marey.motion.rotations import IDENTITY, Z_TO_Y, Array, continuous_euler, multiply, rotate
 from marey.motion.skeleton import Skeleton, mirror_by_name
-from marey.motion.units import Z_TO_Y, Unit, Up
+from marey.motion.units import Unit, Up
 
 
 def format_rigged_bvh(motion: RiggedMotion, *, unit: Unit = "cm", up: Up = "y", options: ExportOptions = PLAIN) -> str:

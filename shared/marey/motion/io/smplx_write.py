@@ -12,8 +12,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.io.rig_smplx import JOINTS, SOURCE
 from marey.motion.rigs.rig import Rig
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import conjugate, multiply, rotate, to_rotvec
-from marey.motion.units import Z_TO_Y
+from marey.motion.rotations import Z_TO_Y, conjugate, multiply, rotate, to_rotvec
 
 BETAS = 16
 BODY, FACE = 22, 25

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from marey.core.errors import InvalidInput
-from marey.core.extras import needs_extra
+from marey.core.extras import extra
 from marey.motion.arrange import Posed, arrange
 from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.io.file_poses import FilePoses, poses_of, rigged_poses
 from marey.motion.io.mesh import Mesh
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import Array, conjugate, rotate, unroll
-from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.motion.rotations import Z_TO_Y, Array, conjugate, rotate, unroll
+from marey.motion.units import METRES, Unit, Up
 
 ROOT = "/Character"
 MODULES = ("Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdSkel", "Vt")
@@ -77,10 +77,8 @@ def load_pxr() -> Any:
     Raises:
         MissingExtra: it is not installed.
     """
-    try:
+    with extra("usd"):
         return SimpleNamespace(**{name: importlib.import_module(f"pxr.{name}") for name in MODULES})
-    except ImportError as error:
-        raise needs_extra("usd", error) from error
 
 
 def _stage(pxr: Any, poses: FilePoses) -> Any:

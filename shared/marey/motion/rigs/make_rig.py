@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile, TooLarge
 from marey.motion.rigs.rig import MAX_JOINTS, Rig
-from marey.motion.rotations import from_matrix, multiply, rotate
-from marey.motion.units import Z_TO_Y, Up
+from marey.motion.rotations import Z_TO_Y, from_matrix, multiply, rotate
+from marey.motion.units import Up
 
 MAX_NAME = 256
 """Characters of the name of a joint."""

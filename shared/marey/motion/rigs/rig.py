@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from marey.motion.rotations import Array, conjugate, multiply, rotate
-from marey.motion.units import Z_TO_Y, Up
+from marey.motion.rotations import Z_TO_Y, Array, conjugate, multiply, rotate
+from marey.motion.units import Up
 
 MAX_JOINTS = 2000
 MAX_BYTES = 64 * 2**20
