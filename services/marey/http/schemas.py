@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
 
 from fastapi import Header, Query
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -13,7 +14,11 @@ from marey.core.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text,
 from marey.core.errors import InvalidInput
 from marey.core.validation import worded
 
+if TYPE_CHECKING:
+    from marey.db.pages import Page  # it would import the database
+
 Row = TypeVar("Row")
+Stored = TypeVar("Stored")
 
 MAX_NAME, MAX_COMMENT, MAX_REASON = 200, 2000, 500
 
@@ -72,3 +77,8 @@ class PageView(View, Generic[Row]):
 
     items: list[Row]
     next: str | None = Field(description="Cursor of the next page; null at the end.")
+
+    @classmethod
+    def of(cls, page: Page[Stored], view: Callable[[Stored], Row]) -> Self:
+        """Return a page of rows as clients see them."""
+        return cls(items=[view(row) for row in page.rows], next=page.cursor)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from marey.core import tracing
+from marey.http.answers import Sender, route_of
 
 UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
 """Paths that machines poll every few seconds."""
@@ -27,19 +28,12 @@ class Trace:
             await self._answer(scope, receive, send)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        status = 500
-
-        async def noted(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-            await send(message)
-
+        sender = Sender(send)
         with tracing.span("request", kind="server") as span:
             try:
-                await self.app(scope, receive, noted)
+                await self.app(scope, receive, sender)
             finally:
-                route = getattr(scope.get("route"), "path", "other")
+                route = route_of(scope)
                 span.rename(f"{scope['method']} {route}")
                 named = {"http.request.method": scope["method"], "http.route": route}
-                span.set(**named, **{"http.response.status_code": status})
+                span.set(**named, **{"http.response.status_code": sender.status})

@@ -59,7 +59,7 @@ def list_evaluations(
 ) -> PageView[EvaluationView]:
     """List evaluations, newest first."""
     page = evaluations.list_evaluations(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
-    return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[EvaluationView].of(page, EvaluationView.of)
 
 
 @router.get("/{evaluation}")

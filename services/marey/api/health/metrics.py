@@ -9,11 +9,12 @@ from collections.abc import Iterable, Mapping
 
 import sqlalchemy as sa
 from prometheus_client import Gauge, generate_latest
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from marey.core import metrics
 from marey.core.metrics import MAX_TENANTS, OTHER_TENANTS
 from marey.db import SEARCH, transaction
+from marey.http.answers import Sender, route_of
 from marey.jobs import (
     Outbox,
     QueueDepth,
@@ -103,19 +104,11 @@ class Measure:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        began = time.perf_counter()
-        status = 500
-
-        async def noted(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-            await send(message)
-
+        began, sender = time.perf_counter(), Sender(send)
         try:
-            await self.app(scope, receive, noted)
+            await self.app(scope, receive, sender)
         finally:
-            route = getattr(scope.get("route"), "path", "other")
+            route = route_of(scope)
             method = scope["method"] if scope["method"] in METHODS else "other"
-            metrics.HTTP_REQUESTS.labels(method, route, str(status)).inc()
+            metrics.HTTP_REQUESTS.labels(method, route, str(sender.status)).inc()
             metrics.HTTP_SECONDS.labels(method, route).observe(time.perf_counter() - began)

@@ -190,7 +190,7 @@ def list_jobs(
 ) -> PageView[JobView]:
     """List jobs, newest first."""
     page = jobs.list_jobs(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
-    return PageView[JobView](items=[JobView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[JobView].of(page, JobView.of)
 
 
 @router.get("/{job}")
@@ -313,7 +313,7 @@ def list_items(
 ) -> PageView[ItemView]:
     """List items with their motions, in input order, variants within prompt; re-rolls come last."""
     page = jobs.list_items(conn, key.tenant, job, states=state or (), reviews=review or (), cursor=cursor, limit=limit)
-    return PageView[ItemView](items=[ItemView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[ItemView].of(page, ItemView.of)
 
 
 @router.get("/{job}/motions")
@@ -323,7 +323,7 @@ def list_job_motions(
 ) -> PageView[MotionView]:
     """List motions of a job that match all filters, in creation order."""
     page = takes.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
-    return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[MotionView].of(page, MotionView.of)
 
 
 @router.get(

@@ -54,7 +54,7 @@ async def add_rig(
 def list_rigs(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[RigView]:
     """List rigs, newest first; the reference rigs are not among them."""
     page = takes.list_rigs(conn, key.tenant, cursor=cursor, limit=limit)
-    return PageView[RigView](items=[RigView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[RigView].of(page, RigView.of)
 
 
 @router.get("/{rig}")

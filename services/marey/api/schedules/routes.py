@@ -35,7 +35,7 @@ async def create_schedule(request: Request, response: Response, shared: Shared, 
 def list_schedules(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[ScheduleView]:
     """List schedules, newest first."""
     page = evaluations.list_schedules(conn, key.tenant, cursor=cursor, limit=limit)
-    return PageView[ScheduleView](items=[ScheduleView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[ScheduleView].of(page, ScheduleView.of)
 
 
 @router.get("/{schedule}")
@@ -74,7 +74,7 @@ def list_runs(
     """List the evaluations of a schedule, newest first."""
     evaluations.get_schedule(conn, key.tenant, schedule)
     page = evaluations.list_evaluations(conn, key.tenant, schedule=schedule, cursor=cursor, limit=limit)
-    return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[EvaluationView].of(page, EvaluationView.of)
 
 
 SCHEMAS = (NewScheduleBody, SchedulePatch)

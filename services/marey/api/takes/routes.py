@@ -90,7 +90,7 @@ def list_motions(
 ) -> PageView[MotionView]:
     """List motions that match all filters, newest first."""
     page = takes_store.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
-    return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[MotionView].of(page, MotionView.of)
 
 
 @router.post("/review")

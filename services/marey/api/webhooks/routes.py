@@ -46,7 +46,7 @@ def create_webhook(
 def list_webhooks(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[WebhookView]:
     """List webhooks, newest first."""
     page = webhooks.list_webhooks(conn, key.tenant, cursor=cursor, limit=limit)
-    return PageView[WebhookView](items=[WebhookView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[WebhookView].of(page, WebhookView.of)
 
 
 @router.get("/{webhook}")
@@ -109,7 +109,7 @@ def list_deliveries(
 ) -> PageView[DeliveryView]:
     """List deliveries of the last 30 days, newest first."""
     page = webhooks.list_deliveries(conn, key.tenant, webhook, states=state or (), cursor=cursor, limit=limit)
-    return PageView[DeliveryView](items=[DeliveryView.of(row) for row in page.rows], next=page.cursor)
+    return PageView[DeliveryView].of(page, DeliveryView.of)
 
 
 @router.get("/{webhook}/deliveries/{event}")
