@@ -5,7 +5,7 @@ from __future__ import annotations
 from starlette.types import Message, Scope, Send
 
 
-class Sender:
+class NotedAnswer:
     """Passes the messages of an answer on.
 
     Attributes:

@@ -6,7 +6,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from marey.core import tracing
-from marey.http.answers import Sender, route_of
+from marey.http.answers import NotedAnswer, route_of
 
 UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
 """Paths that machines poll every few seconds."""
@@ -28,12 +28,12 @@ class Trace:
             await self._answer(scope, receive, send)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        sender = Sender(send)
+        noted = NotedAnswer(send)
         with tracing.span("request", kind="server") as span:
             try:
-                await self.app(scope, receive, sender)
+                await self.app(scope, receive, noted)
             finally:
                 route = route_of(scope)
                 span.rename(f"{scope['method']} {route}")
                 named = {"http.request.method": scope["method"], "http.route": route}
-                span.set(**named, **{"http.response.status_code": sender.status})
+                span.set(**named, **{"http.response.status_code": noted.status})

@@ -20,6 +20,7 @@ from marey.models.hgm3.decoding import DecodeOptions, condition_level
 from marey.models.hgm3.generate import Generated, Generator, SamplingSettings
 from marey.models.hgm3.spec import SPEC
 from marey.registry import Setting
+from tests.support.generating import Dropping, equal_motions
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
 
@@ -35,16 +36,6 @@ def requests() -> list[Request]:
     ]
 
 
-def equal(a: list[Generated | None], b: list[Generated | None]) -> bool:
-    return all(
-        x is not None
-        and y is not None
-        and np.array_equal(x.tokens, y.tokens)
-        and np.array_equal(x.features, y.features)
-        for x, y in zip(a, b, strict=True)
-    )
-
-
 @pytest.fixture(scope="module")
 def reference(generator: Generator) -> list[Generated | None]:
     return generator.generate(requests())
@@ -53,13 +44,13 @@ def reference(generator: Generator) -> list[Generated | None]:
 def test_motions_are_equal_in_batches_of_1_3_and_32(generator: Generator, reference: list[Generated | None]) -> None:
     for size in (1, 3):
         parts = [generator.generate(requests()[i : i + size]) for i in range(0, COUNT, size)]
-        assert equal(reference, [made for part in parts for made in part])
+        assert equal_motions(reference, [made for part in parts for made in part])
 
 
 def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: list[Generated | None]) -> None:
     order = np.random.default_rng(0).permutation(COUNT)
     shuffled = generator.generate([requests()[i] for i in order])
-    assert equal([reference[i] for i in order], shuffled)
+    assert equal_motions([reference[i] for i in order], shuffled)
 
 
 @packs_bfloat16
@@ -67,7 +58,7 @@ def test_tokens_are_equal_in_any_batch_with_bfloat16_matrices(generator: Generat
     lowered = Generator.load(generator.bundle, device="cpu", dtype=torch.bfloat16)
     together = lowered.generate(requests())
     alone = [lowered.generate([r])[0] for r in requests()]
-    assert equal(together, alone)
+    assert equal_motions(together, alone)
 
 
 @pytest.fixture
@@ -80,31 +71,31 @@ def on_two_threads(generator: Generator) -> Iterator[Generator]:
 
 def test_motions_are_equal_on_two_threads(on_two_threads: Generator, reference: list[Generated | None]) -> None:
     assert on_two_threads.batch_threads.count == 2
-    assert equal(reference, on_two_threads.generate(requests()))
-    assert equal(reference[:3], on_two_threads.generate(requests()[:3]))
-    assert equal(reference[7:8], on_two_threads.generate(requests()[7:8]))  # its two branches of guidance
+    assert equal_motions(reference, on_two_threads.generate(requests()))
+    assert equal_motions(reference[:3], on_two_threads.generate(requests()[:3]))
+    assert equal_motions(reference[7:8], on_two_threads.generate(requests()[7:8]))  # its two branches of guidance
 
 
 def test_a_request_dropped_on_two_threads_ends_and_the_others_stay_the_same(
     on_two_threads: Generator, reference: list[Generated | None]
 ) -> None:
-    made = on_two_threads.generate(requests()[:3], control=Dropper())
+    made = on_two_threads.generate(requests()[:3], control=Dropping(1, after=3))
     assert made[1] is None
-    assert equal([reference[0], reference[2]], [made[0], made[2]])
+    assert equal_motions([reference[0], reference[2]], [made[0], made[2]])
 
 
 @pytest.mark.parametrize("plain", [SamplingSettings(skip_idle=False), SamplingSettings(trim_slots=False)])
 def test_savings_change_nothing(
     generator: Generator, reference: list[Generated | None], plain: SamplingSettings
 ) -> None:
-    assert equal(reference, generator.generate(requests(), plain))
+    assert equal_motions(reference, generator.generate(requests(), plain))
 
 
 def test_min_progress_and_flat_conditions_are_other_ways_to_decode(
     generator: Generator, reference: list[Generated | None]
 ) -> None:
     for settings in (SamplingSettings(min_progress=True), FLAT):
-        assert not equal(reference, generator.generate(requests(), settings))
+        assert not equal_motions(reference, generator.generate(requests(), settings))
 
 
 def test_each_token_is_decided_once_and_counted_by_its_condition(generator: Generator) -> None:
@@ -169,26 +160,13 @@ def test_features_of_another_encoder_are_refused(generator: Generator) -> None:
         generator.generate([Request(text_features(0, width=512), 1, 40)])
 
 
-class Dropper:
-    """Drops request 1 after three steps."""
-
-    def __init__(self) -> None:
-        self.steps: list[tuple[int, int]] = []
-
-    def progress(self, done: int, total: int) -> None:
-        self.steps.append((done, total))
-
-    def dropped(self) -> set[int]:
-        return {1} if len(self.steps) >= 3 else set()
-
-
 def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(generator: Generator) -> None:
     asked = [Request(text_features(i), i, 60) for i in range(3)]
     whole = generator.generate(asked)
-    control = Dropper()
+    control = Dropping(1, after=3)
     made = generator.generate(asked, control=control)
     assert made[1] is None
-    assert equal([whole[0], whole[2]], [made[0], made[2]])
+    assert equal_motions([whole[0], whole[2]], [made[0], made[2]])
     assert control.steps[-1][0] == control.steps[-1][1]
 
 
@@ -263,14 +241,16 @@ def test_motions_with_kept_frames_are_equal_in_any_batch(generator: Generator) -
     asked = [*(keeping(generator, index) for index in range(5)), *requests()[:3]]
     together = generator.generate(asked)
     alone = [made for each in asked for made in generator.generate([each])]
-    assert equal(together, alone)
+    assert equal_motions(together, alone)
 
 
 def test_a_free_request_does_not_read_its_text(generator: Generator) -> None:
     asked = keeping(generator, 1)
     other = replace(asked, text=text_features(9, 3, 1))
-    assert equal(generator.generate([asked]), generator.generate([other]))
-    assert not equal(generator.generate([replace(asked, free=False)]), generator.generate([replace(other, free=False)]))
+    assert equal_motions(generator.generate([asked]), generator.generate([other]))
+    assert not equal_motions(
+        generator.generate([replace(asked, free=False)]), generator.generate([replace(other, free=False)])
+    )
 
 
 @pytest.mark.parametrize(

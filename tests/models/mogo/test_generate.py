@@ -27,6 +27,7 @@ from marey.motion.skeleton import HUMANML3D
 from marey.registry import Setting
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
+from tests.support.generating import Dropping
 from tests.support.prepared import text_features, write_prepared
 
 
@@ -140,26 +141,13 @@ def test_a_bundle_of_another_model_is_refused(tmp_path: Path) -> None:
         Generator.load(hgm3_bundle(tmp_path / "other"), device="cpu")
 
 
-class Dropper:
-    """Drops request 1 after three frames, and request 2 before it begins."""
-
-    def __init__(self) -> None:
-        self.steps: list[tuple[int, int]] = []
-
-    def progress(self, done: int, total: int) -> None:
-        self.steps.append((done, total))
-
-    def dropped(self) -> set[int]:
-        return {1, 2} if len(self.steps) >= 3 else set()
-
-
 def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(
     generator: Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("marey.models.mogo.generate.MAX_SESSIONS", 2)
     requests = [Request(text_features(k), seed=k, frames=20) for k in range(4)]
     whole = generator.generate(requests)
-    control = Dropper()
+    control = Dropping(1, 2, after=3)
     made = generator.generate(requests, control=control)
     assert made[1] is made[2] is None
     for row in (0, 3):

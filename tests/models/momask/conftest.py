@@ -9,11 +9,6 @@ from marey.models.momask.bundle import random_bundle
 from marey.models.momask.generate import Generator
 
 
-@pytest.fixture(autouse=True, scope="session")
-def _one_thread() -> None:
-    torch.set_num_threads(1)
-
-
 @pytest.fixture(scope="session")
 def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
     """A generator with random tiny weights, float32."""

@@ -19,6 +19,7 @@ from marey.models.momask.decoding import Items, decode_base, decode_residual, ma
 from marey.models.momask.generate import Generated, Generator, SamplingSettings
 from marey.models.momask.model import MaskedTransformer, ResidualTransformer
 from marey.models.momask.spec import SPEC
+from tests.support.generating import Dropping, equal_motions
 from tests.support.prepared import text_features
 
 COUNT = 32
@@ -29,16 +30,6 @@ def requests() -> list[Request]:
     return [Request(text_features(i), 1000 + i, None if i % 5 == 4 else 20 + 17 * (i % 10)) for i in range(COUNT)]
 
 
-def equal(a: list[Generated | None], b: list[Generated | None]) -> bool:
-    return all(
-        x is not None
-        and y is not None
-        and np.array_equal(x.tokens, y.tokens)
-        and np.array_equal(x.features, y.features)
-        for x, y in zip(a, b, strict=True)
-    )
-
-
 @pytest.fixture(scope="module")
 def reference(generator: Generator) -> list[Generated | None]:
     return generator.generate(requests())
@@ -47,13 +38,13 @@ def reference(generator: Generator) -> list[Generated | None]:
 def test_motions_are_equal_in_batches_of_1_3_and_32(generator: Generator, reference: list[Generated | None]) -> None:
     for size in (1, 3):
         parts = [generator.generate(requests()[i : i + size]) for i in range(0, COUNT, size)]
-        assert equal(reference, [made for part in parts for made in part])
+        assert equal_motions(reference, [made for part in parts for made in part])
 
 
 def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: list[Generated | None]) -> None:
     order = np.random.default_rng(0).permutation(COUNT)
     shuffled = generator.generate([requests()[i] for i in order])
-    assert equal([reference[i] for i in order], shuffled)
+    assert equal_motions([reference[i] for i in order], shuffled)
 
 
 @pytest.fixture
@@ -66,8 +57,8 @@ def on_two_threads(generator: Generator) -> Iterator[Generator]:
 
 def test_motions_are_equal_on_two_threads(on_two_threads: Generator, reference: list[Generated | None]) -> None:
     assert on_two_threads.batch_threads.count == 2
-    assert equal(reference, on_two_threads.generate(requests()))
-    assert equal(reference[7:8], on_two_threads.generate(requests()[7:8]))
+    assert equal_motions(reference, on_two_threads.generate(requests()))
+    assert equal_motions(reference[7:8], on_two_threads.generate(requests()[7:8]))
 
 
 def test_seed_text_and_length_each_change_the_motion(generator: Generator) -> None:
@@ -85,7 +76,7 @@ def test_the_sentence_alone_is_read(generator: Generator) -> None:
     nodes = text.nodes.copy()
     nodes[1:] += 1
     made = generator.generate([Request(text, 1, 40), Request(replace(text, nodes=nodes), 1, 40)])
-    assert equal(made[:1], made[1:])
+    assert equal_motions(made[:1], made[1:])
 
 
 @pytest.mark.parametrize("setting", SPEC.settings, ids=lambda each: each.name)
@@ -95,7 +86,7 @@ def test_each_setting_is_checked_and_changes_tokens(generator: Generator, settin
     asked = [Request(text_features(i), i, 196) for i in range(2)]
     settings = generator.settings({name: other})
     assert generator.describe_settings(settings)[name] == other
-    assert not equal(generator.generate(asked), generator.generate(asked, settings))
+    assert not equal_motions(generator.generate(asked), generator.generate(asked, settings))
     with pytest.raises(InvalidInput, match=f"{name}: .* is outside"):
         generator.settings({name: 1000})
     with pytest.raises(InvalidInput, match="unknown setting"):
@@ -133,35 +124,20 @@ def test_features_of_another_encoder_are_refused(generator: Generator) -> None:
         generator.generate([Request(text_features(0, width=512), 1, 40)])
 
 
-class Dropper:
-    """Drops some requests after three steps."""
-
-    def __init__(self, *rows: int) -> None:
-        self.rows = set(rows)
-        self.steps: list[tuple[int, int]] = []
-
-    def progress(self, done: int, total: int) -> None:
-        self.steps.append((done, total))
-
-    def dropped(self) -> set[int]:
-        return self.rows if len(self.steps) >= 3 else set()
-
-
 @pytest.mark.parametrize("after", [3, 11])
 def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(generator: Generator, after: int) -> None:
     asked = [Request(text_features(i), i, 60) for i in range(3)]
     whole = generator.generate(asked)
-    control = Dropper(1)
-    control.steps = [(0, 0)] * (3 - after)
+    control = Dropping(1, after=after)
     made = generator.generate(asked, control=control)
     assert made[1] is None
-    assert equal([whole[0], whole[2]], [made[0], made[2]])
+    assert equal_motions([whole[0], whole[2]], [made[0], made[2]])
     assert control.steps[-1][0] == control.steps[-1][1]
 
 
 def test_a_batch_whose_requests_are_all_dropped_ends(generator: Generator) -> None:
     asked = [Request(text_features(i), i, 60) for i in range(2)]
-    assert generator.generate(asked, control=Dropper(0, 1)) == [None, None]
+    assert generator.generate(asked, control=Dropping(0, 1, after=3)) == [None, None]
 
 
 def test_the_masked_tokens_follow_the_public_schedule() -> None:

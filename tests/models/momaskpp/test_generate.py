@@ -14,11 +14,12 @@ from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.port import KeptFrames, Request
 from marey.models.momaskpp.bundle import load_networks, random_bundle
 from marey.models.momaskpp.config import CONFIGS, TINY, MoMaskPPConfig
-from marey.models.momaskpp.generate import Generated, Generator, SamplingSettings
+from marey.models.momaskpp.generate import Generator, SamplingSettings
 from marey.models.momaskpp.spec import SPEC
 from marey.models.momaskpp.words import pad_states
 from marey.nn.batch_threads import BatchThreads
 from marey.registry import Setting
+from tests.support.generating import Dropping, equal_motions
 from tests.support.prepared import text_features
 
 COUNT = 6
@@ -33,16 +34,6 @@ def request(index: int, seed: int, frames: int | None = None, prompt: str | None
 def requests() -> list[Request]:
     """Mixed lengths, some open."""
     return [request(i, 1000 + i, None if i % 5 == 4 else 20 + 17 * (i % 10)) for i in range(COUNT)]
-
-
-def equal(a: list[Generated | None], b: list[Generated | None]) -> bool:
-    return all(
-        x is not None
-        and y is not None
-        and np.array_equal(x.tokens, y.tokens)
-        and np.array_equal(x.features, y.features)
-        for x, y in zip(a, b, strict=True)
-    )
 
 
 def load_beside(generator: Generator, bundle: Bundle, threads: int = 1) -> Generator:
@@ -72,17 +63,17 @@ def test_motions_are_equal_in_any_batch_and_order(variant: Generator) -> None:
     together = variant.generate(requests())
     for size in (1, 4):
         parts = [variant.generate(requests()[i : i + size]) for i in range(0, COUNT, size)]
-        assert equal(together, [made for part in parts for made in part])
+        assert equal_motions(together, [made for part in parts for made in part])
     order = np.random.default_rng(0).permutation(COUNT)
     shuffled = variant.generate([requests()[i] for i in order])
-    assert equal([together[i] for i in order], shuffled)
+    assert equal_motions([together[i] for i in order], shuffled)
 
 
 def test_motions_are_equal_on_two_threads(variant: Generator) -> None:
     on_two = load_beside(variant, variant.bundle, threads=2)
     reference = variant.generate(requests())
-    assert equal(reference, on_two.generate(requests()))
-    assert equal(reference[2:3], on_two.generate(requests()[2:3]))  # its two branches of guidance
+    assert equal_motions(reference, on_two.generate(requests()))
+    assert equal_motions(reference[2:3], on_two.generate(requests()[2:3]))  # its two branches of guidance
 
 
 def test_seed_words_and_length_each_change_the_motion(generator: Generator) -> None:
@@ -161,26 +152,13 @@ def test_settings_are_described_in_full_and_unknown_ones_refused(generator: Gene
         generator.settings({"residual_guidance": 1.0})
 
 
-class Dropper:
-    """Drops request 1 after three steps."""
-
-    def __init__(self) -> None:
-        self.steps: list[tuple[int, int]] = []
-
-    def progress(self, done: int, total: int) -> None:
-        self.steps.append((done, total))
-
-    def dropped(self) -> set[int]:
-        return {1} if len(self.steps) >= 3 else set()
-
-
 def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(generator: Generator) -> None:
     asked = [request(i, i, 60) for i in range(3)]
     whole = generator.generate(asked)
-    control = Dropper()
+    control = Dropping(1, after=3)
     made = generator.generate(asked, control=control)
     assert made[1] is None
-    assert equal([whole[0], whole[2]], [made[0], made[2]])
+    assert equal_motions([whole[0], whole[2]], [made[0], made[2]])
     assert control.steps[-1][0] == control.steps[-1][1]
 
 
@@ -266,10 +244,10 @@ def test_coarse_tokens_are_kept_only_where_all_they_cover_is(variant: Generator)
 
 def test_motions_with_kept_frames_are_equal_in_any_batch(variant: Generator) -> None:
     asked = [*(keeping(variant, index) for index in range(3)), *requests()[:2]]
-    assert equal(variant.generate(asked), [made for each in asked for made in variant.generate([each])])
+    assert equal_motions(variant.generate(asked), [made for each in asked for made in variant.generate([each])])
 
 
 def test_a_free_request_does_not_read_its_text(variant: Generator) -> None:
     asked = keeping(variant, 1)
     other = replace(asked, text=request(3, 1).text)
-    assert equal(variant.generate([asked]), variant.generate([other]))
+    assert equal_motions(variant.generate([asked]), variant.generate([other]))

@@ -18,6 +18,7 @@ from marey.generation.shots.windows import no_text
 from marey.items.values import MAX_SEED
 from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.quality.selection import read_selection
+from tests.support.generating import Dropping
 
 RECORD = MotionQuality(
     support=["feet"], float_s=0, skate=0, penetration_mm=0, pops=0, range_deg=0, self_contact=0, flags=[], ok=True
@@ -72,18 +73,6 @@ class FakeGenerated:
     @property
     def features(self) -> np.ndarray[Any, Any]:
         return np.zeros((40, 263), np.float32)
-
-
-class Dropping:
-    def __init__(self, *rows: int) -> None:
-        self.rows = set(rows)
-        self.steps: list[tuple[int, int]] = []
-
-    def progress(self, done: int, total: int) -> None:
-        self.steps.append((done, total))
-
-    def dropped(self) -> set[int]:
-        return self.rows
 
 
 def choose(

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from marey.core import metrics
 from marey.core.metrics import MAX_TENANTS, OTHER_TENANTS
 from marey.db import SEARCH, transaction
-from marey.http.answers import Sender, route_of
+from marey.http.answers import NotedAnswer, route_of
 from marey.jobs import (
     Outbox,
     QueueDepth,
@@ -104,11 +104,11 @@ class Measure:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        began, sender = time.perf_counter(), Sender(send)
+        began, noted = time.perf_counter(), NotedAnswer(send)
         try:
-            await self.app(scope, receive, sender)
+            await self.app(scope, receive, noted)
         finally:
             route = route_of(scope)
             method = scope["method"] if scope["method"] in METHODS else "other"
-            metrics.HTTP_REQUESTS.labels(method, route, str(sender.status)).inc()
+            metrics.HTTP_REQUESTS.labels(method, route, str(noted.status)).inc()
             metrics.HTTP_SECONDS.labels(method, route).observe(time.perf_counter() - began)

@@ -1,4 +1,5 @@
-"""One thread for small networks; a small prepared folder."""
+"""One thread for small networks; a prepared folder of swinging stick figures with made-up text features: small, but in
+the real format."""
 
 from __future__ import annotations
 
@@ -16,4 +17,5 @@ def _one_thread() -> None:
 
 @pytest.fixture(scope="session")
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
-    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("mogo") / "prepared"))
+    """The prepared folder, open."""
+    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("data") / "prepared"))
