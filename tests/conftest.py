@@ -2,7 +2,7 @@
 
 `database_url` a migrated database of the test's own · `engine` its engine · `queue_url` an empty Valkey ·
 `folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start
-(and kill) servers of their own with `marey.embedded`.
+(and kill) servers of their own with `marey.embedded` · `models` the folder in which the process finds bundles.
 """
 
 from __future__ import annotations
@@ -192,3 +192,13 @@ def _execute(server: EmbeddedServer | GivenServer, statement: str) -> None:
     dsn = sa.make_url(server.url).set(drivername="postgresql", database="postgres")
     with psycopg.connect(dsn.render_as_string(hide_password=False), autocommit=True) as connection:
         connection.execute(statement.encode())
+
+
+@pytest.fixture
+def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of models, in which this process finds bundles and imported text encoders."""
+    from marey.core.settings import settings as process_settings
+
+    monkeypatch.setattr(process_settings(), "models", tmp_path / "bundles")
+    monkeypatch.setattr(process_settings(), "home", tmp_path / "home")
+    return tmp_path / "bundles"

@@ -7,9 +7,18 @@ from pathlib import Path
 
 import httpx2
 import pytest
+import redis
 
 from marey.embedded import EmbeddedServer
+from marey.runtime.queue import redis_client
 from tests.support.live_api import LiveApi, running_api, settings_of
+
+
+@pytest.fixture
+def client(queue_url: str) -> Iterator[redis.Redis]:
+    """The test's own way to Valkey."""
+    with redis_client(queue_url) as client:
+        yield client
 
 
 @pytest.fixture(scope="module")

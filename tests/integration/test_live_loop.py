@@ -27,7 +27,6 @@ from marey.registry import get_model, model_names, streaming_models
 from marey.runtime.live import supervisor
 from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.port import LiveFrame, SessionPool
-from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
 from marey.streams import StreamPrompt, StreamState, prompts_with_rewrites, stream_actions, stream_prompts
 from marey.streams.actions import ActionStart
@@ -51,12 +50,6 @@ Start = Callable[..., LiveWorker]
 def streaming(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Streaming]:
     with loaded(request.param, tmp_path_factory.mktemp(request.param)) as streaming:
         yield streaming
-
-
-@pytest.fixture
-def client(queue_url: str) -> Iterator[redis.Redis]:
-    with redis_client(queue_url) as client:
-        yield client
 
 
 @pytest.fixture

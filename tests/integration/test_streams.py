@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +25,6 @@ ACTS = ["write", "renew", "lapse", "release", "take"]
 FOREIGN = [b"\xff\x00", b"[]", b'{"kind": "fly"}', b'{"kind": 3}', b'{"kind": "steer"}', b'{"kind": "stop", "x": 1}']
 _names = itertools.count()
 many_examples = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-@pytest.fixture
-def client(queue_url: str) -> Iterator[redis.Redis]:
-    with redis_client(queue_url) as client:
-        yield client
 
 
 def new_stream(client: redis.Redis, lease_ms: int = 60_000, **options: int) -> FrameStream:

@@ -7,15 +7,10 @@ peer that acknowledges every byte, so neither keepalives nor `tcp_user_timeout` 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import socket
 import struct
-import threading
-from collections.abc import Coroutine
-from concurrent.futures import Future
-from typing import TypeVar
 
-T = TypeVar("T")
+from tests.servers.loop_thread import LoopThread, relay
 
 CHUNK = 64 * 1024
 DRIP_SECONDS = 0.2
@@ -34,7 +29,7 @@ class _Link:
         self.abandoned = False
 
 
-class StallingProxy:
+class StallingProxy(LoopThread):
     """Forward TCP connections on 127.0.0.1 to a server until the end of the `with` block.
 
     Args:
@@ -47,23 +42,10 @@ class StallingProxy:
         self._target = target
         self._pace = pace
         self._wanted_port = port
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="stalling proxy", daemon=True)
         self._links: set[_Link] = set()
-        self._tasks: set[asyncio.Task[None]] = set()
         self._stall_new = False
         self.port = 0
-
-    def __enter__(self) -> StallingProxy:
-        self._thread.start()
-        self._call(self._start())
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._call(self._stop())
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(10)
-        self._loop.close()
+        super().__init__("stalling proxy")
 
     @property
     def connections(self) -> int:
@@ -107,23 +89,13 @@ class StallingProxy:
         """
         self._call(self._cut(silent))
 
-    def _call(self, work: Coroutine[object, object, T]) -> T:
-        future: Future[T] = asyncio.run_coroutine_threadsafe(work, self._loop)
-        return future.result(30)
-
-    async def _start(self) -> None:
+    async def _listen(self) -> asyncio.Server:
         listening = socket.create_server(("127.0.0.1", self._wanted_port), backlog=128)
         if self._pace is not None:  # connections inherit it: else the kernel would take megabytes at once
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
-        self._server = await asyncio.start_server(self._serve, sock=listening)
+        server = await asyncio.start_server(self._serve, sock=listening)
         self.port = listening.getsockname()[1]
-
-    async def _stop(self) -> None:
-        self._server.close()
-        for task in list(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self._cut()
+        return server
 
     async def _stall(self, new: bool) -> int:
         self._stall_new = new
@@ -154,22 +126,17 @@ class StallingProxy:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
-        self._tasks.add(task)
         link = _Link(reader, writer, task)
         if self._stall_new:
             link.flowing.clear()
         self._links.add(link)
         try:
-            # asyncio 3.11 logs a cancelled connection task as an error: end it quietly.
-            with contextlib.suppress(OSError, asyncio.CancelledError):
-                await self._forward(link)
+            await self._forward(link)
         finally:
             self._links.discard(link)
-            self._tasks.discard(task)
-            writer.close()
 
     async def _forward(self, link: _Link) -> None:
         await link.flowing.wait()
@@ -177,18 +144,11 @@ class StallingProxy:
             reader, writer = await asyncio.open_unix_connection(self._target)
         else:
             reader, writer = await asyncio.open_connection(*self._target)
-        pumps = [
-            asyncio.create_task(_pump(link, link.reader, writer, self._pace)),
-            asyncio.create_task(_pump(link, reader, link.writer, self._pace, answers=True)),
-        ]
+        there = _pump(link, link.reader, writer, self._pace)
+        back = _pump(link, reader, link.writer, self._pace, answers=True)
         try:
-            await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
-            if link.abandoned:
-                await asyncio.Event().wait()  # until the proxy stops
+            await relay(there, back, hold=lambda: link.abandoned)
         finally:
-            for pump in pumps:
-                pump.cancel()
-            await asyncio.gather(*pumps, return_exceptions=True)
             writer.close()
 
 

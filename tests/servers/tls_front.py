@@ -5,14 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ssl
-import threading
-from collections.abc import Coroutine
-from typing import Any
+
+from tests.servers.loop_thread import LoopThread, relay
 
 CHUNK = 64 * 1024
 
 
-class TlsFront:
+class TlsFront(LoopThread):
     """Forward TLS connections to `localhost` until the end of the `with` block.
 
     Args:
@@ -30,59 +29,20 @@ class TlsFront:
         self.connections = 0
         self._context = context
         self._target = target
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="TLS front", daemon=True)
-        self._tasks: set[asyncio.Task[None]] = set()
+        super().__init__("TLS front")
 
-    def __enter__(self) -> TlsFront:
-        self._thread.start()
-        self._call(self._start())
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._call(self._stop())
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(10)
-        self._loop.close()
-
-    def _call(self, work: Coroutine[Any, Any, None]) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(30)
-
-    async def _start(self) -> None:
+    async def _listen(self) -> asyncio.Server:
         self._loop.set_exception_handler(lambda *_: None)  # failed handshakes are what tests provoke
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, ssl=self._context)
-        self.port = self._server.sockets[0].getsockname()[1]
+        server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, ssl=self._context)
+        self.port = server.sockets[0].getsockname()[1]
+        return server
 
-    async def _stop(self) -> None:
-        self._server.close()
-        for task in list(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
-        try:
-            with contextlib.suppress(OSError, asyncio.CancelledError):
-                await self._forward(reader, writer)
-        finally:
-            self._tasks.discard(task)
-            writer.close()
-
-    async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         inner_reader, inner_writer = await asyncio.open_connection(*self._target)
-        pumps = [
-            asyncio.create_task(_pump(reader, inner_writer)),
-            asyncio.create_task(_pump(inner_reader, writer)),
-        ]
         try:
-            await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            await relay(_pump(reader, inner_writer), _pump(inner_reader, writer))
         finally:
-            for pump in pumps:
-                pump.cancel()
-            await asyncio.gather(*pumps, return_exceptions=True)
             inner_writer.close()
 
 

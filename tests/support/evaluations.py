@@ -29,10 +29,10 @@ from marey.evaluations import (
     store_prompts,
 )
 from marey.items.evaluation_prompts import EvaluationPrompt
-from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, ClaimedItem, tables
+from marey.jobs import EVALUATOR_QUEUE, ClaimedItem, tables
 from marey.measures.scores import SCHEMA, VERSION, MotionScore
 from marey.runtime.export_types import ExportedFile
-from marey.runtime.handler import Batch, BatchControl, Outcome, Scored, TextDone
+from marey.runtime.handler import Batch, BatchControl, Outcome, Scored
 from marey.runtime.scoring import ScoreInput
 from marey.scheduler.evaluations import EvaluationScheduler
 from marey.tenants import DEFAULT_TENANT
@@ -100,23 +100,6 @@ def models_of(home: Path) -> Settings:
     write_generator(models)
     write_evaluator(models)
     return Settings(home=home, models=models)
-
-
-class ToyTexts:
-    """Reads no prompt and says that it did."""
-
-    queue = TEXT_QUEUE
-    batch_size = 64
-
-    def load(self, bundle: str) -> None:
-        pass
-
-    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
-        return [batch.items]
-
-    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
-        for item in batch.items:
-            yield TextDone(item.id, item.text_key, b"text")
 
 
 class ToyEvaluator:

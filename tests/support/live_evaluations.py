@@ -17,10 +17,10 @@ from marey.evaluations import tables as evaluation_tables
 from marey.scheduler.evaluations import EvaluationScheduler
 from marey.tenants import create_key
 from marey.tenants import tables as tenant_tables
-from tests.support.evaluations import ToyEvaluator, ToyTexts, write_evaluator, write_generator
+from tests.support.evaluations import ToyEvaluator, write_evaluator, write_generator
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.runtime import Loop
-from tests.support.toy import ToyHandler
+from tests.support.toy import ToyHandler, ToyTextHandler
 
 
 @dataclass
@@ -72,7 +72,7 @@ def studio(home: Path, database_url: str, queue_url: str) -> Iterator[Studio]:
     write_evaluator(config.models)
     judge = ToyEvaluator()
     with running_api(config, database_url) as api:
-        loop = Loop(api.engine, api.store, ToyTexts(), ToyHandler(), judge)
+        loop = Loop(api.engine, api.store, ToyTextHandler(), ToyHandler(), judge)
         try:
             yield Studio(api, config, judge, EvaluationScheduler(api.engine, config), loop)
         finally:

@@ -11,9 +11,9 @@ import sqlalchemy as sa
 from marey.core.settings import Settings
 from marey.scheduler.evaluations import EvaluationScheduler
 from marey.storage import FolderStore
-from tests.support.evaluations import ToyEvaluator, ToyTexts, models_of
+from tests.support.evaluations import ToyEvaluator, models_of
 from tests.support.runtime import Loop
-from tests.support.toy import ToyHandler
+from tests.support.toy import ToyHandler, ToyTextHandler
 
 
 @pytest.fixture
@@ -34,6 +34,6 @@ def judge() -> ToyEvaluator:
 @pytest.fixture
 def loop(engine: sa.Engine, folder_store: FolderStore, judge: ToyEvaluator) -> Iterator[Loop]:
     """One child that serves prompts, motions and evaluations."""
-    made = Loop(engine, folder_store, ToyTexts(), ToyHandler(), judge)
+    made = Loop(engine, folder_store, ToyTextHandler(), ToyHandler(), judge)
     yield made
     made.close()

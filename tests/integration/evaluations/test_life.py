@@ -23,7 +23,6 @@ from tests.support.evaluations import (
     JUDGE,
     PROMPTS,
     ToyEvaluator,
-    ToyTexts,
     evaluation_row,
     finish,
     history,
@@ -32,7 +31,7 @@ from tests.support.evaluations import (
     write_generator,
 )
 from tests.support.runtime import Loop
-from tests.support.toy import ToyHandler
+from tests.support.toy import ToyHandler, ToyTextHandler
 from tests.support.toy_jobs import audit
 
 S = EvaluationState
@@ -137,7 +136,7 @@ def test_a_run_is_not_compared_with_one_of_another_model(
     engine: sa.Engine, scheduler: EvaluationScheduler, folder_store: FolderStore, judge: ToyEvaluator, config: Settings
 ) -> None:
     write_generator(config.models, "other-starter", model="other")
-    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), Other(), judge)
+    loop = Loop(engine, folder_store, ToyTextHandler(), ToyHandler(), Other(), judge)
     try:
         for bundle in (GENERATOR, "other-starter"):
             assert finish(scheduler, loop, engine, new_evaluation(engine, bundle=bundle)).state is S.DONE

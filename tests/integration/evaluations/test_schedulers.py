@@ -16,7 +16,6 @@ from marey.evaluations import EvaluationState
 from marey.storage import FolderStore
 from tests.support.evaluations import (
     ToyEvaluator,
-    ToyTexts,
     state_of,
     wait,
 )
@@ -27,7 +26,7 @@ from tests.support.schedules import (
     runs,
     time_passes,
 )
-from tests.support.toy import ToyHandler
+from tests.support.toy import ToyHandler, ToyTextHandler
 from tests.support.toy_jobs import audit
 
 S = EvaluationState
@@ -53,7 +52,7 @@ def test_a_scheduled_run_survives_a_scheduler_killed_in_each_state(
 ) -> None:
     schedule = new_schedule(engine)
     time_passes(engine, schedule, missed=1)
-    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
+    loop = Loop(engine, folder_store, ToyTextHandler(), ToyHandler(), ToyEvaluator())
     try:
         for state in (S.GENERATING, S.SCORING):
             process = start()
@@ -84,7 +83,7 @@ def test_two_schedulers_of_one_server_fire_once_and_take_each_step_once(
         time_passes(engine, schedule, missed=1)
     start()
     start()
-    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
+    loop = Loop(engine, folder_store, ToyTextHandler(), ToyHandler(), ToyEvaluator())
 
     def all_done() -> bool:
         loop.run()

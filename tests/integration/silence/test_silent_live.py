@@ -33,13 +33,6 @@ def streaming(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         yield streaming
 
 
-@pytest.fixture
-def client(queue_url: str) -> Iterator[redis.Redis]:
-    """The test's own way to Redis."""
-    with redis_client(queue_url) as client:
-        yield client
-
-
 def goes_on(studio: Studio, streams: list[UUID]) -> float:
     """Wait until every stream has shown another second; gives how long the slowest took."""
     began, before = time.monotonic(), [studio.shown(stream) for stream in streams]

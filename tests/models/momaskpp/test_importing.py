@@ -13,7 +13,6 @@ import torch
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound
-from marey.core.settings import settings
 from marey.generation.port import Request
 from marey.importing import ImportRequest
 from marey.models.momaskpp.bundle import load_networks
@@ -96,14 +95,6 @@ def humanml3d(tmp_path: Path) -> Path:
 @pytest.fixture(scope="module")
 def t5(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_tiny_t5("t5-v1_1-base", tmp_path_factory.mktemp("t5"))
-
-
-@pytest.fixture
-def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of models, in which imported text encoders are found."""
-    monkeypatch.setattr(settings(), "models", tmp_path / "models")
-    monkeypatch.setattr(settings(), "home", tmp_path / "home")
-    return tmp_path / "models"
 
 
 def run(folder: Path, output: Path, t5: Path | None) -> Bundle:

@@ -13,7 +13,6 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.core.errors import Conflict, InvalidBundle, InvalidFile, MareyError, NotFound
-from marey.core.settings import settings
 from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import renew_reference
 from marey.evaluator.bundle import write_bundle
@@ -105,14 +104,6 @@ def run(download: Path, output: Path, t5: Path | None, *, overwrite: bool = Fals
 @pytest.fixture(scope="module")
 def t5(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_tiny_t5("t5-v1_1-base", tmp_path_factory.mktemp("t5"))
-
-
-@pytest.fixture
-def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of models, in which imported text encoders are found."""
-    monkeypatch.setattr(settings(), "models", tmp_path / "models")
-    monkeypatch.setattr(settings(), "home", tmp_path / "home")
-    return tmp_path / "models"
 
 
 def test_the_imported_evaluator_reads_motions_and_sentences(download: Path, models: Path, t5: Path) -> None:

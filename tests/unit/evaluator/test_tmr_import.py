@@ -16,7 +16,6 @@ from torch import Tensor, nn
 
 from marey.bundles import Bundle
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
-from marey.core.settings import settings
 from marey.evaluator.assembly import renew_reference
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.reference import RealClips
@@ -34,14 +33,6 @@ LICENCE = "LicenseRef-AMASS-NC"
 @pytest.fixture(scope="module")
 def distilbert(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_tiny_distilbert(tmp_path_factory.mktemp("distilbert"))
-
-
-@pytest.fixture
-def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of models, in which imported text encoders are found."""
-    monkeypatch.setattr(settings(), "models", tmp_path / "bundles")
-    monkeypatch.setattr(settings(), "home", tmp_path / "home")
-    return tmp_path / "bundles"
 
 
 def run(folder: Path, output: Path, encoder: Path | None = None, *, overwrite: bool = False) -> Bundle:

@@ -14,7 +14,6 @@ from safetensors.torch import load_file, save_file
 
 from marey.bundles import Bundle, TextSpec
 from marey.core.errors import Conflict, InvalidFile, MareyError, NotFound
-from marey.core.settings import settings
 from marey.importing import ImportRequest, text_encoder_of
 from marey.importing.encoder_files import write_encoder
 from marey.text.encoders import find_weights, weights_sha256
@@ -37,14 +36,6 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     (root / DISTILBERT).mkdir()
     write_tiny_distilbert(root / DISTILBERT)
     return {path.name: path for path in root.iterdir()}
-
-
-@pytest.fixture
-def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of models, in which imported text encoders are found."""
-    monkeypatch.setattr(settings(), "models", tmp_path / "models")
-    monkeypatch.setattr(settings(), "home", tmp_path / "home")
-    return tmp_path / "models"
 
 
 def pickled(folder: Path, target: Path) -> Path:
