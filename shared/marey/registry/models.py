@@ -244,13 +244,22 @@ def models_by_range(setting: str) -> dict[str, list[str]]:
     return found
 
 
+def models_with(field: str) -> tuple[str, ...]:
+    """Return the names of the registered models whose specs have a field that others leave out, sorted.
+
+    Raises:
+        PluginError: a model cannot be loaded.
+    """
+    return tuple(name for name, spec in MODELS.all().items() if getattr(spec, field))
+
+
 def streaming_models() -> tuple[str, ...]:
     """The names of the registered models that make live streams, sorted.
 
     Raises:
         PluginError: a model cannot be loaded.
     """
-    return tuple(name for name, spec in MODELS.all().items() if spec.live is not None)
+    return models_with("live")
 
 
 def trainings() -> dict[str, Training]:

@@ -11,12 +11,13 @@ import pytest
 import torch
 
 from marey.core.errors import InvalidBundle, InvalidInput
+from marey.generation.base import GeneratedMotion
 from marey.generation.export import finish
 from marey.generation.port import Request
 from marey.models.momask.bundle import random_bundle
 from marey.models.momask.config import KIT, TINY, InferenceConfig
 from marey.models.momask.decoding import Items, decode_base, decode_residual, masked_counts
-from marey.models.momask.generate import Generated, Generator, SamplingSettings
+from marey.models.momask.generate import Generator, SamplingSettings
 from marey.models.momask.model import MaskedTransformer, ResidualTransformer
 from marey.models.momask.spec import SPEC
 from tests.support.generating import Dropping, equal_motions
@@ -31,17 +32,19 @@ def requests() -> list[Request]:
 
 
 @pytest.fixture(scope="module")
-def reference(generator: Generator) -> list[Generated | None]:
+def reference(generator: Generator) -> list[GeneratedMotion | None]:
     return generator.generate(requests())
 
 
-def test_motions_are_equal_in_batches_of_1_3_and_32(generator: Generator, reference: list[Generated | None]) -> None:
+def test_motions_are_equal_in_batches_of_1_3_and_32(
+    generator: Generator, reference: list[GeneratedMotion | None]
+) -> None:
     for size in (1, 3):
         parts = [generator.generate(requests()[i : i + size]) for i in range(0, COUNT, size)]
         assert equal_motions(reference, [made for part in parts for made in part])
 
 
-def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: list[Generated | None]) -> None:
+def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: list[GeneratedMotion | None]) -> None:
     order = np.random.default_rng(0).permutation(COUNT)
     shuffled = generator.generate([requests()[i] for i in order])
     assert equal_motions([reference[i] for i in order], shuffled)
@@ -55,7 +58,7 @@ def on_two_threads(generator: Generator) -> Iterator[Generator]:
     torch.set_num_threads(before)
 
 
-def test_motions_are_equal_on_two_threads(on_two_threads: Generator, reference: list[Generated | None]) -> None:
+def test_motions_are_equal_on_two_threads(on_two_threads: Generator, reference: list[GeneratedMotion | None]) -> None:
     assert on_two_threads.batch_threads.count == 2
     assert equal_motions(reference, on_two_threads.generate(requests()))
     assert equal_motions(reference[7:8], on_two_threads.generate(requests()[7:8]))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
@@ -56,9 +57,17 @@ class Sampling(Generic[C]):
 P = TypeVar("P", bound=Sampling[Any])
 """Sampling settings of a model."""
 G = TypeVar("G")
-"""One motion as a model generates it."""
+"""One motion as a model generates it, such as `GeneratedMotion`."""
 Draw = Callable[[RowWatcher], Sequence[G]]
 """Generates the rows of a group, and returns those that its watcher still has at the end."""
+
+
+@dataclass(frozen=True)
+class GeneratedMotion:
+    """One motion as the network generated it, before decoding to joints and clean-up."""
+
+    tokens: NDArray[np.int16]  # (V, n): levels and tokens; -1 = none
+    features: NDArray[np.float32]  # (T, D), in the layout's own units
 
 
 class SampledGenerator(ABC, Generic[P]):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import extra
-from marey.registry import find_model, model_names, resolve
+from marey.registry import find_model, models_with, resolve
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,11 +56,10 @@ def difficulties_of(bundle: str, clips: Sequence[MotionClip], names: Sequence[st
     found = choose_bundle(bundle)
     spec = find_model(found.manifest.model)
     if spec is None or spec.difficulty is None:
-        able = [name for name in model_names() if (each := find_model(name)) and each.difficulty]
         raise InvalidInput(
             f"the model {found.manifest.model!r} does not predict which tokens are hard",
             where=bundle,
-            hint=f"Models that do: {', '.join(able) or 'none'}.",
+            hint=f"Models that do: {', '.join(models_with('difficulty')) or 'none'}.",
         )
     space = layout_of(found.manifest)
     motions = [_features(clip, space, name) for clip, name in zip(clips, names, strict=True)]

@@ -8,7 +8,7 @@ from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import extra
-from marey.registry import Training, find_model, model_names, resolve
+from marey.registry import Training, find_model, models_with, resolve
 
 
 def train_stage(
@@ -152,11 +152,10 @@ def self_train(
     found = choose_bundle(bundle)
     spec = find_model(found.manifest.model)
     if spec is None or spec.self_train is None:
-        able = [name for name in model_names() if (each := find_model(name)) and each.self_train]
         raise InvalidInput(
             f"the model {found.manifest.model!r} has no self-training",
             where=bundle,
-            hint=f"Models that have: {', '.join(able) or 'none'}.",
+            hint=f"Models that have: {', '.join(models_with('self_train')) or 'none'}.",
         )
     generator = resolve(spec.load)(found, threads=threads)
     prepared = PreparedData.open(data)

@@ -8,10 +8,9 @@ from typing import Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from marey.bundles import Bundle
-from marey.generation.base import Draw, GroupedGenerator, Sampling
+from marey.generation.base import Draw, GeneratedMotion, GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import write_kept
 from marey.generation.port import Limits, Request
@@ -63,11 +62,9 @@ class SamplingSettings(Sampling[InferenceConfig]):
 
 
 @dataclass(frozen=True)
-class Generated:
-    """One motion as the network generated it, before decoding to joints and clean-up."""
+class Generated(GeneratedMotion):
+    """One motion as the network generated it."""
 
-    tokens: NDArray[np.int16]  # (V, n)
-    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
     decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from marey.bundles import Bundle
 from marey.bundles.body import layout_of
 from marey.core.errors import InvalidInput
-from marey.generation.base import SampledGenerator, Sampling
+from marey.generation.base import GeneratedMotion, SampledGenerator, Sampling
 from marey.generation.port import GenerationControl, Limits, NoControl, Request
 from marey.models.mogo.bundle import Networks, load_networks
 from marey.models.mogo.config import InferenceConfig, MOGOConfig
@@ -40,14 +40,6 @@ class SamplingSettings(Sampling[InferenceConfig]):
     upper_top_k: float | None = None
     guidance: float | None = None
     upper_guidance: float | None = None
-
-
-@dataclass(frozen=True)
-class Generated:
-    """One motion as the network generated it, before decoding to joints and clean-up."""
-
-    tokens: NDArray[np.int16]  # (V, T)
-    features: NDArray[np.float32]  # (T, D), in the layout's own units
 
 
 class Generator(SampledGenerator[SamplingSettings]):
@@ -122,7 +114,7 @@ class Generator(SampledGenerator[SamplingSettings]):
         settings: SamplingSettings | None = None,
         *,
         control: GenerationControl | None = None,
-    ) -> list[Generated | None]:
+    ) -> list[GeneratedMotion | None]:
         """Generate one motion per request; None where `control` dropped it.
 
         The tokens of an item do not depend on the number or order of the others.
@@ -156,10 +148,10 @@ class Generator(SampledGenerator[SamplingSettings]):
             raise InvalidInput(f"tokens {tokens.shape} are not {wanted}", where="tokens")
         return torch.from_numpy(tokens.astype(np.int64)).to(self.device)
 
-    def _decode(self, tokens: torch.Tensor) -> Generated:
+    def _decode(self, tokens: torch.Tensor) -> GeneratedMotion:
         """Decode one by one: a convolution rounds differently in another batch, and files would differ."""
         features = self.tokenizer.decode(tokens[None])[0]
-        return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
+        return GeneratedMotion(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
 
 
 class _Drawing:

@@ -8,10 +8,9 @@ from typing import Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from marey.bundles import Bundle
-from marey.generation.base import Draw, GroupedGenerator, Sampling
+from marey.generation.base import Draw, GeneratedMotion, GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.port import Limits, Request
 from marey.models.momask.bundle import Networks, load_networks
@@ -38,15 +37,7 @@ class SamplingSettings(Sampling[InferenceConfig]):
     residual_top_k: float | None = None
 
 
-@dataclass(frozen=True)
-class Generated:
-    """One motion as the network generated it, before decoding to joints and clean-up."""
-
-    tokens: NDArray[np.int16]  # (V, n); -1 = a drawn padding token, which adds nothing
-    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
-
-
-class Generator(GroupedGenerator[SamplingSettings, Generated]):
+class Generator(GroupedGenerator[SamplingSettings, GeneratedMotion]):
     """A loaded bundle. Not thread-safe; one per process."""
 
     sampling = SamplingSettings
@@ -84,10 +75,10 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
 
     def _drawing(
         self, requests: Sequence[Request], frames: Sequence[int], settings: SamplingSettings
-    ) -> tuple[int, Draw[Generated]]:
+    ) -> tuple[int, Draw[GeneratedMotion]]:
         inference = settings.inference(self.config.inference)
 
-        def draw(watcher: RowWatcher) -> list[Generated]:
+        def draw(watcher: RowWatcher) -> list[GeneratedMotion]:
             rows = watcher.rows
             items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
             items = decode_base(self.networks.masked, items, inference, watcher.step)
@@ -96,11 +87,14 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
 
         return inference.steps + self.config.tokenizer.levels, draw
 
-    def _generated(self, items: Items, position: int, frames: int) -> Generated:
-        """Decode one item alone, at its own length: padding would change the motion's end (`Tokenizer`)."""
+    def _generated(self, items: Items, position: int, frames: int) -> GeneratedMotion:
+        """Decode one item alone, at its own length: padding would change the motion's end (`Tokenizer`).
+
+        A drawn padding token is -1 and adds nothing.
+        """
         tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
         features = self.networks.tokenizer.decode(tokens[None])[0, :frames]
-        return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
+        return GeneratedMotion(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
 
     def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
         lengths = [self._tokens(count) for count in frames]

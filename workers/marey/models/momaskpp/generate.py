@@ -13,7 +13,7 @@ from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.generation.base import Draw, GroupedGenerator, Sampling
+from marey.generation.base import Draw, GeneratedMotion, GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import bridged, whole_tokens
 from marey.generation.port import Limits, Request
@@ -40,15 +40,7 @@ class SamplingSettings(Sampling[InferenceConfig]):
     top_k: float | None = None
 
 
-@dataclass(frozen=True)
-class Generated:
-    """One motion as the network generated it, before decoding to joints and clean-up."""
-
-    tokens: NDArray[np.int16]  # (1, N): a block a scale, coarse to fine, -1 where the motion has no token
-    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
-
-
-class Generator(GroupedGenerator[SamplingSettings, Generated]):
+class Generator(GroupedGenerator[SamplingSettings, GeneratedMotion]):
     """A loaded bundle. Not thread-safe; one per process."""
 
     sampling = SamplingSettings
@@ -105,11 +97,11 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
 
     def _drawing(
         self, requests: Sequence[Request], frames: Sequence[int], settings: SamplingSettings
-    ) -> tuple[int, Draw[Generated]]:
+    ) -> tuple[int, Draw[GeneratedMotion]]:
         inference = settings.inference(self.config.inference)
         words = self.reader.states([request.text.rewritten for request in requests])
 
-        def draw(watcher: RowWatcher) -> list[Generated]:
+        def draw(watcher: RowWatcher) -> list[GeneratedMotion]:
             own = watcher.rows
             items = self._items([requests[r] for r in own], [frames[r] for r in own], [words[r] for r in own])
             items = decode(self.networks.masked, items, self.scales, inference, watcher.step)
@@ -162,14 +154,15 @@ class Generator(GroupedGenerator[SamplingSettings, Generated]):
         kept = np.pad(is_kept, (0, -len(is_kept) % rate), mode="edge").reshape(-1, rate).all(1)  # (n,)
         return tokens.masked_fill(~self.scales.within(torch.from_numpy(kept).to(self.device)), NO_TOKEN)
 
-    def _generated(self, items: ScaleItems, position: int, frames: int) -> Generated:
-        """Decode one item alone: a convolution rounds differently in another batch, and files would differ."""
+    def _generated(self, items: ScaleItems, position: int, frames: int) -> GeneratedMotion:
+        """Decode one item alone: a convolution rounds differently in another batch, and files would differ. Its tokens
+        (1, N) are a block a scale, coarse to fine."""
         tokens, length = items.tokens[position : position + 1], items.lengths[position : position + 1]
         tokenizer, refiner = self.networks.tokenizer, self.networks.refiner
         features = tokenizer.decode(tokens[..., None], length)
         if refiner is not None:
             features = self._refined(refiner, features)
-        return Generated(tokens.cpu().numpy().astype(np.int16), features[0, :frames].cpu().numpy())
+        return GeneratedMotion(tokens.cpu().numpy().astype(np.int16), features[0, :frames].cpu().numpy())
 
     def _refined(self, refiner: RootRefiner, features: Tensor) -> Tensor:
         """Replace the root's velocity by what the refiner makes of the other columns (1, T, D).
