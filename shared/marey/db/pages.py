@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from operator import attrgetter
 from typing import Any, Generic, TypeVar
 from uuid import UUID
 
@@ -76,21 +77,32 @@ class Order:
         """Return the condition of rows that come after a cursor; raises as `place`."""
         return self.beyond(self.place(cursor, scope))
 
-    def read(
-        self, conn: sa.Connection, query: sa.Select[Any], scope: sa.ColumnElement[bool], cursor: str | None, limit: int
-    ) -> Sequence[sa.RowMapping]:
-        """Return the rows of a page, and one more if there is a next one, for `cut_page`.
+    def page(
+        self,
+        conn: sa.Connection,
+        query: sa.Select[Any],
+        scope: sa.ColumnElement[bool],
+        cursor: str | None,
+        limit: int,
+        read: Callable[[sa.RowMapping], Row],
+        *,
+        mark: Callable[[Row], tuple[datetime, UUID]] = attrgetter("created", "id"),
+    ) -> Page[Row]:
+        """Return a page of a listing.
 
         Args:
             query: the rows that are wanted, in any order.
             scope: as in `place`.
+            read: makes a row of the database's.
+            mark: returns the creation time and the id of a row.
 
         Raises:
             InvalidInput: not a cursor of this listing, or a limit out of range.
         """
         if cursor is not None:
             query = query.where(self.after(cursor, scope))
-        return conn.execute(query.order_by(*self.by()).limit(page_limit(limit) + 1)).mappings().all()
+        found = conn.execute(query.order_by(*self.by()).limit(page_limit(limit) + 1)).mappings()
+        return cut_page([read(each) for each in found], limit, lambda row: mark_of(*mark(row)))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY
 
 from marey.core import characters
+from marey.core.errors import MareyError
 
 CLOCK = sa.func.clock_timestamp()
 """Database time at this statement; `now()` is the start of the transaction, before it waited for locks."""
@@ -28,6 +29,18 @@ def notify(conn: sa.Connection, channel: str, payloads: Iterable[str]) -> None:
     """NOTIFY when this transaction commits; equal payloads are sent once."""
     for payload in payloads:
         conn.execute(sa.select(sa.func.pg_notify(channel, payload)))
+
+
+def need_row(conn: sa.Connection, query: sa.Select[Any], missing: MareyError) -> sa.RowMapping:
+    """Return the row of a query.
+
+    Raises:
+        MareyError: `missing`, where there is none.
+    """
+    row = conn.execute(query).mappings().one_or_none()
+    if row is None:
+        raise missing
+    return row
 
 
 def check_text(text: str | None, where: str) -> None:

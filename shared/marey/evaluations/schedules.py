@@ -11,8 +11,8 @@ import sqlalchemy as sa
 
 from marey.core.errors import InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
-from marey.db.sql import CLOCK, check_text
+from marey.db.pages import Order, Page
+from marey.db.sql import CLOCK, check_text, need_row
 from marey.evaluations import tables
 from marey.evaluations.cron import check_cron, check_zone, last_time, next_time
 from marey.evaluations.repository import create_evaluation, lock_evaluation, move_evaluation
@@ -52,12 +52,9 @@ def get_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> ScheduleRo
         NotFound: the tenant has no such schedule.
     """
     table = tables.schedule.c
-    row = conn.execute(_schedules().where(table.tenant_id == tenant, table.id == schedule)).mappings().one_or_none()
-    if row is None:
-        raise NotFound(
-            "there is no such schedule", where=f"schedule {schedule}", hint="`marey eval schedule list` shows yours."
-        )
-    return _row(row)
+    query = _schedules().where(table.tenant_id == tenant, table.id == schedule)
+    hint = "`marey eval schedule list` shows yours."
+    return _row(need_row(conn, query, NotFound("there is no such schedule", where=f"schedule {schedule}", hint=hint)))
 
 
 def list_schedules(
@@ -67,8 +64,7 @@ def list_schedules(
     table = tables.schedule.c
     ours = table.tenant_id == tenant
     query, order = _schedules().where(ours), Order(table.created_at, table.id)
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
+    return order.page(conn, query, ours, cursor, limit, _row)
 
 
 def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: ScheduleChange) -> ScheduleRow:

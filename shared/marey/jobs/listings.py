@@ -8,8 +8,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit, read_cursor
-from marey.db.sql import among
+from marey.db.pages import Order, Page, cut_page, page_limit, read_cursor
+from marey.db.sql import among, need_row
 from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import no_such_job
@@ -25,10 +25,7 @@ def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
         NotFound: the tenant has no such job.
     """
     table = tables.job.c
-    row = conn.execute(_jobs().where(table.tenant_id == tenant, table.id == job)).mappings().one_or_none()
-    if row is None:
-        raise no_such_job(job)
-    return _job(row)
+    return _job(need_row(conn, _jobs().where(table.tenant_id == tenant, table.id == job), no_such_job(job)))
 
 
 def list_jobs(
@@ -40,8 +37,7 @@ def list_jobs(
     query, order = _jobs().where(ours), Order(table.created_at, table.id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([_job(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
+    return order.page(conn, query, ours, cursor, limit, _job)
 
 
 def list_items(

@@ -16,8 +16,8 @@ from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Busy, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
-from marey.db.sql import CLOCK, check_text, interval
+from marey.db.pages import Order, Page
+from marey.db.sql import CLOCK, check_text, interval, need_row
 from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
 from marey.jobs.types import FailureReason, NewItem, NewJob
@@ -87,10 +87,8 @@ def get_stream(conn: sa.Connection, tenant: str, stream: UUID) -> StreamRow:
         NotFound: the tenant has no such stream.
     """
     table = tables.stream.c
-    row = conn.execute(_streams().where(table.tenant_id == tenant, table.id == stream)).mappings().one_or_none()
-    if row is None:
-        raise NotFound("there is no such stream", where=f"stream {stream}")
-    return _row(row)
+    query = _streams().where(table.tenant_id == tenant, table.id == stream)
+    return _row(need_row(conn, query, NotFound("there is no such stream", where=f"stream {stream}")))
 
 
 def list_streams(
@@ -102,8 +100,7 @@ def list_streams(
     query, order = _streams().where(ours), Order(table.created_at, table.id)
     if is_open:
         query = query.where(table.ended_at.is_(None))
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
+    return order.page(conn, query, ours, cursor, limit, _row)
 
 
 def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:

@@ -13,8 +13,8 @@ from marey.core.errors import Conflict, NotFound, Unreachable
 from marey.db.database import transaction
 from marey.db.deadlines import MAINTENANCE
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
-from marey.db.sql import CLOCK
+from marey.db.pages import Order, Page
+from marey.db.sql import CLOCK, need_row
 from marey.jobs import tables
 from marey.takes.assets import keep_content, write_content
 from marey.takes.gc import remove_assets
@@ -61,8 +61,7 @@ def list_rigs(conn: sa.Connection, tenant: str, *, cursor: str | None = None, li
     table = tables.rig.c
     ours = table.tenant_id == tenant
     query, order = rigs_query().where(ours), Order(table.created_at, table.id)
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([RigRow(**row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
+    return order.page(conn, query, ours, cursor, limit, lambda row: RigRow(**row))
 
 
 def get_rig(conn: sa.Connection, tenant: str, name: str) -> RigRow:
@@ -72,10 +71,8 @@ def get_rig(conn: sa.Connection, tenant: str, name: str) -> RigRow:
         NotFound: the tenant has no such rig.
     """
     table = tables.rig.c
-    row = conn.execute(rigs_query().where(table.tenant_id == tenant, table.name == name)).mappings().one_or_none()
-    if row is None:
-        raise _no_rig(name)
-    return RigRow(**row)
+    query = rigs_query().where(table.tenant_id == tenant, table.name == name)
+    return RigRow(**need_row(conn, query, _no_rig(name)))
 
 
 def remove_rig(conn: sa.Connection, tenant: str, name: str) -> UUID:

@@ -10,7 +10,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
+from marey.db.pages import Order, Page
 from marey.db.sql import CLOCK
 from marey.tenants import tables
 from marey.tenants.types import Actor, AuditRow
@@ -62,8 +62,7 @@ def list_audit(
         query = query.where((table.verb == verb) | table.verb.startswith(f"{verb}.", autoescape=True))
     if since is not None:
         query = query.where(table.at >= since)
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([AuditRow(**row) for row in rows], limit, lambda row: mark_of(row.at, row.id))
+    return order.page(conn, query, ours, cursor, limit, lambda row: AuditRow(**row), mark=lambda row: (row.at, row.id))
 
 
 def _rows() -> sa.Select[*tuple[Any, ...]]:

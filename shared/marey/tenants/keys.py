@@ -17,7 +17,7 @@ from marey.core.characters import check_text
 from marey.core.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
 from marey.core.rates import check_rates
 from marey.db.ids import new_id
-from marey.db.sql import CLOCK, interval
+from marey.db.sql import CLOCK, interval, need_row
 from marey.tenants import tables
 from marey.tenants.repository import get_tenant
 from marey.tenants.types import DEFAULT_TENANT, ApiKey, NewApiKey
@@ -122,10 +122,8 @@ def check_key(conn: sa.Connection, key: UUID) -> None:
     Raises:
         Unauthenticated, Refused: as `authenticate`.
     """
-    row = conn.execute(_standing().where(tables.api_key.c.id == key)).mappings().one_or_none()
-    if row is None:
-        raise Unauthenticated("this API key no longer exists")
-    _valid(row)
+    query = _standing().where(tables.api_key.c.id == key)
+    _valid(need_row(conn, query, Unauthenticated("this API key no longer exists")))
 
 
 def keys_still_valid(conn: sa.Connection, keys: Collection[UUID]) -> set[UUID]:
@@ -192,10 +190,7 @@ def revoke_key(conn: sa.Connection, tenant: str, key: UUID) -> ApiKey:
     table = tables.api_key.c
     ours = (table.tenant_id == tenant) & (table.id == key)
     conn.execute(sa.update(tables.api_key).where(ours, table.revoked_at.is_(None)).values(revoked_at=CLOCK))
-    row = conn.execute(_keys().where(ours)).mappings().one_or_none()
-    if row is None:
-        raise _no_such_key(key)
-    return _key(row)
+    return _key(need_row(conn, _keys().where(ours), _no_such_key(key)))
 
 
 def _valid(row: sa.RowMapping) -> ApiKey:

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
-from marey.db.sql import CLOCK
+from marey.db.sql import CLOCK, need_row
 from marey.tenants import tables
 from marey.tenants.types import Quotas, TenantRow
 
@@ -49,10 +49,7 @@ def get_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
     Raises:
         NotFound: there is none of that name.
     """
-    row = conn.execute(_tenants().where(tables.tenant.c.id == tenant)).mappings().one_or_none()
-    if row is None:
-        raise no_such_tenant(tenant)
-    return _row(row)
+    return _row(need_row(conn, _tenants().where(tables.tenant.c.id == tenant), no_such_tenant(tenant)))
 
 
 def list_tenants(conn: sa.Connection) -> list[TenantRow]:

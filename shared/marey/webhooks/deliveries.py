@@ -15,8 +15,8 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
-from marey.db.sql import CLOCK, interval
+from marey.db.pages import Order, Page
+from marey.db.sql import CLOCK, interval, need_row
 from marey.tenants.audit import audit
 from marey.tenants.types import Actor
 from marey.webhooks.repository import get_webhook
@@ -184,14 +184,12 @@ def get_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID) -
         NotFound: the tenant has no such webhook, or the webhook no such delivery.
     """
     get_webhook(conn, tenant, webhook)
-    row = conn.execute(_deliveries().where(_is(webhook, event))).mappings().one_or_none()
-    if row is None:
-        raise NotFound(
-            "this webhook has no such delivery",
-            where=f"delivery {event}",
-            hint=f"`marey webhooks deliveries {webhook}` shows those of the last 30 days.",
-        )
-    return _row(row)
+    missing = NotFound(
+        "this webhook has no such delivery",
+        where=f"delivery {event}",
+        hint=f"`marey webhooks deliveries {webhook}` shows those of the last 30 days.",
+    )
+    return _row(need_row(conn, _deliveries().where(_is(webhook, event)), missing))
 
 
 def list_deliveries(
@@ -214,8 +212,7 @@ def list_deliveries(
     query, order = _deliveries().where(ours), Order(table.created_at, table.event_id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.event))
+    return order.page(conn, query, ours, cursor, limit, _row, mark=lambda row: (row.created, row.event))
 
 
 def delivery_attempts(conn: sa.Connection, webhook: UUID, event: UUID) -> list[AttemptRow]:

@@ -10,8 +10,8 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page, cut_page, mark_of
-from marey.db.sql import CLOCK, check_text, interval
+from marey.db.pages import Order, Page
+from marey.db.sql import CLOCK, check_text, interval, need_row
 from marey.tenants import tables
 from marey.webhooks.tables import webhook, webhook_delivery
 from marey.webhooks.types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
@@ -58,10 +58,8 @@ def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRo
         NotFound: the tenant has no such webhook.
     """
     table = webhook.c
-    row = conn.execute(_webhooks().where(table.tenant_id == tenant, table.id == identifier)).mappings().one_or_none()
-    if row is None:
-        raise no_such_webhook(identifier)
-    return _row(row)
+    query = _webhooks().where(table.tenant_id == tenant, table.id == identifier)
+    return _row(need_row(conn, query, no_such_webhook(identifier)))
 
 
 def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[WebhookRow]:
@@ -69,8 +67,7 @@ def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None
     table = webhook.c
     ours = table.tenant_id == tenant
     query, order = _webhooks().where(ours), Order(table.created_at, table.id)
-    rows = order.read(conn, query, ours, cursor, limit)
-    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
+    return order.page(conn, query, ours, cursor, limit, _row)
 
 
 def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: WebhookChange) -> WebhookRow:
