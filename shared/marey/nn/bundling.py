@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -16,7 +16,7 @@ from marey.bundles import Bundle, BundleWriter, TextSpec
 from marey.bundles.eight_bit import restore
 from marey.core.errors import InvalidBundle
 from marey.motion.features import layout
-from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
 
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
 """Tensors of a tokenizer: state of the codebooks' training, as large as the codebooks; and the bundle's statistics."""
@@ -121,15 +121,30 @@ class NetworkParts:
         self.tokenizer.set_statistics(*(torch.tensor(values) for values in bundle.statistics()))
 
 
-def parameters_of(bundle: Bundle, model: str) -> dict[str, Any]:
-    """Return the plain values of the configuration of a model's bundle.
+C = TypeVar("C")
+N = TypeVar("N", bound=NetworkParts)
+
+
+def load_parts(
+    bundle: Bundle, model: str, read: Callable[[Mapping[str, Any]], C], build: Callable[[C], N]
+) -> tuple[C, N]:
+    """Build and fill the networks of a generator's bundle, float32, in evaluation mode.
+
+    Args:
+        bundle: verified.
+        model: required model of the bundle.
+        read: parses its configuration.
+        build: makes the networks of a configuration.
 
     Raises:
-        InvalidBundle: of another model.
+        InvalidBundle: of another model, or its tensors do not fit its configuration.
     """
     if bundle.manifest.model != model:
         raise InvalidBundle(f"a bundle of model {bundle.manifest.model}, not {model}", where=str(bundle.path))
-    return bundle.manifest.parameters
+    config = read(bundle.manifest.parameters)
+    networks = build(config)
+    networks.fill(bundle)
+    return config, networks
 
 
 def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
@@ -158,26 +173,51 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     network.eval().requires_grad_(False)
 
 
-def random_parts(
-    build: Callable[[], Mapping[str, nn.Module]], loud: Collection[str], seed: int
-) -> dict[str, dict[str, Tensor]]:
-    """State dicts of networks with random weights, the same for the same seed.
+G = TypeVar("G", bound=GeneratorConfig)
+
+
+def write_random(
+    path: Path | str,
+    model: str,
+    config: G,
+    build: Callable[[G], NetworkParts],
+    loud: Collection[str],
+    seed: int,
+    *,
+    text: TextSpec,
+    bias: float = 1.0,
+    dtype: type[np.floating] = np.float16,
+) -> Bundle:
+    """Write a bundle with random weights, for tests: it runs like a trained one (manifest `random` = true).
+
+    Statistics are those of a person standing still, so that joints stay within a sane range.
 
     Args:
-        build: makes the networks, by part; one is the `tokenizer`, whose codebooks are drawn as well.
+        path: the bundle's folder, which is replaced.
+        model: name of the model that reads it.
+        config: configuration of the networks.
+        build: makes the networks of a configuration; their codebooks are drawn as well.
         loud: parts whose matrices are scaled up from their initial values, so that prompts make a difference.
         seed: torch's own generator is not changed.
+        text: encoder, labeller and caps.
+        bias: of root and contacts in the statistics (`biased_std`).
+        dtype: of the stored tensors.
     """
     with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
-        networks = build()
-        quantizer: Any = networks["tokenizer"].quantizer
+        networks = build(config)
+        quantizer: Any = networks.tokenizer.quantizer
         quantizer.codebooks.normal_()
         quantizer.initialized.fill_(True)
-        for layer in (layer for name in loud for layer in networks[name].modules()):
+        for layer in (layer for name in loud for layer in networks.parts()[name].modules()):
             if isinstance(layer, nn.Linear):
                 nn.init.normal_(layer.weight, std=0.1)
-        return {name: network.state_dict() for name, network in networks.items()}
+    mean, std = standing(config.layout)
+    statistics = mean, biased_std(torch.tensor(std), bias).numpy()
+    return write_generator(
+        Path(path), model, config, networks.states(), statistics,
+        text=text, dtype=dtype, random=True, licence="MIT", overwrite=True,
+    )  # fmt: skip
 
 
 def standing(name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -14,12 +14,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from marey.bundles import Bundle, DataSource
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.importing import Download, Fields, ImportRequest, make_card, provenance, text_encoder_of
 from marey.models.momask import names
-from marey.models.momask.bundle import Networks, write_bundle
+from marey.models.momask.bundle import MODEL, Networks
 from marey.models.momask.config import KIT, T2M, MoMaskConfig, TokenizerConfig, TransformerConfig
+from marey.nn.bundling import write_generator
 
 DATA_SETS = {"t2m": T2M, "kit": KIT}
 DILATION_GROWTH, STRIDE = 3, 2
@@ -83,9 +86,9 @@ def import_momask(request: ImportRequest) -> Bundle:
     accounts = download.finish()
     with text_encoder_of(request, "clip-vit-b32") as text:
         card = make_card(request, accounts, about=ABOUT[config.name], normalisation=NORMALISATION, text=text)
-        return write_bundle(
-            request.output, config, networks.states(), statistics, text=text, card=card, overwrite=request.overwrite,
-            licence=request.licence, training=provenance(request, accounts),
+        return write_generator(
+            request.output, MODEL, config, networks.states(), statistics, text=text, card=card, dtype=np.float32,
+            overwrite=request.overwrite, licence=request.licence, training=provenance(request, accounts),
             data=(DataSource(**DATA[config.name], licence=request.licence),),
         )  # fmt: skip
 
