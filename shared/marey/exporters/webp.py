@@ -1,31 +1,7 @@
-"""WebP: a film of the motion that plays for ever, smaller than a GIF. Only written, on request; no prompt is in it."""
+"""WebP: a film of the motion, smaller than a GIF."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from marey.exporters.animated import animated
 
-from marey.exporters.exporter import Coordinates, Exporter
-
-if TYPE_CHECKING:
-    from marey.motion.clip import MotionClip
-
-
-def encode(clip: MotionClip, coordinates: Coordinates) -> bytes:
-    """Draw a clip.
-
-    Raises:
-        TooLarge: too many pictures for an animated one.
-    """
-    from marey.viz.video import webp_bytes
-
-    return webp_bytes(clip)
-
-
-EXPORTER: Exporter[MotionClip] = Exporter(
-    format="webp",
-    media_type="image/webp",
-    extension="webp",
-    holds_prompt=False,
-    encode=encode,
-    stored=False,
-)
+EXPORTER = animated("webp")

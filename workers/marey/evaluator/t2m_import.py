@@ -61,9 +61,7 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
     mean, std = download.statistics(meta, config.features)
     words, vectors = _read_words(download, config)
     accounts = download.finish()
-    source = DataSource(
-        name="KIT-ML" if config.layout == KIT.layout else "HumanML3D", licence=request.licence, credit=CREDIT
-    )
+    data_set = "KIT-ML" if config.layout == KIT.layout else "HumanML3D"
     with BundleWriter(request.output, overwrite=request.overwrite) as writer:
         for name, network in (("motion", motion), ("text", text)):
             state = {k: v.numpy() for k, v in network.state_dict().items() if stored(k)}
@@ -82,7 +80,7 @@ def import_t2m(request: ImportRequest, config: T2MConfig | None = None) -> Bundl
             skeleton=layout(config.layout).skeleton.name,
             layout=config.layout,
             fps=config.fps,
-            data=(source,),
+            data=(DataSource(name=data_set, licence=request.licence, credit=CREDIT),),
             licence=request.licence,
             training=provenance(request, accounts),
         )
