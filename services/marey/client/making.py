@@ -75,10 +75,8 @@ def check_body(export: ExportOptions) -> None:
             from marey.motion.change_body import load_shape
         load_shape(export.body, export.rig_map)
     elif export.rig is not None:
-        try:
+        with extra("motion"):
             from marey.motion.retarget import load_body
-        except ImportError as error:
-            raise needs_extra("motion", error) from error
         load_body(export.rig, export.rig_map)
 
 
