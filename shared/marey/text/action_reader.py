@@ -25,10 +25,12 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
 FILE = Path(__file__).with_name("action_reader.safetensors")
+STANDING = "idle"
+"""Said beside other actions: "stands and waves"."""
 VECTOR_SCALE, WORD_SCALE = 10.0, 3.0
 """Factors of the sentence vector, whose length is 1, and of the marks of actions that the words name."""
-SURE = 0.5
-"""Probability from which on a prompt asks for one action."""
+SURE, SURE_OF_SEVERAL = 0.5, 0.8
+"""Probabilities from which on a prompt asks for one action, and does so though its words name several."""
 SEVERAL, OUTSIDE = "several actions", "no action of the vocabulary"
 """Classes behind the actions."""
 
@@ -42,20 +44,22 @@ Float32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ReadAction:
-    """What a prompt asks for.
+    """The action that a prompt asks for.
 
     Attributes:
         name: id of the action in the vocabulary, `SEVERAL`, or `OUTSIDE`.
         probability: 0 to 1.
+        least: probability from which on it is believed.
     """
 
     name: str
     probability: float
+    least: float = SURE
 
     @property
     def action(self) -> str | None:
         """Return the id of the action; None = several, none, or in doubt."""
-        return None if self.name in (SEVERAL, OUTSIDE) or self.probability < SURE else self.name
+        return None if self.name in (SEVERAL, OUTSIDE) or self.probability < self.least else self.name
 
 
 class ActionReader:
@@ -86,7 +90,7 @@ class ActionReader:
             facts: dict[str, str] = file.metadata() or {}
             weights: dict[str, Float32] = {name: file.get_tensor(name) for name in sorted(file.keys())}
         if set(weights) != {"hidden", "hidden_bias", "out", "out_bias"}:
-            raise InvalidFile("is no reader of actions", where=str(path))
+            raise InvalidFile("is not a reader of actions", where=str(path))
         return cls(json.loads(facts["classes"]), facts["encoder_sha256"], sha256_of(path), weights)
 
     def read(self, prompt: str, vector: Float32) -> ReadAction:
@@ -96,22 +100,32 @@ class ActionReader:
             prompt: as `check_prompt` returns it.
             vector: (W,) its sentence vector, by `TextPipeline.pooled`.
         """
-        weights = self._weights
+        weights, apart = self._weights, _apart(_named(prompt))
         hidden = weights["hidden"] @ inputs_of(prompt, vector, self.classes) + weights["hidden_bias"]
         scores = weights["out"] @ np.maximum(hidden, 0) + weights["out_bias"]
         shares = np.exp(scores - scores.max())
         best = int(scores.argmax())
-        return ReadAction(self.classes[best], float(shares[best] / shares.sum()))
+        least = SURE_OF_SEVERAL if len(apart - {STANDING}) > 1 else SURE
+        return ReadAction(self.classes[best], float(shares[best] / shares.sum()), least)
 
 
 def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
     """Return the input (W + C + 2,) of the network: the sentence vector (W,), a mark of each class that the words name,
     and marks of prompts whose words name several actions, and that join clauses in time."""
-    actions = load_vocabulary().actions
-    named = {each.action for each in match_scope(prompt, every_action()).actions if each.action is not None}
-    apart = named.difference(*(actions[name].implies for name in named))
-    marks = [*(name in named for name in classes), len(apart) > 1, _JOINTS.search(prompt.lower()) is not None]
+    named = _named(prompt)
+    marks = [*(name in named for name in classes), len(_apart(named)) > 1, _JOINTS.search(prompt.lower()) is not None]
     return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE])
+
+
+def _named(prompt: str) -> set[str]:
+    """Return the ids of the actions that the words of a prompt name."""
+    return {each.action for each in match_scope(prompt, every_action()).actions if each.action is not None}
+
+
+def _apart(named: set[str]) -> set[str]:
+    """Return those of several actions that no other of them implies."""
+    actions = load_vocabulary().actions
+    return named.difference(*(actions[name].implies for name in named))
 
 
 @cache

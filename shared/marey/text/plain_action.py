@@ -7,6 +7,7 @@ says stays behind the plain words.
 
 from __future__ import annotations
 
+from marey.text.action_reader import STANDING
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
@@ -14,8 +15,8 @@ VERSION = 2
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
-STANDING, TURNING = "idle", "turn"
-"""Said beside other actions: "stands and waves". A gait in a curve: "walks and turns the corner"."""
+TURNING = "turn"
+"""Said beside gaits: "walks and turns the corner"."""
 
 
 def with_plain_action(prompt: str, action: str | None) -> str:

@@ -17,7 +17,7 @@ from tests.support.bodies import raiser, waver
 
 
 @dataclass(frozen=True)
-class Made:
+class RawMotion:
     features: np.ndarray[Any, Any]
 
 
@@ -27,7 +27,7 @@ class OneMotion:
     layout = HUMANML3D_263
 
     def __init__(self, joints: np.ndarray[Any, Any]) -> None:
-        self.made = Made(self.layout.encode(joints))
+        self.made = RawMotion(self.layout.encode(joints))
 
     def generate(self, requests: Sequence[Request], settings: Any, *, control: Any) -> list[Any]:
         return [self.made for _ in requests]
@@ -62,11 +62,11 @@ def test_the_wrong_hand_is_mirrored() -> None:
     ids=["right side", "no side", "neither side", "no rule for the side", "both sides"],
 )
 def test_motions_that_a_mirror_does_not_help_stay(joints: np.ndarray[Any, Any], prompt: str) -> None:
-    assert isinstance(make(joints, ask(prompt)), Made)
+    assert isinstance(make(joints, ask(prompt)), RawMotion)
 
 
 def test_motions_around_kept_frames_are_not_mirrored() -> None:
     asked = ask("a man waves with his right hand")
     kept = KeptFrames(0, np.zeros((4, 263), np.float32))
-    assert isinstance(make(waver("left"), replace(asked, kept=(kept,))), Made)
-    assert isinstance(make(waver("left"), replace(asked, free=True)), Made)
+    assert isinstance(make(waver("left"), replace(asked, kept=(kept,))), RawMotion)
+    assert isinstance(make(waver("left"), replace(asked, free=True)), RawMotion)

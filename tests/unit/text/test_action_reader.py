@@ -12,7 +12,7 @@ from safetensors.numpy import save_file
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
 from marey.referee.prompts import development_prompts
-from marey.text.action_reader import OUTSIDE, SEVERAL, SURE, ActionReader, ReadAction, action_reader
+from marey.text.action_reader import OUTSIDE, SEVERAL, SURE, SURE_OF_SEVERAL, ActionReader, ReadAction, action_reader
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder, shared_pipeline
 
@@ -55,14 +55,22 @@ def test_few_others_are_read_as_one_action() -> None:
     assert sum(action is not None for action in outside) <= 0.1 * len(outside)
 
 
+def test_prompts_whose_words_name_several_actions_must_be_read_surely() -> None:
+    (one, two, standing) = read(
+        ["she goes for a stroll", "she strolls ahead, then breaks into a jog", "he stands and waves"]
+    )
+    assert [each.least for each in read(prompts)] == [SURE, SURE_OF_SEVERAL, SURE]
+
+
 def test_in_doubt_it_names_none() -> None:
     assert ReadAction("walk", SURE).action == "walk"
     assert ReadAction("walk", SURE - 0.01).action is None
+    assert ReadAction("walk", SURE_OF_SEVERAL - 0.01, SURE_OF_SEVERAL).action is None
     assert ReadAction(SEVERAL, 0.99).action is None
     assert ReadAction(OUTSIDE, 0.99).action is None
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:
     save_file({"hidden": np.zeros((1, 1), np.float32)}, tmp_path / "other.safetensors")
-    with pytest.raises(InvalidFile, match="no reader of actions"):
+    with pytest.raises(InvalidFile, match="not a reader of actions"):
         ActionReader.load(tmp_path / "other.safetensors")
