@@ -56,9 +56,7 @@ def test_few_others_are_read_as_one_action() -> None:
 
 
 def test_prompts_whose_words_name_several_actions_must_be_read_surely() -> None:
-    (one, two, standing) = read(
-        ["she goes for a stroll", "she strolls ahead, then breaks into a jog", "he stands and waves"]
-    )
+    prompts = ["she goes for a stroll", "she strolls ahead, then breaks into a jog", "he stands and waves"]
     assert [each.least for each in read(prompts)] == [SURE, SURE_OF_SEVERAL, SURE]
 
 
