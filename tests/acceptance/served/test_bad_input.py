@@ -97,7 +97,7 @@ def test_a_setting_that_only_another_model_has_is_refused_by_name(marey: Marey, 
 
 
 def test_an_unknown_model_names_the_known_ones(marey: Marey, offline: Marey) -> None:
-    marey("submit", "a person waves", "--model", "nomo").refused(2, "line 1: model", "'nomo'", TINY)
+    marey("submit", "a person waves", "--model", "nomo").refused(2, "argument 1: model", "'nomo'", TINY)
     offline("generate", "a person waves", "--model", "nomo").refused(3, "'nomo'", TINY)
     marey("models", "show", "nomo").refused(3, "'nomo'", TINY)
 

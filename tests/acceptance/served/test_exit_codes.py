@@ -42,7 +42,9 @@ def test_usage_is_2(marey: Marey) -> None:
         2, "--priority: 99999 is above 1,000, the most that is allowed"
     )
     marey("motions", "list", "--tag", "").refused(2, "tag", "is empty")
-    marey("webhooks", "add", "https://x.example", "--event", "nope").refused(2, "events.0: 'nope'", "job.ended")
+    marey("webhooks", "add", "https://x.example", "--event", "nope").refused(
+        2, "--event: 'nope' is not known", "job.ended"
+    )
     marey("nonsense").refused(2, "nonsense")
     marey("submit", "--nonsense").refused(2, "--nonsense")
 

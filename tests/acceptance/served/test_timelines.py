@@ -33,7 +33,7 @@ def test_a_sheet_of_a_timeline_is_drawn(offline: Marey, tmp_path: Path) -> None:
 
 def test_rows_that_overlap_are_refused(offline: Marey, tmp_path: Path) -> None:
     ran = offline("generate", "--timeline", "0-3 a person walks; 2-5 a person waves", "-o", tmp_path)
-    ran.refused(2, "line 1: timeline: row 1 (0-3) overlaps row 2 (2-5)")
+    ran.refused(2, "argument 1: timeline: row 1 (0-3) overlaps row 2 (2-5)")
 
 
 def test_a_model_that_cannot_refuses_before_it_is_loaded(offline: Marey, tmp_path: Path) -> None:

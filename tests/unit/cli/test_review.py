@@ -31,7 +31,7 @@ def test_motions_of_several_jobs_name_their_job() -> None:
 
 
 def test_a_contact_sheet_tells_seed_length_and_bundle_once() -> None:
-    others = replace(BOW, job="b", bundle="hgm3-open@4b73363936fc"), replace(BOW, bundle="mogo-open@4b73363936fc")
+    others = replace(BOW, job="b", bundle="hgm3-open@4b73363936fc"), replace(BOW, bundle="other-open@4b73363936fc")
     assert facts(*others, sheet=True) == ["00003  ·  greet  ·  day b", "00003  ·  greet  ·  day a"]
     assert facts(*others)[0] == "00003  ·  greet  ·  day b  ·  hgm3-open  ·  seed 7  ·  3.0 s"
     clip = walker(seconds=3.0)
