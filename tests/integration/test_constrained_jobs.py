@@ -121,7 +121,7 @@ def test_an_item_that_cannot_be_made_names_the_field(
     assert (bad["state"], good["state"]) == ("failed", "succeeded")
     assert bad["error"]["where"].startswith("constraints.0.joint_rotations")
     shown = marey("jobs", "show", "late").ok().out
-    assert f"failed     0: {TIMELINE!r}: constraints.0.joint_rotations" in shown
+    assert f":0.0 {TIMELINE!r}: constraints.0.joint_rotations" in shown
     watched = marey("jobs", "watch", "late")
     assert watched.code == 6
 

@@ -84,7 +84,7 @@ def test_pieces_are_items_and_other_motions_follow_by_their_ids(api: LiveApi, ht
         ([{"op": "speed", "factor": 99}], 422, "ops.0.factor", "99 is not a number from 0.1 to 10"),
         ([{"op": "mirror"}, {"op": "concat", "with": "wave.npz"}], 422, "ops.1.with", "is not the id of a motion"),
         ([{"op": "concat"}], 422, "ops.0.with", "is missing"),
-        ([], 422, "ops", "at least 1 item"),
+        ([], 422, "ops", "is empty"),
         ([{"op": "split", "at": 0.1}] * 6, 413, "ops.5", "6 splits make 64 pieces; the most is 32"),
     ],
 )
