@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import httpx2
 import pytest
@@ -12,6 +13,9 @@ import redis
 from marey.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
 from tests.support.live_api import LiveApi, running_api, settings_of
+
+if TYPE_CHECKING:
+    from tests.support.live_evaluations import Studio
 
 
 @pytest.fixture
@@ -32,6 +36,15 @@ def api(module_database_url: str, valkey: EmbeddedServer, api_home: Path) -> Ite
     config = settings_of(api_home, module_database_url, valkey.url)
     with running_api(config, module_database_url) as api:
         yield api
+
+
+@pytest.fixture(scope="module")
+def place(module_database_url: str, valkey: EmbeddedServer, api_home: Path) -> Iterator[Studio]:
+    """An API with bundles to evaluate, and the scheduler and the worker beside it."""
+    from tests.support.live_evaluations import studio
+
+    with studio(api_home, module_database_url, valkey.url) as place:
+        yield place
 
 
 @pytest.fixture

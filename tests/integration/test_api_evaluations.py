@@ -12,10 +12,9 @@ import httpx2
 import pytest
 
 from marey.db import transaction
-from marey.embedded import EmbeddedServer
 from marey.jobs import WorkerHeartbeat, beat, retire
 from tests.support.evaluations import GENERATOR, JUDGE
-from tests.support.live_evaluations import Studio, studio
+from tests.support.live_evaluations import Studio
 
 PROMPTS: list[dict[str, Any]] = [
     {"prompt": "walk ahead", "seconds": 2, "expected": "Walk straight"},
@@ -23,14 +22,6 @@ PROMPTS: list[dict[str, Any]] = [
 ]
 BODY: dict[str, Any] = {"bundle": GENERATOR, "prompts": PROMPTS, "source": "studio.csv", "name": "before the release"}
 EVERY_MONDAY: dict[str, Any] = {"cron": "0 3 * * 1", "time_zone": "Europe/Berlin", **BODY}
-
-
-@pytest.fixture(scope="module")
-def place(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Studio]:
-    with studio(tmp_path_factory.mktemp("evaluations"), module_database_url, valkey.url) as place:
-        yield place
 
 
 @pytest.fixture

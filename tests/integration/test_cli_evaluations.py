@@ -8,7 +8,6 @@ import json
 import os
 import subprocess
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from uuid import uuid4
 
@@ -16,20 +15,11 @@ import pytest
 from typer.testing import CliRunner
 
 from marey.cli.main import app
-from marey.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR
-from tests.support.live_evaluations import Studio, studio
+from tests.support.live_evaluations import Studio
 from tests.support.marey import COMMAND, REPOSITORY, Ran
 
 MONDAYS = "0 3 * * 1"
-
-
-@pytest.fixture(scope="module")
-def place(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Studio]:
-    with studio(tmp_path_factory.mktemp("evaluations"), module_database_url, valkey.url) as place:
-        yield place
 
 
 class Marey:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 from uuid import UUID
 
 import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from pydantic import SecretStr
+from structlog.testing import capture_logs
 
+from marey.core.addresses import Allowed
 from marey.db import transaction
+from marey.scheduler.sending import Sender
+from marey.scheduler.webhooks import Deliverer
 from marey.tenants import DEFAULT_TENANT
 from marey.webhooks import (
     DeliveryRow,
@@ -21,6 +27,7 @@ from marey.webhooks import (
     list_deliveries,
 )
 from marey.webhooks.vault import Vault, new_signing_secret
+from tests.servers.receiver import LOOPBACK
 
 KEY = Fernet.generate_key().decode()
 VAULT = Vault(KEY)
@@ -63,3 +70,17 @@ def time_passes(engine: sa.Engine) -> None:
     """As if every delivery that waits, for its next try or behind a claim, had waited long enough."""
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE webhook_delivery SET next_at = now() WHERE state = 'pending'"))
+
+
+@contextmanager
+def delivering(engine: sa.Engine, api: str) -> Iterator[None]:
+    """The scheduler's part, with the address of the API, until the end of the block."""
+    stopping, sender = threading.Event(), Sender(Allowed.of(LOOPBACK))
+    thread = Deliverer(engine, VAULT, sender, api=api, interval=0.02, stopping=stopping)
+    with capture_logs():  # commands that run in this process own its stdout
+        thread.start()
+        try:
+            yield
+        finally:
+            stopping.set()
+            thread.join(30)

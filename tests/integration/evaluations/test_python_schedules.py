@@ -8,19 +8,10 @@ from pathlib import Path
 import pytest
 
 from marey.client import Client, InvalidInput, InvalidItems, NotFound
-from marey.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR
-from tests.support.live_evaluations import Studio, studio
+from tests.support.live_evaluations import Studio
 
 MONDAYS = "0 3 * * 1"
-
-
-@pytest.fixture(scope="module")
-def place(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Studio]:
-    with studio(tmp_path_factory.mktemp("schedules"), module_database_url, valkey.url) as place:
-        yield place
 
 
 @pytest.fixture

@@ -2,43 +2,28 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 from uuid import uuid4
 
 import httpx2
 import pytest
 from standardwebhooks.webhooks import Webhook
-from structlog.testing import capture_logs
 
 from marey.cli.ports import try_port
-from marey.core.addresses import Allowed
 from marey.db import transaction
-from marey.embedded import EmbeddedServer
-from marey.scheduler.sending import Sender
-from marey.scheduler.webhooks import Deliverer
 from marey.webhooks import EventKind
-from tests.servers.receiver import LOOPBACK, Receiver, hang, status
+from tests.servers.receiver import Receiver, hang, status
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR, wait
 from tests.support.live_api import ApiThread
-from tests.support.live_evaluations import Studio, studio
+from tests.support.live_evaluations import Studio
 from tests.support.marey import Ran
-from tests.support.webhooks import VAULT
+from tests.support.webhooks import VAULT, delivering
 
 HOOK = "https://studio.example/marey"
 Marey = Callable[..., Ran]
 """`marey webhooks`, in this process."""
-
-
-@pytest.fixture(scope="module")
-def place(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Studio]:
-    with studio(tmp_path_factory.mktemp("webhooks"), module_database_url, valkey.url) as place:
-        yield place
 
 
 @pytest.fixture
@@ -53,22 +38,6 @@ def http(place: Studio) -> Iterator[httpx2.Client]:
 def receiver() -> Iterator[Receiver]:
     with Receiver() as made:
         yield made
-
-
-@contextmanager
-def delivering(place: Studio) -> Iterator[None]:
-    """The scheduler's part, until the end of the block."""
-    stopping = threading.Event()
-    sender = Sender(Allowed.of(LOOPBACK))
-    api = place.config.api_url
-    thread = Deliverer(place.api.engine, VAULT, sender, api=api, interval=0.02, stopping=stopping)
-    with capture_logs():  # commands that run in this process own its stdout
-        thread.start()
-        try:
-            yield
-        finally:
-            stopping.set()
-            thread.join(30)
 
 
 def make(http: httpx2.Client, url: str = HOOK, **fields: object) -> dict[str, Any]:
@@ -212,7 +181,7 @@ def test_an_evaluation_that_is_worse_reaches_the_receiver_signed(
         place.work()
     finally:
         place.judge.forget = 0
-    with delivering(place):
+    with delivering(place.api.engine, place.config.api_url):
         received = receiver.wait(3)
     documents = [Webhook(made["secret"]).verify(each.body, each.headers) for each in received]
     messages_of = sorted((each["data"]["evaluation"], each["type"], each["data"]["regressed"]) for each in documents)
@@ -237,7 +206,7 @@ def test_a_webhook_is_added_tried_out_paused_and_removed(
     assert secret not in marey("list", "--json").out + marey("show", webhook, "--json").out
     rotated = marey("rotate", webhook, "--overlap-hours", 1).ok()
     assert (rotated.out.startswith("whsec_"), "1 hours more" in rotated.err) == (True, True)
-    with delivering(place):
+    with delivering(place.api.engine, place.config.api_url):
         said = marey("test", webhook, "--wait").ok()
         assert (said.out.strip(), "it arrived: 200" in said.err) == (receiver.received[0].id, True)
         receiver.answer = status(500)
@@ -256,7 +225,7 @@ def test_deliveries_are_listed_with_their_tries_and_made_again(
 ) -> None:
     webhook = marey("add", receiver.url(), "--json").ok().lines[0]["id"]
     receiver.answer = status(404)
-    with delivering(place):
+    with delivering(place.api.engine, place.config.api_url):
         for _ in range(2):
             marey("test", webhook, "--wait").refused(6, "answered 404")
         failed = marey("deliveries", webhook, "--state", "failed", "--json").ok().lines

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
 from standardwebhooks.webhooks import Webhook as Signature
-from structlog.testing import capture_logs
 
 from marey.client import Client, InvalidInput, NotFound, TimedOut, WebhookSecret
-from marey.core.addresses import Allowed
 from marey.embedded import EmbeddedServer
-from marey.scheduler.sending import Sender
-from marey.scheduler.webhooks import Deliverer
-from tests.servers.receiver import LOOPBACK, Receiver, status
+from tests.servers.receiver import Receiver, status
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.webhooks import VAULT
+from tests.support.webhooks import delivering
 
 HOOK = "https://studio.example/marey"
 
@@ -37,20 +31,6 @@ def client(api: LiveApi) -> Iterator[Client]:
         yield client
         for webhook in client.webhooks.list():
             client.webhooks.delete(webhook)
-
-
-@contextmanager
-def delivering(api: LiveApi) -> Iterator[None]:
-    """The scheduler's part, until the end of the block."""
-    stopping = threading.Event()
-    thread = Deliverer(api.engine, VAULT, Sender(Allowed.of(LOOPBACK)), api=api.url, interval=0.02, stopping=stopping)
-    with capture_logs():
-        thread.start()
-        try:
-            yield
-        finally:
-            stopping.set()
-            thread.join(30)
 
 
 def test_a_webhook_is_made_changed_and_deleted(client: Client) -> None:
@@ -80,7 +60,7 @@ def test_a_webhook_is_made_changed_and_deleted(client: Client) -> None:
 def test_messages_are_sent_replayed_and_listed_with_their_attempts(api: LiveApi, client: Client) -> None:
     with Receiver() as receiver:
         webhook = client.webhooks.create(receiver.url())
-        with delivering(api):
+        with delivering(api.engine, api.url):
             sent = client.webhooks.wait(client.webhooks.test(webhook), timeout=60)
             assert (sent.state, sent.kind, sent.status, sent.attempts, sent.has_ended) == (
                 "delivered", "webhook.test", 200, 1, True,

@@ -26,6 +26,7 @@ from tests.models.momask.public import (
     rvq_shapes,
     weights,
 )
+from tests.support.golden import assert_golden
 
 CONFIG = MoMaskConfig()
 LENGTHS = torch.tensor([49, 25])
@@ -54,15 +55,6 @@ def tokenizer() -> Tokenizer:
 @pytest.fixture(scope="module")
 def masked() -> MaskedTransformer:
     return filled(MaskedTransformer(CONFIG), names.masked_names(CONFIG), masked_shapes())
-
-
-def assert_golden(value: Tensor, golden: dict[str, Any]) -> None:
-    """Compare shape, mean, deviation and single numbers."""
-    assert list(value.shape) == golden["shape"]
-    assert abs(value.double().mean().item() - golden["mean"]) < 1e-4
-    assert abs(value.double().std(unbiased=False).item() - golden["std"]) < 1e-4
-    for place, expected in golden["at"].items():
-        assert abs(value[tuple(int(k) for k in place.strip("[]").split(","))].item() - expected) < 1e-4, place
 
 
 def as_public(logits: Tensor) -> Tensor:

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from marey.evaluator.t2m_model import T2MConfig, T2MMotionEncoder, T2MTextEncoder
 from marey.evaluator.t2m_words import TAGS
+from tests.support.golden import assert_golden
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parent / "t2m_golden.json").read_text())
 
@@ -34,14 +35,6 @@ def fill(network: nn.Module) -> None:
 
 def normals(seed: int, *shape: int) -> Tensor:
     return torch.from_numpy(np.random.RandomState(seed).standard_normal(shape).astype(np.float32))
-
-
-def assert_golden(value: Tensor, golden: dict[str, Any]) -> None:
-    assert list(value.shape) == golden["shape"]
-    assert abs(value.double().mean().item() - golden["mean"]) < 1e-4
-    assert abs(value.double().std(unbiased=False).item() - golden["std"]) < 1e-4
-    for place, expected in golden["at"].items():
-        assert abs(value[tuple(int(k) for k in place.strip("[]").split(","))].item() - expected) < 1e-4, place
 
 
 @pytest.fixture
