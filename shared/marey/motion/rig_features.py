@@ -32,12 +32,10 @@ from marey.motion.pose import solve_pose
 from marey.motion.rotations import (
     Array,
     about,
-    between,
     conjugate,
     cross,
     from_6d,
     multiply,
-    normalize,
     rotate,
     to_6d,
 )
@@ -157,7 +155,8 @@ class RigLayout:
         """Return the rotations (T, 4) that turn the smoothed facing of joints (T, J, 3) to +Z."""
         across = places[:, list(self.left)].sum(axis=1) - places[:, list(self.right)].sum(axis=1)
         across /= np.maximum(np.abs(across).sum(axis=-1, keepdims=True), 1e-9)  # not its length: as published
-        return between(normalize(smooth(cross(across, UP), self.facing_sigma, cut=4.0)), AHEAD)
+        forward = smooth(cross(across, UP), self.facing_sigma, cut=4.0)
+        return about("Y", -np.arctan2(forward[:, 0], forward[:, 2]))  # also where it is straight back
 
     def _trajectory(self, features: Array) -> tuple[Array, Array]:
         """Return the heading (..., Tf, 4), world to heading, and the root position (..., Tf, 3) in units."""
