@@ -46,7 +46,7 @@ def test_doctor_tells_a_wrong_setting_among_the_rest(offline: Marey) -> None:
 
 @pytest.mark.parametrize("port", [99999, -1])
 def test_a_port_that_is_none_is_wrong_usage(offline: Marey, port: int) -> None:
-    offline("serve", "--port", port).refused(2, "--port", "65535" if port > 0 else "0")
+    offline("serve", "--port", port).refused(2, "--port", "65,535" if port > 0 else "0")
 
 
 def test_an_address_that_is_none_is_told(offline: Marey) -> None:
