@@ -135,6 +135,8 @@ class TextPipeline:
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Get ready to read these prompts one by one."""
         self.rewriter.prefetch(prompts)
+        if self._reads_actions and self.spec.rewriter == "none":
+            self.pooled(prompts)  # together, in half the time
 
     def _rewritten(self, prompts: Sequence[str]) -> list[Rewrite]:
         if len(prompts) > 1:
@@ -189,11 +191,16 @@ class TextPipeline:
             return list(texts)
         return [with_plain_action(text, action) for text, action in zip(texts, self._asked(texts), strict=True)]
 
+    @property
+    def _reads_actions(self) -> bool:
+        """True if the reader of actions reads prompts by the sentence vectors of this encoder."""
+        return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
+
     def _asked(self, texts: Sequence[str]) -> list[str | None]:
         """Return the one action that each text asks for: by the reader of the encoder, or else by the words."""
-        reader = action_reader()
-        if reader.encoder_sha256 != self.encoder.sha256:
+        if not self._reads_actions:
             return [only_action(text) for text in texts]
+        reader = action_reader()
         return [reader.read(text, vector).action for text, vector in zip(texts, self.pooled(texts), strict=True)]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:

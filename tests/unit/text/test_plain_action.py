@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from marey.bundles import TextSpec
 from marey.text.action_reader import action_reader
+from marey.text.encoders import Encoding
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
 from marey.text.plain_action import MOST_WORDS, only_action, with_plain_action
@@ -84,3 +89,29 @@ def test_where_the_reader_knows_another_encoder_the_words_decide(
     assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "a person crouches,"]
     monkeypatch.setattr(action_reader(), "encoder_sha256", "0" * 64)
     assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "A young deer hunte"]
+
+
+def test_prompts_that_are_read_one_by_one_are_encoded_together(pipeline: TextPipeline) -> None:
+    asked: list[Sequence[str]] = []
+
+    class Watched:
+        name, width, sha256 = pipeline.encoder.name, pipeline.encoder.width, pipeline.encoder.sha256
+
+        def encode(self, text: str) -> Encoding:
+            return pipeline.encoder.encode(text)
+
+        def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+            asked.append(texts)
+            return pipeline.encoder.pooled(texts)
+
+        def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+            return pipeline.encoder.tokens(texts)
+
+    spec = pipeline.spec.model_copy(update={"plain_action": True})
+    watched = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=Watched())
+    prompts = ["The waiter takes a bow", "A goblin hunkers low"]
+    watched.prefetch(prompts)
+    assert asked == [prompts]
+    for prompt in prompts:
+        watched.features([prompt])
+    assert not any(prompt in texts for texts in asked[1:] for prompt in prompts)
