@@ -151,10 +151,10 @@ def test_a_missing_field_broken_json_and_nan_are_refused(report: Report) -> None
     del document["generator"]
     with pytest.raises(InvalidFile, match="generator: is missing"):
         from_json(json.dumps(document).encode())
-    for data in (b"{", b"[]", b"\xff"):
+    for data in (b"{", b"[]", b"\xff", b"[" * 100_000):
         with pytest.raises(InvalidFile):
             from_json(data)
-    with pytest.raises(InvalidFile, match="NaN is not a number"):
+    with pytest.raises(InvalidFile, match="holds a number that is not finite"):
         from_json(to_json(report).replace(b'"motions_per_second": 1.42', b'"motions_per_second": NaN'))
 
 

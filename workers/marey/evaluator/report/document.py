@@ -18,6 +18,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile
 from marey.core.validation import first_problem
 from marey.evaluator.report.model import Report
@@ -50,11 +51,7 @@ def from_json(data: bytes, where: str = "report") -> Report:
         InvalidFile: invalid JSON, another version, or a field that is missing or of the wrong type.
         InvalidInput: the fields contradict each other.
     """
-    try:
-        document = json.loads(data, parse_constant=_no_number)
-    except ValueError as error:
-        raise InvalidFile(f"is not JSON: {error}", where=where) from None
-    fields = check_document(document, where)
+    fields = check_document(parse_json(data, where), where)
     try:
         return _reader().validate_json(json.dumps(fields), strict=True)
     except ValidationError as error:
@@ -64,10 +61,6 @@ def from_json(data: bytes, where: str = "report") -> Report:
 @cache
 def _reader() -> TypeAdapter[Report]:
     return TypeAdapter(Report)
-
-
-def _no_number(text: str) -> None:
-    raise ValueError(f"{text} is not a number")
 
 
 def _text(value: Any, indent: int | None = None) -> str:
