@@ -2,7 +2,7 @@
 
 Words alone miss every phrase that no list has ("a goblin hunkers low"), and find too much in others ("he jumps up and
 lands facing the other way"). The network was trained on sentences that ask for each action of the vocabulary, on those
-of several, and on those that no action covers: `python -m marey.reading` makes `action_reader.safetensors` anew.
+of several, and on those that no action covers: `python -m marey.reading.train` makes `action_reader.safetensors` anew.
 """
 
 from __future__ import annotations
@@ -68,15 +68,13 @@ class ActionReader:
     Attributes:
         classes: ids of the vocabulary's actions, `SEVERAL`, `OUTSIDE`.
         encoder_sha256: hash of the encoder whose sentence vectors it reads.
-        sha256: hash of its file.
     """
 
     def __init__(
-        self, classes: Sequence[str], encoder_sha256: str, sha256: str, weights: Mapping[str, NDArray[np.floating]]
+        self, classes: Sequence[str], encoder_sha256: str, weights: Mapping[str, NDArray[np.floating]]
     ) -> None:
         self.classes = tuple(classes)
         self.encoder_sha256 = encoder_sha256
-        self.sha256 = sha256
         self._weights = {name: np.asarray(tensor, np.float32) for name, tensor in weights.items()}
 
     @classmethod
@@ -91,7 +89,7 @@ class ActionReader:
             weights: dict[str, Float32] = {name: file.get_tensor(name) for name in sorted(file.keys())}
         if set(weights) != {"hidden", "hidden_bias", "out", "out_bias"}:
             raise InvalidFile("is not a reader of actions", where=str(path))
-        return cls(json.loads(facts["classes"]), facts["encoder_sha256"], sha256_of(path), weights)
+        return cls(json.loads(facts["classes"]), facts["encoder_sha256"], weights)
 
     def read(self, prompt: str, vector: Float32) -> ReadAction:
         """Return what a prompt asks for.
@@ -100,12 +98,13 @@ class ActionReader:
             prompt: as `check_prompt` returns it.
             vector: (W,) its sentence vector, by `TextPipeline.pooled`.
         """
-        weights, apart = self._weights, _apart(_named(prompt))
+        weights = self._weights
         hidden = weights["hidden"] @ inputs_of(prompt, vector, self.classes) + weights["hidden_bias"]
         scores = weights["out"] @ np.maximum(hidden, 0) + weights["out_bias"]
         shares = np.exp(scores - scores.max())
         best = int(scores.argmax())
-        least = SURE_OF_SEVERAL if len(apart - {STANDING}) > 1 else SURE
+        several = len(load_vocabulary().without_implied(_named(prompt)) - {STANDING}) > 1
+        least = SURE_OF_SEVERAL if several else SURE
         return ReadAction(self.classes[best], float(shares[best] / shares.sum()), least)
 
 
@@ -113,19 +112,17 @@ def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
     """Return the input (W + C + 2,) of the network: the sentence vector (W,), a mark of each class that the words name,
     and marks of prompts whose words name several actions, and that join clauses in time."""
     named = _named(prompt)
-    marks = [*(name in named for name in classes), len(_apart(named)) > 1, _JOINTS.search(prompt.lower()) is not None]
+    marks = [
+        *(name in named for name in classes),
+        len(load_vocabulary().without_implied(named)) > 1,
+        _JOINTS.search(prompt.lower()) is not None,
+    ]
     return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE])
 
 
 def _named(prompt: str) -> set[str]:
     """Return the ids of the actions that the words of a prompt name."""
     return {each.action for each in match_scope(prompt, every_action()).actions if each.action is not None}
-
-
-def _apart(named: set[str]) -> set[str]:
-    """Return those of several actions that no other of them implies."""
-    actions = load_vocabulary().actions
-    return named.difference(*(actions[name].implies for name in named))
 
 
 @cache

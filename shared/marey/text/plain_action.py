@@ -42,13 +42,13 @@ def only_action(prompt: str) -> str | None:
     scope = match_scope(prompt, every_action())
     if scope.left is not None:
         return None
-    names = {each.action for each in scope.actions}
-    if len(names) > 1:
-        names.discard(STANDING)
-    actions = [load_vocabulary().need(name) for name in names if name is not None]
-    names.difference_update(*(action.implies for action in actions))
+    vocabulary = load_vocabulary()
+    found = {each.action for each in scope.actions if each.action is not None}
+    if any(each.action is None for each in scope.actions):
+        return None
+    names = vocabulary.without_implied(found - {STANDING} if len(found) > 1 else found)
     if TURNING in names:
-        names.difference_update(action.id for action in actions if action.in_place and action.id != TURNING)
+        names = {name for name in names if name == TURNING or not vocabulary.need(name).in_place}
     return names.pop() if len(names) == 1 else None
 
 

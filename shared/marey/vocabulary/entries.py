@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from marey.core.errors import InvalidFile, NotFound
-from marey.vocabulary.inflection import third_person
+from marey.vocabulary.inflection import phrase_in_third_person
 
 Support = Literal["feet", "seat", "hands", "whole-body", "raised", "none"]
 """Part of the body that rests on something; `raised`: on something over the floor, `none`: on nothing."""
@@ -72,8 +72,7 @@ class Action:
     @property
     def plain_words(self) -> str:
         """Return the plain phrase as a sentence: "a person waves a hand"."""
-        verb, *rest = self.plain.split()
-        return " ".join(["a person", third_person(verb), *rest])
+        return f"a person {phrase_in_third_person(self.plain)}"
 
 
 @dataclass(frozen=True)
@@ -93,6 +92,10 @@ class Vocabulary:
         if action is None:
             raise NotFound(f"unknown action {name!r}", hint=f"Known: {', '.join(self.actions)}.")
         return action
+
+    def without_implied(self, names: Set[str]) -> set[str]:
+        """Return those of some actions, by their ids, that no other of them implies."""
+        return set(names).difference(*(self.actions[name].implies for name in names))
 
     def said_first(self, text: str) -> str | None:
         """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""

@@ -122,6 +122,12 @@ def third_person(base: str) -> str:
     return base + ("es" if base.endswith(("ch", "sh", "s", "x", "z", "o")) else "s")
 
 
+def phrase_in_third_person(phrase: str) -> str:
+    """Return a verb phrase with its first word in the form with -s: "waves a hand"."""
+    verb, *rest = phrase.split()
+    return " ".join([third_person(verb), *rest])
+
+
 def _gerunds(base: str) -> set[str]:
     if base.endswith("ie"):
         return {base[:-2] + "ying"}

@@ -41,7 +41,7 @@ def test_a_reader_learns_its_texts(texts: list[LabelledText], monkeypatch: pytes
     classes, weights = training.train(some, encoder, 0)
     assert classes == [*load_vocabulary().actions, SEVERAL, OUTSIDE]
     halves = {name: part.astype(np.float16) for name, part in weights.items()}
-    reader = ActionReader(classes, encoder.sha256, "", halves)
+    reader = ActionReader(classes, encoder.sha256, halves)
     vectors = encoder.pooled([training.without_punctuation(each.text) for each in some])
     right = [reader.read(each.text, vector).name == each.asks for each, vector in zip(some, vectors, strict=True)]
     assert np.mean(right) > 0.9

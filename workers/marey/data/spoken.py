@@ -16,7 +16,7 @@ from marey.core.errors import InvalidInput
 from marey.data.captions import seeded
 from marey.items.prompts import check_prompt
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.inflection import third_person
+from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import ActionLists, match_scope
 
 PHRASES, SENTENCES = 6, 12
@@ -24,7 +24,7 @@ PHRASES, SENTENCES = 6, 12
 SUBJECTS = ("a person", "a man", "a woman", "someone", "the character", "he", "she", "the figure", "the actor")
 _SHARE_OF_NOUNS, _SHARE_OF_COMMANDS = 0.25, 0.33
 _SIDED = re.compile(r"\b(left|right)\b")  # true of some clips only
-_MARKED = re.compile(r"[~=]")  # patterns for matching, no words
+MARKED = re.compile(r"[~=]")  # patterns for matching, no words
 
 
 def spoken(action: str, seed: str, untrue: str = "") -> tuple[str, ...]:
@@ -47,7 +47,9 @@ def spoken(action: str, seed: str, untrue: str = "") -> tuple[str, ...]:
             said[rng.choice(nouns)] = None
         else:
             verb = rng.choice(verbs)
-            said[verb if rng.random() < _SHARE_OF_COMMANDS else f"{rng.choice(SUBJECTS)} {_inflect(verb)}"] = None
+            said[
+                verb if rng.random() < _SHARE_OF_COMMANDS else f"{rng.choice(SUBJECTS)} {phrase_in_third_person(verb)}"
+            ] = None
     return tuple(said)
 
 
@@ -72,17 +74,14 @@ def all_sayings() -> dict[str, list[str]]:
 def _words(action: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Verbs and nouns that are captions: those that people may send as prompts and that are read as this action."""
     entry = load_vocabulary().actions[action]
-    verbs = tuple(verb for verb in entry.verbs if _reads(verb, action) and _reads(f"he {_inflect(verb)}", action))
+    verbs = tuple(
+        verb for verb in entry.verbs if _reads(verb, action) and _reads(f"he {phrase_in_third_person(verb)}", action)
+    )
     return verbs, tuple(noun for noun in entry.nouns if _reads(noun, action))
 
 
-def _inflect(verb: str) -> str:
-    first, _, rest = verb.partition(" ")
-    return f"{third_person(first)} {rest}".rstrip()
-
-
 def _reads(text: str, action: str) -> bool:
-    if _SIDED.search(text) or _MARKED.search(text):
+    if _SIDED.search(text) or MARKED.search(text):
         return False
     try:
         check_prompt(text)

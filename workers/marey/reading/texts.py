@@ -7,7 +7,6 @@ the two files saw the definitions and no prompts.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -19,11 +18,11 @@ from marey.data.caption_files import read_caption_files
 from marey.data.captions import lower_first, seeded
 from marey.data.dataset import INDEX, SETS, known_set, known_sets
 from marey.data.index import read_index
-from marey.data.spoken import SUBJECTS, all_sayings
+from marey.data.spoken import MARKED, SUBJECTS, all_sayings
 from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
 from marey.text.action_reader import OUTSIDE, SEVERAL
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.inflection import third_person
+from marey.vocabulary.inflection import phrase_in_third_person
 
 SEQUENCES = 4000
 """Number of texts of several actions that are made of those of single ones."""
@@ -31,7 +30,6 @@ WRITTEN = 3.0
 """Weight of the texts of `several.toml` and `outside.toml`."""
 LONGEST = 45
 """Most words of them."""
-_MARKED = re.compile(r"[~=]")  # patterns for matching, no words
 _OF_THREE, _OF_ONE_SUBJECT = 0.2, 0.6
 _JOINTS = (
     "{a}, then {b}",
@@ -111,11 +109,10 @@ def _of_clips() -> Iterator[LabelledText]:
 
 def _of_vocabulary() -> Iterator[LabelledText]:
     for action in load_vocabulary().actions.values():
-        for phrase in action.verbs:
-            if not _MARKED.search(phrase):
-                yield LabelledText(phrase, action.id, 0.7)
-                yield LabelledText(f"a person {_inflected(phrase)}", action.id, 0.7)
-        yield from (LabelledText(noun, action.id, 0.7) for noun in action.nouns if not _MARKED.search(noun))
+        for phrase in _words_alone(action.verbs):
+            yield LabelledText(phrase, action.id, 0.7)
+            yield LabelledText(f"a person {phrase_in_third_person(phrase)}", action.id, 0.7)
+        yield from (LabelledText(noun, action.id, 0.7) for noun in _words_alone(action.nouns))
 
 
 def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
@@ -124,17 +121,16 @@ def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
     by_action = defaultdict[str, list[str]](list)
     for each in single:
         by_action[each.asks].append(each.text)
-    verbs = {
-        action.id: [phrase for phrase in action.verbs if not _MARKED.search(phrase)]
-        for action in load_vocabulary().actions.values()
-    }
+    verbs = {action.id: _words_alone(action.verbs) for action in load_vocabulary().actions.values()}
     subjects = (*SUBJECTS, "")
     actions, made = list(by_action), 0
     while made < SEQUENCES:
         names = rng.sample(actions, 3 if rng.random() < _OF_THREE else 2)
         if rng.random() < _OF_ONE_SUBJECT:
             subject = rng.choice(subjects)
-            parts = [_inflected(rng.choice(verbs[name])) if subject else rng.choice(verbs[name]) for name in names]
+            parts = [rng.choice(verbs[name]) for name in names]
+            if subject:
+                parts = [phrase_in_third_person(part) for part in parts]
             parts[0] = f"{subject} {parts[0]}".lstrip()
         else:
             parts = [rng.choice(by_action[name]) for name in names]
@@ -146,6 +142,6 @@ def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
             yield text
 
 
-def _inflected(phrase: str) -> str:
-    verb, *rest = phrase.split()
-    return " ".join([third_person(verb), *rest])
+def _words_alone(phrases: Sequence[str]) -> list[str]:
+    """Return the phrases of an entry that are words, without those that are patterns for matching."""
+    return [phrase for phrase in phrases if not MARKED.search(phrase)]
