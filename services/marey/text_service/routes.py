@@ -86,6 +86,8 @@ class GraphView(BaseModel):
     """The text that the model reads: the prompt, or its rewrite."""
     rewrite_reason: str | None
     """Reason why `text` differs from `prompt`, or why a rewrite was not used."""
+    movements: list[str]
+    """Texts of its movements in the order of time, if it asks for several; each is made as a motion of its own."""
     warnings: list[str]
     """Notes for the author: no action found, or parts over the model's limits."""
     words: list[str]

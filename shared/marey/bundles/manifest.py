@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -90,6 +90,10 @@ class TextSpec(_Frozen):
     plain_action: bool = False
     """Ours: the one action that a prompt asks for is said first in plain words ("The waiter takes a bow" is read as
     "a person bows, the waiter takes a bow")."""
+    movements: bool = False
+    """Ours: of a prompt of several actions, one after the other, each is also read by itself, in the order of time; a
+    model that generates around other frames makes each of them as a motion of its own, and the ways between them. Needs
+    `plain_action`."""
     split_actions: bool = True
     """Ours: a model that draws action after action reads each action of a prompt by itself; else the sentence alone."""
 
@@ -97,12 +101,20 @@ class TextSpec(_Frozen):
     """Texts that the model was trained on, in whose wording a language model rewrites: captions of one sentence, or
     descriptions of about 60 words (SnapMoGen)."""
 
+    @model_validator(mode="after")
+    def _check_movements(self) -> Self:
+        if self.movements and not self.plain_action:
+            raise ValueError("movements needs plain_action")
+        return self
+
     @model_serializer(mode="wrap")
     def _serialize(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave fields out that have the usual value: earlier releases refuse a field that they do not know."""
         values: dict[str, Any] = handler(self)
         if not self.plain_action:
             values.pop("plain_action", None)
+        if not self.movements:
+            values.pop("movements", None)
         if self.split_actions:
             values.pop("split_actions", None)
         if self.wording == "caption":

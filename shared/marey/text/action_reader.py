@@ -103,7 +103,7 @@ class ActionReader:
         scores = weights["out"] @ np.maximum(hidden, 0) + weights["out_bias"]
         shares = np.exp(scores - scores.max())
         best = int(scores.argmax())
-        several = len(load_vocabulary().without_implied(_named(prompt)) - {STANDING}) > 1
+        several = len(load_vocabulary().without_implied(named_actions(prompt)) - {STANDING}) > 1
         least = SURE_OF_SEVERAL if several else SURE
         return ReadAction(self.classes[best], float(shares[best] / shares.sum()), least)
 
@@ -111,7 +111,7 @@ class ActionReader:
 def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
     """Return the input (W + C + 2,) of the network: the sentence vector (W,), a mark of each class that the words name,
     and marks of prompts whose words name several actions, and that join clauses in time."""
-    named = _named(prompt)
+    named = named_actions(prompt)
     marks = [
         *(name in named for name in classes),
         len(load_vocabulary().without_implied(named)) > 1,
@@ -120,9 +120,9 @@ def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
     return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE])
 
 
-def _named(prompt: str) -> set[str]:
-    """Return the ids of the actions that the words of a prompt name."""
-    return {each.action for each in match_scope(prompt, every_action()).actions if each.action is not None}
+def named_actions(text: str) -> set[str]:
+    """Return the ids of the actions that the words of a text name."""
+    return {each.action for each in match_scope(text, every_action()).actions if each.action is not None}
 
 
 @cache

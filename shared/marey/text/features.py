@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +33,7 @@ class TextFeatures:
     actions: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
     action_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
     seconds: float | None = None  # length of the motion that the rewriter proposes
+    movements: tuple[TextFeatures, ...] = ()  # its movements in the order of time, if there are several
 
     @property
     def sentence(self) -> NDArray[np.float16]:
@@ -45,6 +47,11 @@ class TextFeatures:
 
     def to_blob(self) -> bytes:
         """Encode as safetensors fp16 with prompt, rewritten prompt, graph and actions in the metadata."""
+        # one entry: safetensors writes several in random order, and equal features should be equal bytes
+        rows = np.ascontiguousarray(np.concatenate(list(self._rows())), dtype=np.float16)
+        return save({"nodes": rows}, metadata={"features": json.dumps(self._about(), ensure_ascii=False)})
+
+    def _about(self) -> dict[str, Any]:
         about: dict[str, Any] = {
             "format": FORMAT,
             "prompt": self.prompt,
@@ -55,13 +62,18 @@ class TextFeatures:
             about["not_rewritten"] = self.not_rewritten
         if self.seconds is not None:
             about["seconds"] = self.seconds
-        # one entry: safetensors writes several in random order, and equal features should be equal bytes
-        rows = self.nodes
         if self.action_rows is not None:
             about["acts"] = list(self.actions)
-            rows = np.concatenate([self.nodes, self.action_rows])
-        metadata = {"features": json.dumps(about, ensure_ascii=False)}
-        return save({"nodes": np.ascontiguousarray(rows, dtype=np.float16)}, metadata=metadata)
+        if self.movements:
+            about["movements"] = [movement._about() for movement in self.movements]
+        return about
+
+    def _rows(self) -> Iterator[NDArray[np.float16]]:
+        yield self.nodes
+        if self.action_rows is not None:
+            yield self.action_rows
+        for movement in self.movements:
+            yield from movement._rows()
 
     @classmethod
     def from_blob(cls, blob: bytes) -> TextFeatures:
@@ -72,23 +84,36 @@ class TextFeatures:
         """
         try:
             nodes = parse_safetensors(blob, "features")["nodes"]
-            about = parse_json(_metadata(blob)["features"], "features", allow_nan=True)
-            if about["format"] != FORMAT:
-                raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
-            graph = SemanticGraph.from_json(about["graph"])
-            actions, count = tuple(about.get("acts", ())), len(graph.nodes)
-            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != count + len(actions):
-                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {count} nodes and {len(actions)} actions")
-            rows = nodes[count:] if actions else None
-            return cls(
-                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), actions, rows,
-                about.get("seconds"),
-            )  # fmt: skip
+            if nodes.dtype != np.float16 or nodes.ndim != 2:
+                raise ValueError(f"{nodes.dtype} {nodes.shape} are no vectors")
+            features, left = cls._of(parse_json(_metadata(blob)["features"], "features", allow_nan=True), nodes)
+            if len(left):
+                raise ValueError(f"{nodes.shape} has {len(left)} vectors too many")
+            return features
         except (InvalidFile, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",
                 hint="Delete the row of text_features; the text stage makes it again.",
             ) from error
+
+    @classmethod
+    def _of(cls, about: Mapping[str, Any], rows: NDArray[np.float16]) -> tuple[TextFeatures, NDArray[np.float16]]:
+        """Return the features that `about` and the first of the rows hold, and the other rows."""
+        if about["format"] != FORMAT:
+            raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
+        graph = SemanticGraph.from_json(about["graph"])
+        actions, count = tuple(about.get("acts", ())), len(graph.nodes)
+        end = count + len(actions)
+        if len(rows) < end:
+            raise ValueError(f"{len(rows)} vectors do not fit {count} nodes and {len(actions)} actions")
+        left, movements = rows[end:], list[TextFeatures]()
+        for each in about.get("movements", ()):
+            movement, left = cls._of(each, left)
+            movements.append(movement)
+        return cls(
+            about["prompt"], about["rewritten"], graph, rows[:count], about.get("not_rewritten"), actions,
+            rows[count:end] if actions else None, about.get("seconds"), tuple(movements),
+        ), left  # fmt: skip
 
 
 def _metadata(blob: bytes) -> dict[str, Any]:

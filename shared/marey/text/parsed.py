@@ -24,6 +24,9 @@ class ParsedPrompt:
     rewrite_reason: str | None
     """Why the text differs from the prompt, or why a rewrite was not used; None where no rewrite was asked for."""
     warnings: tuple[str, ...]
+    movements: tuple[str, ...] = ()
+    """Texts of its movements in the order of time, if it asks for several; a model that makes sequences reads these in
+    place of `graph.text`."""
 
     def to_json(self) -> dict[str, Any]:
         """The line of `marey text parse --json`, and an item of `POST /v1/texts/parse`.
@@ -40,6 +43,7 @@ class ParsedPrompt:
             "prompt": self.prompt,
             "text": graph.pop("text"),
             "rewrite_reason": self.rewrite_reason,
+            "movements": list(self.movements),
             "warnings": list(self.warnings),
             **graph,
         }

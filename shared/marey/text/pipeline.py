@@ -6,7 +6,7 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
-from marey.text.action_reader import action_reader
+from marey.text.action_reader import SURE_OF_SEVERAL, ReadAction, action_reader
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
@@ -30,6 +30,7 @@ from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_plain_action
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
+from marey.text.sequence_reader import Movement, sequence_reader
 from marey.text.words import EDGE_PUNCTUATION
 
 if TYPE_CHECKING:
@@ -38,6 +39,19 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What a prompt asks for.
+
+    Attributes:
+        worded: the text that the model reads.
+        movements: those that it asks for, if there are several, one after the other.
+    """
+
+    worded: str
+    movements: tuple[Movement, ...] = ()
 
 
 class TextPipeline:
@@ -109,11 +123,17 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        worded = self._worded([each.text for each in rewritten])
-        graphs = [graph for graph, _ in self._read(worded)]
+        readings = self._readings([each.text for each in rewritten])
+        graphs = [graph for graph, _ in self._read([reading.worded for reading in readings])]
         return [
-            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, rewrite, text, graph), self._warnings(graph))
-            for prompt, rewrite, text, graph in zip(checked, rewritten, worded, graphs, strict=True)
+            ParsedPrompt(
+                prompt,
+                graph,
+                self._rewrite_reason(prompt, rewrite, reading.worded, graph),
+                self._warnings(graph),
+                tuple(with_plain_action(each.text, each.action) for each in reading.movements),
+            )
+            for prompt, rewrite, reading, graph in zip(checked, rewritten, readings, graphs, strict=True)
         ]
 
     def _rewrite_reason(self, prompt: str, rewrite: Rewrite, worded: str, graph: SemanticGraph) -> str | None:
@@ -179,29 +199,50 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        read = self._read(self._worded([each.text for each in rewritten]))
+        readings = self._readings([each.text for each in rewritten])
+        read = self._read([reading.worded for reading in readings])
         return [
-            replace(self._features(prompt, graph, actions), not_rewritten=rewrite.refused, seconds=rewrite.seconds)
-            for prompt, rewrite, (graph, actions) in zip(checked, rewritten, read, strict=True)
+            replace(
+                self._features(prompt, graph, actions),
+                not_rewritten=rewrite.refused,
+                seconds=rewrite.seconds,
+                movements=self._movements(reading.movements),
+            )
+            for prompt, rewrite, reading, (graph, actions) in zip(checked, rewritten, readings, read, strict=True)
         ]
 
-    def _worded(self, texts: Sequence[str]) -> list[str]:
-        """Return the texts that are read: with `TextSpec.plain_action`, behind their action in plain words."""
+    def _movements(self, movements: Sequence[Movement]) -> tuple[TextFeatures, ...]:
+        """Return the features of each movement of a sequence, which is one action."""
+        graphs = self._graphs([with_plain_action(each.text, each.action) for each in movements])
+        return tuple(
+            self._features(each.text, graph, (graph.text,)) for each, graph in zip(movements, graphs, strict=True)
+        )
+
+    def _readings(self, texts: Sequence[str]) -> list[_Reading]:
+        """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
-            return list(texts)
-        return [with_plain_action(text, action) for text, action in zip(texts, self._asked(texts), strict=True)]
+            return [_Reading(text) for text in texts]
+        if not self._reads_actions:
+            return [_Reading(with_plain_action(text, only_action(text))) for text in texts]
+        reader = action_reader()
+        read = [reader.read(text, vector) for text, vector in zip(texts, self.pooled(texts), strict=True)]
+        return list(map(self._reading, texts, read))
+
+    def _reading(self, text: str, read: ReadAction) -> _Reading:
+        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL
+        if self.spec.movements and not sure and (movements := self._movements_in(text, read.action)):
+            return _Reading(text, movements)
+        return _Reading(with_plain_action(text, read.action))
+
+    def _movements_in(self, text: str, action: str | None) -> tuple[Movement, ...]:
+        with self._lock:
+            encoding = self.encoder.encode(text)
+        return sequence_reader().read(text, encoding, self.pooled, action)
 
     @property
     def _reads_actions(self) -> bool:
-        """True if the reader of actions reads prompts by the sentence vectors of this encoder."""
+        """True if prompts are read by the vectors of this encoder."""
         return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
-
-    def _asked(self, texts: Sequence[str]) -> list[str | None]:
-        """Return the one action that each text asks for: by the reader of the encoder, or else by the words."""
-        if not self._reads_actions:
-            return [only_action(text) for text in texts]
-        reader = action_reader()
-        return [reader.read(text, vector).action for text, vector in zip(texts, self.pooled(texts), strict=True)]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of

@@ -128,6 +128,11 @@ def phrase_in_third_person(phrase: str) -> str:
     return " ".join([third_person(verb), *rest])
 
 
+def gerund(base: str) -> str:
+    """Return the form with -ing: walking, carrying, stopping."""
+    return max(_gerunds(base), key=len)
+
+
 def _gerunds(base: str) -> set[str]:
     if base.endswith("ie"):
         return {base[:-2] + "ying"}

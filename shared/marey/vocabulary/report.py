@@ -32,7 +32,7 @@ NOTES = {
     "negation": "what is not to be done may be done",
     "objects": "objects are mimed",
     "counts": "may be done another number of times",
-    PART: "a stated length is not used: it is that of a part of the motion",
+    PART: "a stated length is that of a part of the motion: it is used only if the parts are made one by one",
     RANGE: "a stated length is not used: it is out of the model's range",
     "several-people": "one person is shown",
     "subject": "its subject is read as a person",

@@ -68,7 +68,7 @@ def test_actions_are_counted_apart_and_the_table_begins_with_the_best() -> None:
     lines = markdown("toy@1", found).splitlines()
     assert lines[0].startswith("Bundle `toy@1`: 1 of 2 actions with a precise rule are supported; 45.0% of 80 motions")
     assert [line.split(" | ")[0] for line in lines[4:]] == ["| kick", "| bow"]
-    assert len(document("toy@1", {}, trials)["trials"]) == 80  # pyright: ignore[reportArgumentType]
+    assert len(document("toy@1", {}, trials, rates(trials))["trials"]) == 80  # pyright: ignore[reportArgumentType]
 
 
 @given(st.integers(1, 500), st.floats(0, 1))

@@ -61,3 +61,19 @@ def test_vectors_of_another_graph_are_refused() -> None:
     broken = TextFeatures(made.prompt, made.rewritten, made.graph, made.nodes[:2])
     with pytest.raises(InvalidFile, match="3 nodes"):
         TextFeatures.from_blob(broken.to_blob())
+
+
+def test_movements_come_back_with_their_own_vectors() -> None:
+    rows = np.random.default_rng(1).normal(size=(2, 384)).astype(np.float16)
+    acted = replace(features(), prompt="he bows", actions=("he walks", "he bows"), action_rows=rows)
+    made = replace(acted, movements=(acted, features()))
+    read = TextFeatures.from_blob(made.to_blob())
+    assert read.to_blob() == made.to_blob()
+    assert [each.prompt for each in read.movements] == ["he bows", "A pérson walks 👋"]
+    assert np.array_equal(read.movements[0].action_vectors, rows)
+    assert np.array_equal(read.movements[1].nodes, features().nodes)
+    assert (features().movements, read.movements[0].movements) == ((), ())
+    with pytest.raises(InvalidFile, match="do not fit"):
+        TextFeatures.from_blob(replace(made, movements=(replace(acted, nodes=acted.nodes[:1]),)).to_blob())
+    with pytest.raises(InvalidFile, match="too many"):
+        TextFeatures.from_blob(replace(made, action_rows=np.concatenate([rows, rows])).to_blob())

@@ -1,4 +1,4 @@
-"""Training of the reader of actions."""
+"""Training of the readers of actions and of sequences."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ import pytest
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.reading import train as training
+from marey.reading import train_sequences as sequence_training
+from marey.reading.sequences import parted_texts, written_parts
 from marey.reading.texts import LabelledText, labelled_texts
 from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
+from marey.referee.prompts import sequence_prompts as referee_sequences
 from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
+from marey.text.sequence_reader import CONTEXT, SequenceReader
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder
 
@@ -45,3 +49,32 @@ def test_a_reader_learns_its_texts(texts: list[LabelledText], monkeypatch: pytes
     vectors = encoder.pooled([training.without_punctuation(each.text) for each in some])
     right = [reader.read(each.text, vector).name == each.asks for each, vector in zip(some, vectors, strict=True)]
     assert np.mean(right) > 0.9
+
+
+def test_texts_in_parts_are_whole_and_none_is_a_prompt_for_measuring() -> None:
+    parted = parted_texts(0)
+    known = {*load_vocabulary().actions, OUTSIDE, CONTEXT}
+    assert {part.asks for text in parted for part in text.parts} == known
+    assert all(part.text.strip() for text in parted for part in text.parts)
+    held_out = {prompt.text.casefold() for prompt in (*referee_sequences(), *development_prompts())}
+    held_out |= {text.casefold() for text, _ in sequence_prompts()}
+    assert not held_out & {text.text.casefold() for text in parted}
+    assert len(list(written_parts())) > 1700
+
+
+def test_a_reader_of_sequences_learns_its_texts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sequence_training, "ACTION_MEMBERS", 1)
+    monkeypatch.setattr(sequence_training, "CUT_BATCH", 16)
+    wanted = {"walk", "wave", "bow"}
+    some = [text for text in parted_texts(0) if {part.asks for part in text.parts} <= wanted][::3]
+    several = [text for text in some if len(text.parts) > 1]
+    assert len(several) > 5
+    encoder = shared_encoder()
+    classes, weights = sequence_training.train([*some, *several * 20], encoder, 0)
+    reader = SequenceReader(classes, encoder.sha256, {name: part.astype(np.float16) for name, part in weights.items()})
+    read = [reader.read(text.text, encoder.encode(text.text), encoder.pooled) for text in several]
+    right = [
+        {each.action for each in found} == {part.asks for part in text.parts}
+        for found, text in zip(read, several, strict=True)
+    ]
+    assert np.mean(right) > 0.7

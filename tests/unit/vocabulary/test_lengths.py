@@ -61,8 +61,8 @@ def test_a_warning_tells_the_length_of_a_part_from_one_out_of_the_range() -> Non
     for prompt in ("walks for twenty seconds", "walks, then waves for 3 seconds", "waves for a minute"):
         report.judge(prompt, "tiny", LISTS, lengths=(1.0, 9.8))
     assert [said for said in report.warnings() if "length" in said] == [
-        "1 of 3 prompts, index 1 (from 0), 'walks, then waves for 3 seconds': a stated length is not used: it is that "
-        "of a part of the motion",
+        "1 of 3 prompts, index 1 (from 0), 'walks, then waves for 3 seconds': a stated length is that of a part "
+        "of the motion: it is used only if the parts are made one by one",
         "2 of 3 prompts, indexes 0, 2 (from 0), first 'walks for twenty seconds': a stated length is not used: it is "
         "out of the model's range",
     ]
@@ -71,4 +71,4 @@ def test_a_warning_tells_the_length_of_a_part_from_one_out_of_the_range() -> Non
     assert [each["index"] for each in found["examples"] if each["kind"] == "length"] == [0, 2, 1]
     row = ScopeReport()
     row.judge("0-5 …", "tiny", LISTS, rows=[("row 1 (0-5)", "walks, then waves for 3 seconds")])
-    assert row.warnings()[-1].endswith("it is that of a part of the motion")
+    assert row.warnings()[-1].endswith("it is used only if the parts are made one by one")

@@ -7,6 +7,7 @@ from typing import Any
 
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
+from marey.generation.shots.timelines import TimelineMotion
 from marey.generation.sides import MirroredMotion
 from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
@@ -70,6 +71,8 @@ def finish(
         clean: lock feet in contact.
     """
     body = body or standard_body(generator.layout.skeleton)
+    if isinstance(generated, TimelineMotion):
+        request = replace(request, timeline=generated.timeline)
     mirrored = {"mirrored": True} if isinstance(generated, MirroredMotion) else {}
     manifest = {**manifest_of(generator, request, settings), **mirrored, CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
@@ -91,7 +94,8 @@ def judged(clip: MotionClip, request: Request) -> MotionClip:
 
 def _prompts(request: Request) -> list[str]:
     if request.timeline is not None:
-        return [row.text.prompt for row in request.timeline]
+        whole = [request.text.prompt] if request.text.movements else []
+        return [*whole, *(row.text.prompt for row in request.timeline)]
     return [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
 
 

@@ -12,14 +12,15 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.checks import reader_prompts
 from marey.data.caption_files import read_caption_files
 from marey.data.captions import lower_first, seeded
 from marey.data.dataset import INDEX, SETS, known_set, known_sets
 from marey.data.index import read_index
 from marey.data.spoken import MARKED, SUBJECTS, all_sayings
-from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
+from marey.referee.prompts import action_prompts, development_prompts, sequence_prompts, studio_prompts
 from marey.text.action_reader import OUTSIDE, SEVERAL
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
@@ -69,21 +70,21 @@ def labelled_texts(seed: int) -> list[LabelledText]:
     texts = [
         *single,
         *several,
-        *(LabelledText(text, SEVERAL, WRITTEN) for text in _written("several")),
+        *(LabelledText(text.replace("|", ""), SEVERAL, WRITTEN) for text, _ in _written("several")),
         *(LabelledText(text, OUTSIDE, WRITTEN) for text in _written("outside")),
     ]
-    held_out = _held_out()
-    return [each for each in texts if each.text.casefold() not in held_out]
+    unseen = held_out()
+    return [each for each in texts if each.text.casefold() not in unseen]
 
 
-def _held_out() -> set[str]:
-    """Return the prompts by which the reader, and the motions of what it reads, are measured."""
-    asked = (*action_prompts(), *studio_prompts(), *development_prompts())
-    others = (*outside_prompts(), *(text for text, _ in sequence_prompts()))
+def held_out() -> set[str]:
+    """Return the prompts by which the readers, and the motions of what they read, are measured."""
+    asked = (*action_prompts(), *studio_prompts(), *development_prompts(), *sequence_prompts())
+    others = (*reader_prompts.outside_prompts(), *(text for text, _ in reader_prompts.sequence_prompts()))
     return {text.casefold() for text in (*(prompt.text for prompt in asked), *others)}
 
 
-def _written(kind: str) -> list[str]:
+def _written(kind: str) -> list[Any]:
     return tomllib.loads(Path(__file__).with_name(f"{kind}.toml").read_text("utf-8"))[kind]
 
 
@@ -109,10 +110,10 @@ def _of_clips() -> Iterator[LabelledText]:
 
 def _of_vocabulary() -> Iterator[LabelledText]:
     for action in load_vocabulary().actions.values():
-        for phrase in _words_alone(action.verbs):
+        for phrase in words_alone(action.verbs):
             yield LabelledText(phrase, action.id, 0.7)
             yield LabelledText(f"a person {phrase_in_third_person(phrase)}", action.id, 0.7)
-        yield from (LabelledText(noun, action.id, 0.7) for noun in _words_alone(action.nouns))
+        yield from (LabelledText(noun, action.id, 0.7) for noun in words_alone(action.nouns))
 
 
 def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
@@ -121,7 +122,7 @@ def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
     by_action = defaultdict[str, list[str]](list)
     for each in single:
         by_action[each.asks].append(each.text)
-    verbs = {action.id: _words_alone(action.verbs) for action in load_vocabulary().actions.values()}
+    verbs = {action.id: words_alone(action.verbs) for action in load_vocabulary().actions.values()}
     subjects = (*SUBJECTS, "")
     actions, made = list(by_action), 0
     while made < SEQUENCES:
@@ -142,6 +143,6 @@ def _joined(single: Sequence[LabelledText], seed: int) -> Iterator[str]:
             yield text
 
 
-def _words_alone(phrases: Sequence[str]) -> list[str]:
+def words_alone(phrases: Sequence[str]) -> list[str]:
     """Return the phrases of an entry that are words, without those that are patterns for matching."""
     return [phrase for phrase in phrases if not MARKED.search(phrase)]

@@ -64,7 +64,7 @@ def fit(inputs: Float32, classes: Sequence[int], weights: Float32, count: int, s
 
 def side_by_side(networks: Sequence[nn.Sequential]) -> dict[str, Float32]:
     """Return one network whose scores are the mean of those of several."""
-    first, last = ([_layer(network, place) for network in networks] for place in (1, 4))
+    first, last = ([layer_at(network, place) for network in networks] for place in (1, 4))
     parts = {
         "hidden": torch.cat([layer.weight for layer in first]),
         "hidden_bias": torch.cat([layer.bias for layer in first]),
@@ -74,7 +74,8 @@ def side_by_side(networks: Sequence[nn.Sequential]) -> dict[str, Float32]:
     return {name: part.detach().numpy().astype(np.float32) for name, part in parts.items()}
 
 
-def _layer(network: nn.Sequential, place: int) -> nn.Linear:
+def layer_at(network: nn.Sequential, place: int) -> nn.Linear:
+    """Return the linear layer at a place of a network."""
     layer = network[place]
     assert isinstance(layer, nn.Linear)
     return layer

@@ -74,6 +74,32 @@ def rates(trials: Sequence[ActionTrial]) -> list[ActionRate]:
     return [_rate(action, group) for action, group in groups.items()]
 
 
+def sequence_rates(trials: Sequence[ActionTrial]) -> list[ActionRate]:
+    """Return the rate of prompts of two actions, of three, and so on; their standing says nothing."""
+    groups = defaultdict[int, list[ActionTrial]](list)
+    for trial in trials:
+        groups[len(trial.prompt.actions)].append(trial)
+    return [_rate(f"{count} actions", groups[count]) for count in sorted(groups)]
+
+
+def sequence_markdown(bundle: str, found: Sequence[ActionRate]) -> str:
+    """Return a report with a table."""
+    motions = sum(rate.motions for rate in found)
+    passed = sum(rate.share * rate.motions for rate in found)
+    lines = [
+        f"Bundle `{bundle}`: {passed / motions:.1%} of {motions} motions show their actions, in order.",
+        "",
+        "| prompts | adherence | 95 % interval | prompts | motions | prompts that always failed |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {rate.action} | {rate.share:.0%} | {rate.low:.0%} to {rate.high:.0%} | {rate.phrasings} | {rate.motions} "
+        f"| {rate.lost} |"
+        for rate in found
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def _rate(action: str, trials: Sequence[ActionTrial]) -> ActionRate:
     of_prompt = defaultdict[str, list[bool]](list)
     for trial in trials:
@@ -118,11 +144,13 @@ def markdown(bundle: str, found: Sequence[ActionRate]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def document(bundle: str, settings: Mapping[str, object], trials: Sequence[ActionTrial]) -> dict[str, object]:
+def document(
+    bundle: str, settings: Mapping[str, object], trials: Sequence[ActionTrial], found: Sequence[ActionRate]
+) -> dict[str, object]:
     """Return all data as JSON values, each trial included."""
     return {
         "bundle": bundle,
         "settings": dict(settings),
-        "actions": [asdict(rate) for rate in rates(trials)],
+        "actions": [asdict(rate) for rate in found],
         "trials": [asdict(trial) for trial in trials],
     }

@@ -1,8 +1,8 @@
 """Held-out prompts by authors who saw the definitions of the vocabulary and nothing else.
 
 Two authors ask for single actions, by which the supported actions of a bundle are published; a third wrote a list of
-300 prompts as a games studio would send it. Nothing is trained on them or chosen by them. By the prompts of a fourth,
-`development`, settings are chosen.
+300 prompts as a games studio would send it, and a fifth asks for sequences. Nothing is trained on them or chosen by
+them. By the prompts of a fourth, `development`, settings are chosen.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 AUTHORS = (1, 2)
-STUDIO_AUTHOR, DEVELOPMENT_AUTHOR = 3, 4
+STUDIO_AUTHOR, DEVELOPMENT_AUTHOR, SEQUENCE_AUTHOR = 3, 4, 5
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,13 @@ def development_prompts() -> tuple[ActionPrompt, ...]:
     return tuple(
         ActionPrompt(text, (action,), "", DEVELOPMENT_AUTHOR) for action, texts in tables.items() for text in texts
     )
+
+
+@lru_cache(maxsize=1)
+def sequence_prompts() -> tuple[ActionPrompt, ...]:
+    """Return prompts of two to four actions one after another, by which nothing is chosen."""
+    table = tomllib.loads(Path(__file__).with_name("prompts_sequences.toml").read_text("utf-8"))
+    return tuple(ActionPrompt(each["text"], tuple(each["actions"]), "", SEQUENCE_AUTHOR) for each in table["sequence"])
 
 
 @lru_cache(maxsize=1)

@@ -27,6 +27,7 @@ from marey.core.errors import InvalidBundle
 from marey.data.prepared import PreparedData
 from marey.generation.export import finish
 from marey.generation.port import Generator, Request, S
+from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.motion.clip import MotionClip
 from marey.text.features import TextFeatures
 from marey.text.pipeline import TextPipeline
@@ -172,7 +173,8 @@ def _judged(generator: Generator[S], jobs: Sequence[tuple[HeldOutPrompt, Request
 
 def finished(generator: Generator[S], requests: Sequence[Request], settings: S) -> Iterator[MotionClip]:
     """Generate a batch, and yield its motions as they are exported, in order."""
-    for request, made in zip(requests, generator.generate(requests, settings), strict=True):
+    resolved = [resolve_request(generator, request) for request in requests]
+    for request, made in zip(resolved, generate_any(generator, resolved, settings), strict=True):
         assert made is not None  # no rows are dropped here
         yield finish(generator, request, made, settings)
 

@@ -381,6 +381,26 @@ def actions(
 
 
 @app.command()
+def sequences(
+    bundle: JudgedBundle,
+    seeds: Seeds = 4,
+    settings: evaluating.Settings = None,
+    development: Annotated[
+        bool, typer.Option("--development", help="By the prompts by which settings are chosen, not the held-out ones.")
+    ] = False,
+    threads: Threads = 0,
+    output: ReportFolder = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure whether a bundle shows two to four actions in the order that a prompt tells. Needs no server."""
+    from marey.cli.roles.actions import measure_sequences
+
+    _measure(
+        lambda how: measure_sequences(bundle, how, development=development), seeds, settings, threads, output, as_json
+    )
+
+
+@app.command()
 def pairs(
     bundle: JudgedBundle,
     chosen: Annotated[

@@ -82,6 +82,8 @@ def draw(graph: dict[str, Any]) -> None:
         console.result(f"read as: {graph['text']}")
     if graph["rewrite_reason"] is not None:
         console.result(f"why: {graph['rewrite_reason']}")
+    for number, movement in enumerate(graph["movements"], 1):
+        console.result(f"movement {number}: {movement}")
     for node in graph["nodes"]:
         if node["level"] == "action":
             console.result(f"  {node['text']}")

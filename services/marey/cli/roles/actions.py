@@ -1,4 +1,5 @@
-"""Measurements of a bundle by the referee, in this process: `marey eval actions`, `pairs` and `studio`."""
+"""Measurements of a bundle by the referee, in this process: `marey eval actions`, `sequences`, `pairs` and
+`studio`."""
 
 from __future__ import annotations
 
@@ -106,7 +107,7 @@ def measure_actions(
         learning.record(run.bundle, found)
     if picture is not None:
         _draw(list(firsts.values()), found, run.reference, picture)
-    return run.report(markdown(run.reference, found), document(run.reference, run.settings, trials))
+    return run.report(markdown(run.reference, found), document(run.reference, run.settings, trials, found))
 
 
 class _Learning:
@@ -183,6 +184,32 @@ def measure_studio(bundle: str, options: MeasureOptions) -> RefereeReport:
     return run.report(table, studio_document(run.reference, run.settings, trials))
 
 
+def measure_sequences(bundle: str, options: MeasureOptions, *, development: bool = False) -> RefereeReport:
+    """Generate prompts of several actions one after another with a bundle, and let the referee judge their order.
+
+    Args:
+        development: take the prompts by which settings are chosen, instead of the held-out ones.
+
+    Raises:
+        NotFound, InvalidBundle: of the bundle.
+        InvalidInput: no such setting.
+    """
+    run = _Run.of(bundle, options)
+    from marey.checks import reader_prompts
+    from marey.referee import Body
+    from marey.referee.adherence import document, judge_trial, sequence_markdown, sequence_rates
+    from marey.referee.prompts import DEVELOPMENT_AUTHOR, ActionPrompt, sequence_prompts
+
+    known = reader_prompts.sequence_prompts()
+    chosen = [ActionPrompt(text, actions, "", DEVELOPMENT_AUTHOR) for text, actions in known]
+    trials = [
+        judge_trial(prompt, seed, Body(clip.joints, clip.fps))
+        for prompt, seed, clip in run.motions(chosen if development else sequence_prompts())
+    ]
+    found = sequence_rates(trials)
+    return run.report(sequence_markdown(run.reference, found), document(run.reference, run.settings, trials, found))
+
+
 def measure_pairs(bundle: str, properties: Sequence[str], options: MeasureOptions) -> RefereeReport:
     """Generate minimal pairs of prompts with a bundle, and count the pairs whose motions differ as asked.
 
@@ -254,6 +281,7 @@ class _Run:
         from marey.bundles.limits import length_of
         from marey.generation.candidates import draw_clips
         from marey.generation.port import Request
+        from marey.generation.shots.dispatch import resolve_request
         from marey.items.item import Item
         from marey.training.adherence import pipeline_of
 
@@ -264,7 +292,7 @@ class _Run:
         frames = [generator.limits.frames_of(seconds, text) for seconds, text in zip(lengths, texts, strict=True)]
         scopes = self._scopes(pipeline, prompts)
         jobs = [
-            (prompt, Request(text, seed, wanted, scope=scope))
+            (prompt, resolve_request(generator, Request(text, seed, wanted, scope=scope)))
             for seed in range(self._options.seeds)
             for prompt, text, wanted, scope in zip(prompts, texts, frames, scopes, strict=True)
         ]

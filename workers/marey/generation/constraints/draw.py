@@ -74,7 +74,8 @@ def constrained_request(
     """
     terms_with(generator.bundle.manifest.licence, constraints)
     rate, limits = fps or generator.layout.fps, generator.limits
-    known = resolve_request(generator, request)
+    # A path runs through one motion; movements that are made one by one would not follow it together.
+    known = resolve_request(generator, replace(request, text=replace(request.text, movements=())))
     if seconds is None and request.timeline is None and request.recording is None:
         known = replace(known, frames=_reaching(known, constraints, limits, rate))
     _asked(constraints, known, limits, generator.layout.skeleton, rate)

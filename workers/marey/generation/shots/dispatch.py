@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
+from marey.generation.shots.sequences import as_timeline
 from marey.generation.shots.timelines import check_timelines, generate_timelines
 from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText
@@ -38,15 +40,17 @@ def timeline_request(
     timeline = tuple(
         TimedText(row.start, row.end, text, of_row) for row, text, of_row in zip(rows, texts, scopes, strict=True)
     )
-    return Request(texts[0], seed, scope=scope, timeline=timeline)
+    return Request(replace(texts[0], movements=()), seed, scope=scope, timeline=timeline)
 
 
 def resolve_request(generator: Generator[S], request: Request) -> Request:
-    """Return the request with its length set, where the model decides lengths beforehand.
+    """Return the request with its length set, where the model decides lengths beforehand; a sequence as a timeline.
 
     Raises:
         InvalidInput: as `Limits.check`; or a timeline, and the model cannot generate frames around others.
     """
+    generator.limits.check(request)
+    request = as_timeline(generator, request)
     if request.timeline is None:
         return generator.resolve_length(request)
     check_timelines(generator)

@@ -23,7 +23,8 @@ KEY = "timeline"
 def describe_timeline(
     request: Request, timeline: Sequence[TimedText], limits: Limits, lists: ActionLists | None
 ) -> dict[str, Any]:
-    """Return the part of the provenance that says what the prompts of a timeline are and how they were read.
+    """Return the part of the provenance that says what the prompts of a timeline are and how they were read; that of a
+    sequence has the prompt of the whole.
 
     Times are in seconds; those of transitions and gaps are of the frames that they have.
     """
@@ -33,10 +34,11 @@ def describe_timeline(
         {"start": part.start / limits.fps, "end": part.end / limits.fps, "seed": part.seed} for part in plan.transitions
     ]
     gaps = [{"start": start / limits.fps, "end": end / limits.fps} for start, end in gaps_of(plan)]
+    prompt = text_of([TimelineRow(row.start, row.end, row.text.prompt) for row in timeline])
     return {
-        "prompt": text_of([TimelineRow(row.start, row.end, row.text.prompt) for row in timeline]),
+        "prompt": request.text.prompt if request.text.movements else prompt,
         "rewritten": text_of([TimelineRow(row.start, row.end, row.text.rewritten) for row in timeline]),
-        **({} if lists is None else {"scope": dict(request.scope or _scope(timeline, lists))}),
+        **({} if lists is None else {"scope": dict(request.scope or _scope(request, timeline, lists))}),
         KEY: {"rows": rows, "transitions": transitions, "gaps": gaps},
     }
 
@@ -54,7 +56,9 @@ def _describe_row(row: TimedText, seed: int) -> dict[str, Any]:
     }
 
 
-def _scope(timeline: Sequence[TimedText], lists: ActionLists) -> Mapping[str, Any]:
+def _scope(request: Request, timeline: Sequence[TimedText], lists: ActionLists) -> Mapping[str, Any]:
+    if request.text.movements:
+        return match_scope(request.text.prompt, lists).as_json()
     return scope_of_rows([match_scope(row.text.prompt, lists) for row in timeline]).as_json()
 
 

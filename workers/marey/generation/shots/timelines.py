@@ -8,12 +8,14 @@ all timelines of a batch are generated together, and each depends on its own row
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.generation.passes import PassControl
@@ -22,20 +24,31 @@ from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, c
 from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
+from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
+from marey.vocabulary.entries import load_vocabulary
 
 CUT = 8
 """Most frames of a row that the transition to it replaces. All are at its beginning: an action shows at its end that it
 was done (a seat is reached, stairs are climbed), and replacing frames there costs adherence."""
 CUT_SHARE = 4
 """At most one in so many frames of a row is replaced."""
+RISE, RISE_SPEED = 0.3, 0.6
+"""Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
+stand up or to go down at this speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimelineMotion:
-    """The features of a timeline, (T, D), in the layout's own units."""
+    """The features of a timeline.
+
+    Attributes:
+        features: (T, D), in the layout's own units.
+        timeline: its rows, with the times that they have.
+    """
 
     features: Float32 = field(repr=False)
+    timeline: tuple[TimedText, ...]
 
 
 @dataclass(frozen=True)
@@ -120,6 +133,9 @@ def generate_timelines(
     timelines = [_Timeline(request, generator.limits) for request in requests]
     windows = _Windows(generator, settings, control or NoControl(), timelines)
     windows.make([strand for timeline in timelines for strand in timeline.rows])
+    for timeline, request in zip(timelines, requests, strict=True):
+        if request.text.movements and request.frames is None and not timeline.dropped:
+            timeline.leave_time(generator.layout)
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions()])
     return [timeline.motion() for timeline in timelines]
 
@@ -232,6 +248,8 @@ class _Timeline:
         assert request.timeline is not None
         self.limits = limits
         self.dropped = False
+        self.timeline = request.timeline
+        self.seed = request.seed
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [
             _Row(self, part, row.text, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)
@@ -247,6 +265,27 @@ class _Timeline:
         most = (most_frames(self.limits, 2), self.limits.max_frames - CONTEXT)
         between = sum(len(even_parts(part.frames, *most)) for part in self.plan.transitions)
         return sum(len(row.lengths) - len(row.windows) for row in self.rows) + between
+
+    def leave_time(self, layout: FeatureLayout) -> None:
+        """Begin movements later that begin much higher or lower than those before them end; not where people stand on
+        something, since all movements begin on one floor."""
+        later, times = 0.0, list[TimedText]()
+        heights = [_pelvis_heights(row.features, layout) for row in self.rows]
+        for number, timed in enumerate(self.timeline):
+            if number:
+                rise = abs(float(heights[number][0] - heights[number - 1][-1]))
+                raised = _is_raised(timed.text) or _is_raised(self.timeline[number - 1].text)
+                later += self._whole_tokens(rise / RISE_SPEED) if rise > RISE and not raised else 0.0
+            times.append(replace(timed, start=timed.start + later, end=timed.end + later))
+        self.timeline = tuple(times)
+        self.plan = plan_timeline(self.timeline, self.seed, self.limits)
+        for row, part in zip(self.rows, self.plan.rows, strict=True):
+            row.part = part
+
+    def _whole_tokens(self, seconds: float) -> float:
+        """Return a time in seconds, up to the next whole token of the model."""
+        grid = self.limits.keeps
+        return math.ceil(seconds * self.limits.fps / grid) * grid / self.limits.fps
 
     def open_transitions(self) -> list[_Transition]:
         """Return the transitions, once the rows are made; none of a dropped timeline."""
@@ -266,7 +305,7 @@ class _Timeline:
             frames[row.part.start : row.part.end] = row.features
         for transition in self.transitions:
             frames = transition.write(frames)
-        return TimelineMotion(frames.astype(np.float32))
+        return TimelineMotion(frames.astype(np.float32), self.timeline)
 
 
 class _Windows:
@@ -312,6 +351,19 @@ class _Windows:
     def _owners(self, strands: Sequence[_Strand]) -> list[int]:
         place = {id(timeline): number for number, timeline in enumerate(self._timelines)}
         return [place[id(strand.timeline)] for strand in strands]
+
+
+def _pelvis_heights(features: Float32 | None, layout: FeatureLayout) -> NDArray[np.float32]:
+    """Return the height (T,) of the pelvis over the floor, metres."""
+    assert features is not None
+    return layout.decode(features)[:, 0, 1]
+
+
+def _is_raised(text: TextFeatures) -> bool:
+    """Return True if the action that a text is read as ends or begins over the floor: on stairs, a ladder or a bar."""
+    vocabulary = load_vocabulary()
+    action = vocabulary.said_first(text.rewritten)
+    return action is not None and vocabulary.need(action).support == "raised"
 
 
 def even_parts(frames: int, single: int, most: int) -> list[int]:

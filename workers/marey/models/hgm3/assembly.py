@@ -48,7 +48,8 @@ def assemble(
     }
     condition = config.condition
     caps = {"max_actions": condition.max_actions, "max_specifics": condition.max_specifics}
-    text = gathered.text.model_copy(update={"in_order": config.in_order, "plain_action": config.plain_action, **caps})
+    read = {"in_order": config.in_order, "plain_action": config.plain_action, "movements": config.movements}
+    text = gathered.text.model_copy(update={**read, **caps})
     return gathered.write(bundle, MODEL, config, states=states, text=text, card=card, overwrite=overwrite)
 
 

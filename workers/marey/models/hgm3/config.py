@@ -131,6 +131,9 @@ class HGM3Config(ModelConfig):
     plain_action: bool = field(default=False, metadata=ADDED)
     """Ours: the action that a prompt asks for is said first in plain words (`TextSpec.plain_action`); captions are
     learned as they are."""
+    movements: bool = field(default=False, metadata=ADDED)
+    """Ours: the actions of a prompt that asks for several, one after the other, are made one by one
+    (`TextSpec.movements`); needs `plain_action`."""
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     phases: Count = field(default=4, metadata=ADDED)
@@ -236,6 +239,7 @@ OPEN = replace(
     phases=1,
     speeds=False,
     plain_action=True,
+    movements=True,
     # Captured walks last three seconds and more; prompts ask for two.
     crops=0.4,
     # Waves and claps must be in the first level: upper levels are drawn without regard to their neighbours.

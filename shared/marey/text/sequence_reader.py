@@ -1,0 +1,325 @@
+"""Reader of prompts that ask for several movements: where each begins, which action it is, and when it comes (ours).
+
+A convolution over the token states of the sentence encoder finds where movements may begin, and a second network reads
+the action of each clause that these cuts make, from the clause's own sentence vector, its words and the states around
+it.
+The cuts that both find likeliest together are taken. `python -m marey.reading.train_sequences` makes
+`sequence_reader.safetensors` anew.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import safe_open
+
+from marey.core.errors import InvalidFile
+from marey.core.hashing import sha256_of
+from marey.text.action_reader import OUTSIDE, STANDING, named_actions
+from marey.text.encoders import Encoding
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import every_action, match_scope
+
+FILE = Path(__file__).with_name("sequence_reader.safetensors")
+VERSION = 1
+"""Raise it when the same prompt and file give other movements."""
+STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
+"""Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
+KERNEL = 5
+"""Tokens that a convolution sees."""
+CONTEXT = "no movement"
+"""Class of a clause that asks for nothing: "while the others eat"."""
+MOST_CUTS = 5
+"""Cuts that are considered, those most likely; a prompt has one movement more at most."""
+LEAST_CUT = 0.03
+"""Probability from which on a cut is considered."""
+ACTION_WEIGHT = 4.0
+"""Weight of the actions of clauses beside that of the cuts."""
+SURE = 0.4
+"""Probability that each movement of a sequence has at least."""
+PLAIN = 0.5
+"""Probability from which on the action of a clause is said in plain words."""
+
+_PAUSE = (
+    r"(?:(?:an?|one|two|three|some|\d+) )?(?:short |brief |little |few |couple of )?"
+    r"(?:moment|while|pause|beat|bit|second|time)s?"
+)
+_AFTER = re.compile(
+    r"^\W*(?:and )?(?:(?:right |just |shortly )?(?:after|once(?= (?:he|she|they|it|the|his|her|a)\b))|but first"
+    r"|before that|having)\b",
+    re.IGNORECASE,
+)
+_AFTER_THAT = re.compile(rf"^\W*(?:and )?(?:after (?:that|this|which|{_PAUSE})|afterwards?)\b", re.IGNORECASE)
+_BEFORE = re.compile(r"^\W*(?:right |just |shortly )?before\b", re.IGNORECASE)
+_JOINING = re.compile(
+    r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|before"
+    rf"|after(?: (?:that|this|{_PAUSE}))?|until|once|while|as|followed by|but|having|ending with)\b\s*)+",
+    re.IGNORECASE,
+)
+"""Words and signs at the beginning of a clause that join it to others."""
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Movement:
+    """One movement of a prompt.
+
+    Attributes:
+        text: its words, without those that join it to others.
+        action: id of its action in the vocabulary; None = none, in doubt, or several at once.
+    """
+
+    text: str
+    action: str | None
+
+
+@dataclass(frozen=True)
+class Clause:
+    """A part of a prompt with what it asks for.
+
+    Attributes:
+        name: id of an action, `OUTSIDE` or `CONTEXT`.
+        probability: 0 to 1.
+        text: as written.
+        at_once: it comes at the same time as the clause before it.
+    """
+
+    name: str
+    probability: float
+    text: str
+    at_once: bool = False
+
+
+class SequenceReader:
+    """Both networks.
+
+    Attributes:
+        classes: ids of the vocabulary's actions, `OUTSIDE`, `CONTEXT`.
+        encoder_sha256: hash of the encoder whose states it reads.
+    """
+
+    def __init__(
+        self, classes: Sequence[str], encoder_sha256: str, weights: Mapping[str, NDArray[np.floating]]
+    ) -> None:
+        self.classes = tuple(classes)
+        self.encoder_sha256 = encoder_sha256
+        self._weights = {name: np.asarray(tensor, np.float32) for name, tensor in weights.items()}
+
+    @classmethod
+    def load(cls, path: Path = FILE) -> SequenceReader:
+        """Load the reader.
+
+        Raises:
+            InvalidFile: it has other tensors.
+        """
+        with cast("Any", safe_open)(path, framework="np") as file:
+            facts: dict[str, str] = file.metadata() or {}
+            weights: dict[str, Float32] = {name: file.get_tensor(name) for name in sorted(file.keys())}
+        if set(weights) != set(TENSORS):
+            raise InvalidFile("is not a reader of sequences", where=str(path))
+        return cls(json.loads(facts["classes"]), facts["encoder_sha256"], weights)
+
+    def read(
+        self,
+        prompt: str,
+        encoding: Encoding,
+        pooled: Callable[[Sequence[str]], Sequence[Float32]],
+        action: str | None = None,
+    ) -> tuple[Movement, ...]:
+        """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
+        other, or that is in doubt.
+
+        Standing still beside the one action that a prompt is taken for is no movement, and prompts that say what is not
+        done are not taken apart.
+
+        Args:
+            prompt: as `check_prompt` returns it.
+            encoding: of the prompt as it is written.
+            pooled: returns the sentence vectors (W,) of texts.
+            action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
+        """
+        groups = in_order(self._clauses(prompt, encoding, pooled))
+        clauses = [clause for group in groups for clause in group]
+        if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
+            return ()
+        if action is not None and len({clause.name for clause in clauses} - {STANDING}) < 2:
+            return ()
+        if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
+            return ()
+        return tuple(map(_movement, groups))
+
+    def _clauses(
+        self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
+    ) -> list[Clause]:
+        """Return the likeliest clauses of a prompt, as they are written."""
+        begins, at_once = self.beginnings(encoding.tokens)
+        places = [place for place in _word_starts(prompt, encoding.offsets) if begins[place] > LEAST_CUT]
+        places = sorted(sorted(places, key=lambda place: -begins[place])[:MOST_CUTS])
+        edges = [0, *(encoding.offsets[place][0] for place in places), len(prompt)]
+        spans = list(itertools.combinations(range(len(edges)), 2))
+        texts = [without_joints(prompt[edges[low] : edges[high]]) for low, high in spans]
+        rows = [
+            clause_inputs(text, vector, encoding, (edges[low], edges[high]), self.classes)
+            for text, vector, (low, high) in zip(texts, pooled(texts), spans, strict=True)
+        ]
+        shares = dict(zip(spans, self.actions(np.stack(rows)), strict=True))
+        cuts = _likeliest([float(begins[place]) for place in places], shares)
+        found: list[Clause] = []
+        for low, high in itertools.pairwise(cuts):
+            best = int(shares[low, high].argmax())
+            together = low > 0 and bool(at_once[places[low - 1]])
+            text = prompt[edges[low] : edges[high]].strip()
+            found.append(Clause(self.classes[best], float(shares[low, high][best]), text, together))
+        return found
+
+    def beginnings(self, states: Float32) -> tuple[Float32, NDArray[np.bool_]]:
+        """Return the probability (T,) that a movement begins at each token, and whether (T,) it would come at the same
+        time as the one before, from token states (T, W)."""
+        weights = self._weights
+        hidden = np.maximum(states * STATE_SCALE @ weights["states"].T + weights["states_bias"], 0)
+        for layer in ("first", "second"):
+            hidden = hidden + np.maximum(_convolved(hidden, weights[layer], weights[f"{layer}_bias"]), 0)
+        scores = hidden @ weights["begins"].T + weights["begins_bias"]
+        return (1 / (1 + np.exp(-scores[:, 0]))).astype(np.float32), scores[:, 1] > 0
+
+    def actions(self, inputs: Float32) -> Float32:
+        """Return the probabilities (N, C) of the classes for clauses (N, I); what is left of 1 is that of several
+        actions."""
+        weights = self._weights
+        hidden = np.maximum(inputs @ weights["hidden"].T + weights["hidden_bias"], 0)
+        scores = hidden @ weights["out"].T + weights["out_bias"]
+        shares = np.exp(scores - scores.max(axis=1, keepdims=True))
+        return (shares / shares.sum(axis=1, keepdims=True))[:, : len(self.classes)]
+
+
+TENSORS = tuple(
+    f"{name}{end}" for name in ("states", "first", "second", "begins", "hidden", "out") for end in ("", "_bias")
+)
+
+
+def clause_inputs(
+    text: str, vector: Float32, encoding: Encoding, span: tuple[int, int], classes: Sequence[str]
+) -> Float32:
+    """Return the input (2 W + C + 1,) of the network of actions: the sentence vector of a clause, a mark of each class
+    that its words name, a mark of words that name several, and the mean state of its tokens in the prompt.
+
+    Args:
+        text: the clause, without joining words.
+        vector: (W,) of the clause alone.
+        encoding: of the prompt.
+        span: its first character in the prompt, and the one after its last.
+        classes: ids of the actions, and the classes behind them.
+    """
+    named = named_actions(text)
+    marks = [*(name in named for name in classes), len(load_vocabulary().without_implied(named)) > 1]
+    within = encoding.span(*span)
+    around = np.zeros_like(vector) if within is None else within
+    parts = vector * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE, around * STATE_SCALE
+    return np.concatenate(parts).astype(np.float32)
+
+
+def without_joints(text: str) -> str:
+    """Return a clause without the words that join it to others: "and then he bows," is "he bows"."""
+    bare = _JOINING.sub("", text).strip(" ,.;:→>-(")
+    return bare or text.strip()
+
+
+def in_order(clauses: Sequence[Clause]) -> list[list[Clause]]:
+    """Return clauses in groups, in the order of time; those of a group come at once.
+
+    Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
+    down" and "before leaving, he bows" are told in the other order.
+    """
+    groups: list[list[Clause]] = []
+    at = 0
+    for before, clause in zip([None, *clauses], clauses, strict=False):
+        if clause.name == CONTEXT:
+            continue
+        if not groups:
+            groups.append([clause])
+        elif before is not None and before is clauses[0] and _BEFORE.match(before.text):
+            groups.insert(at, [clause])
+        elif _AFTER.match(clause.text) and not _AFTER_THAT.match(clause.text):
+            groups.insert(at, [clause])
+            at += 1
+        elif clause.at_once:
+            groups[at].append(clause)
+        else:
+            at += 1
+            groups.insert(at, [clause])
+    return _merged(groups)
+
+
+def _merged(groups: Sequence[list[Clause]]) -> list[list[Clause]]:
+    merged: list[list[Clause]] = []
+    for group in groups:
+        last = merged[-1] if merged else []
+        if len(group) == len(last) == 1 and group[0].name == last[0].name:
+            surer = max(group[0].probability, last[0].probability)
+            merged[-1] = [Clause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
+        else:
+            merged.append(group)
+    return merged
+
+
+def _movement(group: Sequence[Clause]) -> Movement:
+    text = without_joints(" ".join(clause.text for clause in group))
+    single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
+    return Movement(text, group[0].name if single else None)
+
+
+def _word_starts(prompt: str, offsets: Sequence[tuple[int, int]]) -> Iterator[int]:
+    """Yield the tokens that begin a word or a sign, but the first."""
+    real = [place for place, (start, end) in enumerate(offsets) if end > start]
+    for before, place in itertools.pairwise(real):
+        start = offsets[place][0]
+        if start > offsets[before][1] or not prompt[start].isalnum():
+            yield place
+
+
+def _likeliest(begins: Sequence[float], shares: Mapping[tuple[int, int], Float32]) -> list[int]:
+    """Return the edges of the likeliest clauses, the first and the last among them.
+
+    Args:
+        begins: probability of each cut between the first and the last edge.
+        shares: probabilities of the classes of each clause, by its edges.
+    """
+    score_of = {span: ACTION_WEIGHT * math.log(float(share.max())) for span, share in shares.items()}
+
+    def score(taken: Sequence[bool]) -> tuple[float, list[int]]:
+        edges = [0, *(number + 1 for number, cut in enumerate(taken) if cut), len(begins) + 1]
+        cut = sum(math.log(max(share if now else 1 - share, 1e-4)) for share, now in zip(begins, taken, strict=True))
+        return cut + sum(score_of[span] for span in itertools.pairwise(edges)), edges
+
+    return max(map(score, itertools.product((False, True), repeat=len(begins))), key=lambda each: each[0])[1]
+
+
+def _convolved(hidden: Float32, weight: Float32, bias: Float32) -> Float32:
+    """Convolve states (T, H) with a kernel (H, H, K), zeros around them."""
+    reach = weight.shape[2] // 2
+    padded = np.pad(hidden, ((reach, reach), (0, 0)))
+    windows = np.stack([padded[shift : shift + len(hidden)] for shift in range(weight.shape[2])], axis=2)
+    return windows.reshape(len(hidden), -1) @ weight.reshape(len(weight), -1).T + bias
+
+
+@cache
+def sequence_reader() -> SequenceReader:
+    """Return the reader, loaded once."""
+    return SequenceReader.load()
+
+
+@cache
+def sequence_reader_sha256() -> str:
+    """Return the hash of the reader's file."""
+    return sha256_of(FILE)

@@ -1,0 +1,115 @@
+"""Prompts of several movements, made as timelines of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidInput
+from marey.generation.candidates import DrawPlan, best_clips
+from marey.generation.constraints.draw import constrained_request
+from marey.generation.export import finish
+from marey.generation.port import Request
+from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
+from marey.items.timeline import read_timeline, timeline_rows
+from marey.motion.edits.timeline_rows import cut_rows
+from marey.text.features import TextFeatures
+from tests.unit.generating.test_timelines import load, text_of
+
+PROMPT = "a person walks ahead and, once there, waves; then he bows"
+PARTS = ("a person walks ahead", "waves", "he bows")
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    return load("hgm3", tmp_path_factory.mktemp("models"))
+
+
+def told(generator: Any) -> TextFeatures:
+    width = generator.limits.text_width
+    return replace(text_of(PROMPT, width), movements=tuple(text_of(part, width) for part in PARTS))
+
+
+def alone(generator: Any, request: Request) -> list[int]:
+    """Frames of each row of a request."""
+    assert request.timeline is not None
+    fps = generator.limits.fps
+    return [round(row.end * fps) - round(row.start * fps) for row in request.timeline]
+
+
+def test_each_movement_is_a_row_as_long_as_it_is_alone(generator: Any) -> None:
+    request = resolve_request(generator, Request(told(generator), 3))
+    assert request.timeline is not None
+    assert [row.text.prompt for row in request.timeline] == [*PARTS]
+    assert request.timeline[0].start == 0
+    assert [row.end for row in request.timeline[:-1]] == [row.start for row in request.timeline[1:]]
+    other = resolve_request(generator, Request(told(generator), 4))
+    assert min(alone(generator, request)) >= generator.limits.min_frames
+    assert alone(generator, resolve_request(generator, Request(told(generator), 3))) == alone(generator, request)
+    (made,) = generate_any(generator, [request])
+    (again, *_) = generate_any(generator, [request, other])
+    assert made is not None
+    assert again is not None
+    assert np.array_equal(made.features, again.features)
+    assert len(made.features) == sum(alone(generator, request))
+
+
+def test_rows_share_the_length_that_is_asked_for(generator: Any) -> None:
+    request = resolve_request(generator, Request(told(generator), 3, frames=120))
+    assert sum(alone(generator, request)) == 120
+    free = alone(generator, resolve_request(generator, Request(told(generator), 3)))
+    ratios = np.array(alone(generator, request)) / np.array(free)
+    assert np.ptp(ratios) < 0.1
+
+
+def test_what_is_too_short_for_its_movements_stays_one_text(generator: Any) -> None:
+    request = resolve_request(generator, Request(told(generator), 3, frames=40))
+    assert (request.timeline, request.frames) == (None, 40)
+
+
+def test_a_length_out_of_range_is_refused_as_ever(generator: Any) -> None:
+    with pytest.raises(InvalidInput, match="out of range"):
+        resolve_request(generator, Request(told(generator), 3, frames=4000))
+
+
+def test_a_model_that_cannot_generate_around_frames_reads_one_text(
+    generator: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(generator, "limits", replace(generator.limits, keeps=0))
+    assert resolve_request(generator, Request(told(generator), 3)).timeline is None
+
+
+def test_rows_of_a_timeline_and_motions_on_a_path_are_one_text_each(generator: Any) -> None:
+    rows = timeline_rows(read_timeline(f"0-4 {PROMPT.replace(';', ',')}; 4-6 a person bows"))
+    request = timeline_request(rows, [told(generator), told(generator)], 3, None)
+    resolved = resolve_request(generator, request)
+    assert resolved.timeline is not None
+    assert len(resolved.timeline) == 2
+    path = [{"type": "root_path", "frames": [0, 60], "positions_xz": [[0.0, 0.0], [0.0, 3.0]]}]
+    assert constrained_request(generator, Request(told(generator), 3), path, None, None).timeline is None
+
+
+def test_the_manifest_tells_the_prompt_as_it_was_written_and_the_rows(generator: Any) -> None:
+    settings = generator.settings({})
+    request = resolve_request(generator, Request(told(generator), 3))
+    (made,) = generate_any(generator, [request], settings)
+    assert made is not None
+    manifest = finish(generator, request, made, settings).manifest
+    assert manifest["prompt"] == PROMPT
+    assert [row["prompt"] for row in manifest["timeline"]["rows"]] == [*PARTS]
+    assert [text for _, text in manifest["prompts"]] == [*PARTS]
+    assert manifest["rewritten"].split("; ")[1].endswith("waves")
+    first = round(manifest["timeline"]["rows"][0]["end"] * generator.layout.fps) - 1
+    assert cut_rows(manifest, 0, first, generator.layout.fps)["prompt"] == PARTS[0]
+
+
+def test_candidates_are_drawn_of_each_movement(generator: Any) -> None:
+    request = resolve_request(generator, Request(told(generator), 3))
+    (clip,) = best_clips(generator, [request], generator.settings({}), DrawPlan(None, 2, 0))
+    assert clip is not None
+    assert clip.manifest["prompt"] == PROMPT
+    assert all("selection" in row for row in clip.manifest["timeline"]["rows"])

@@ -1,0 +1,138 @@
+"""The reader of prompts that ask for several movements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from marey.bundles import TextSpec
+from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.core.errors import InvalidFile
+from marey.referee.prompts import development_prompts
+from marey.text.action_reader import OUTSIDE
+from marey.text.keys import feature_key
+from marey.text.pipeline import TextPipeline
+from marey.text.sequence_reader import (
+    CONTEXT,
+    MOST_CUTS,
+    Clause,
+    Movement,
+    SequenceReader,
+    in_order,
+    sequence_reader,
+    without_joints,
+)
+from marey.vocabulary.entries import load_vocabulary
+from tests.support.texts import shared_encoder, shared_pipeline
+
+
+@pytest.fixture(scope="module")
+def told() -> TextPipeline:
+    pipeline = shared_pipeline()
+    spec = pipeline.spec.model_copy(update={"plain_action": True, "movements": True})
+    return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+
+
+def read(prompt: str) -> tuple[Movement, ...]:
+    return sequence_reader().read(prompt, shared_encoder().encode(prompt), shared_encoder().pooled)
+
+
+def test_it_knows_every_action_and_the_shipped_encoder() -> None:
+    assert sequence_reader().classes == (*load_vocabulary().actions, OUTSIDE, CONTEXT)
+    assert sequence_reader().encoder_sha256 == shared_encoder().sha256
+
+
+@pytest.mark.parametrize(
+    ("prompt", "actions"),
+    [
+        ("The old knight walks to the altar, kneels down, and then bows.", ["walk", "kneel", "bow"]),
+        ("before sitting down she waves at the crowd", ["wave", "sit-down"]),
+        ("he claps after a deep bow", ["bow", "clap"]),
+        ("jog -> jump -> cheer", ["run", "jump", "cheer"]),
+        ("A kid dances. Then he lies down on the floor.", ["dance", "lie-down"]),
+    ],
+)
+def test_movements_come_in_the_order_of_time(prompt: str, actions: list[str]) -> None:
+    assert [movement.action for movement in read(prompt)] == actions
+
+
+def test_a_movement_keeps_its_words_but_those_that_join_it() -> None:
+    assert [movement.text for movement in read("He takes two steps back, and then he waves his left hand.")] == [
+        "He takes two steps back",
+        "he waves his left hand",
+    ]
+    assert without_joints(", and then he bows,") == "he bows"
+    assert without_joints("and after a short pause, she bows") == "she bows"
+    assert without_joints("then") == "then"
+
+
+def test_three_of_four_development_prompts_are_read_right() -> None:
+    right = [[each.action for each in read(text)] == list(actions) for text, actions in sequence_prompts()]
+    assert np.mean(right) >= 0.7
+
+
+def test_few_other_prompts_are_taken_apart(told: TextPipeline) -> None:
+    single = told.features([prompt.text for prompt in development_prompts()][::4])
+    outside = told.features(outside_prompts()[::2])
+    assert np.mean([bool(each.movements) for each in single]) <= 0.1
+    assert np.mean([bool(each.movements) for each in outside]) <= 0.15
+
+
+def clauses(*told: str) -> list[Clause]:
+    return [Clause(name, 0.9, text.strip(), at_once=text.startswith("&")) for name, _, text in map(split, told)]
+
+
+def split(told: str) -> tuple[str, str, str]:
+    return told.partition(":")
+
+
+@pytest.mark.parametrize(
+    ("told", "groups"),
+    [
+        (["walk:he walks", "bow:and bows"], [["walk"], ["bow"]]),
+        (["bow:he bows", "sit:after sitting", "wave:then waves"], [["sit"], ["bow"], ["wave"]]),
+        (["walk:before leaving", "bow:he bows", "wave:then waves"], [["bow"], ["wave"], ["walk"]]),
+        (["walk:he walks", "wave:&while waving", "bow:then bows"], [["walk", "wave"], ["bow"]]),
+        (["walk:he walks", "bow:after that he bows"], [["walk"], ["bow"]]),
+        (["walk:he walks", "bow:after a few seconds he bows"], [["walk"], ["bow"]]),
+        (["walk:he walks", "bow:once up there, he bows"], [["walk"], ["bow"]]),
+        (["walk:he walks", "bow:once he has bowed"], [["bow"], ["walk"]]),
+        ([f"{CONTEXT}:while the others eat", "walk:he walks", "bow:and bows"], [["walk"], ["bow"]]),
+        (["hop:hops", "hop:and hops again", "bow:then bows"], [["hop"], ["bow"]]),
+    ],
+)
+def test_the_order_of_time(told: list[str], groups: list[list[str]]) -> None:
+    assert [[clause.name for clause in group] for group in in_order(clauses(*told))] == groups
+
+
+def test_a_long_list_of_clauses_is_read_in_bounded_time() -> None:
+    assert len(read(", then he waves, then he bows" * 40)) <= MOST_CUTS + 1
+
+
+def test_a_bundle_says_whether_its_prompts_are_read_so(told: TextPipeline) -> None:
+    prompt = "she bows low, then strolls off"
+    (features,) = told.features([prompt])
+    assert [each.prompt for each in features.movements] == ["she bows low", "strolls off"]
+    assert features.movements[1].rewritten == "a person walks, strolls off"
+    assert features.rewritten == prompt
+    (parsed,) = told.explain([prompt])
+    assert parsed.to_json()["movements"] == [each.rewritten for each in features.movements]
+    plain = told.spec.model_copy(update={"movements": False})
+    assert feature_key(prompt, plain) != feature_key(prompt, told.spec)
+    assert "movements" not in TextSpec().model_dump()
+    with pytest.raises(ValueError, match="needs plain_action"):
+        TextSpec(movements=True)
+
+
+def test_one_action_is_one_text(told: TextPipeline) -> None:
+    prompts = ["The waiter takes a bow", "a person waves both arms high over the head, left and right"]
+    assert [each.movements for each in told.features(prompts)] == [(), ()]
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    save_file({"hidden": np.zeros((1, 1), np.float32)}, tmp_path / "other.safetensors")
+    with pytest.raises(InvalidFile, match="not a reader of sequences"):
+        SequenceReader.load(tmp_path / "other.safetensors")

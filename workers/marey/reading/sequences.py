@@ -1,0 +1,261 @@
+"""Texts that the reader of sequences learns from: prompts in parts, each with what it asks for.
+
+Those of `several.toml` were written and cut by people. More are made of verb phrases and of sentences that ask for one
+action, joined as people join them. Sentences of one action are texts of one part.
+"""
+
+from __future__ import annotations
+
+import random
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from marey.data.captions import lower_first, seeded
+from marey.data.spoken import SUBJECTS
+from marey.reading.texts import LONGEST, LabelledText, held_out, labelled_texts, words_alone
+from marey.text.action_reader import OUTSIDE, SEVERAL
+from marey.text.sequence_reader import CONTEXT
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import gerund, phrase_in_third_person
+
+MADE = 10_000
+"""Number of texts that are made."""
+WRITTEN, SINGLE = 5.0, 0.7
+"""Weights of the texts of `several.toml`, and of those of one action, beside made ones."""
+_COUNTS, _SHARES_OF_COUNTS = (2, 3, 4), (0.6, 0.33, 0.07)
+_OUTSIDE, _OF_VERBS, _SENTENCE, _ASKED = 0.05, 0.6, 0.35, 0.1
+_MOST_WORDS = 18
+"""Of a sentence that is a part."""
+_OTHERS = ("the knight", "an old man", "a dancer", "the guard", "my guy", "the robot", "a soldier", "the kid")
+_PRONOUNS = ("he", "she", "they", "", "", "")
+_REQUESTS = ("please ", "can you do ", "I need ", "make him ", "just ")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a prompt.
+
+    Attributes:
+        text: as written, with the words that join it to others.
+        asks: id of an action, `OUTSIDE` or `CONTEXT`.
+        at_once: it comes at the same time as the part before.
+    """
+
+    text: str
+    asks: str
+    at_once: bool = False
+
+
+@dataclass(frozen=True)
+class PartedText:
+    """A prompt in parts."""
+
+    parts: tuple[Part, ...]
+    weight: float
+
+    @property
+    def text(self) -> str:
+        """Return the whole."""
+        return "".join(part.text for part in self.parts)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A way to join two parts.
+
+    Attributes:
+        first: words before the first part.
+        ends: the sign behind it.
+        between: words before the second part.
+        weight: how often it is drawn.
+        forms: of both parts: `v`erb phrase, with a `s`ubject, or `g`erund.
+        at_once: both come at the same time.
+    """
+
+    first: str
+    ends: str
+    between: str
+    weight: float
+    forms: str = "vv"
+    at_once: bool = False
+
+
+_JOINTS = (
+    _Joint("", ",", " then ", 4),
+    _Joint("", "", " and then ", 4),
+    _Joint("", ".", " Then ", 2),
+    _Joint("", ",", " ", 5),
+    _Joint("", "", " and ", 8),
+    _Joint("", ",", " and ", 2),
+    _Joint("", "", " -> ", 0.7),
+    _Joint("", "", " → ", 0.7),
+    _Joint("", "", " > ", 0.3),
+    _Joint("", "", " + ", 0.5),
+    _Joint("", "", " / ", 0.3),
+    _Joint("", ";", " ", 0.7),
+    _Joint("first ", ",", " then ", 1),
+    _Joint("First ", ",", " then ", 0.5),
+    _Joint("", ";", " after that ", 0.5),
+    _Joint("", ",", " after that ", 0.5),
+    _Joint("", ",", " next ", 0.5),
+    _Joint("", ",", " finally ", 0.7),
+    _Joint("", "", " and finally ", 0.7),
+    _Joint("", ",", " and finally ", 0.5),
+    _Joint("", "", " and afterwards ", 0.4),
+    _Joint("", ",", " afterwards ", 0.3),
+    _Joint("", ",", " pauses, then ", 0.3),
+    _Joint("", "", " and, after a short pause, ", 0.2),
+    _Joint("", ",", " waits, and ", 0.2),
+    _Joint("", ",", " followed by ", 1, "vg"),
+    _Joint("", "", " followed by ", 1, "vg"),
+    _Joint("", ",", " ending with ", 0.3, "vg"),
+    _Joint("", "", " until ", 0.6, "vs"),
+    _Joint("", ".", " ", 2, "vs"),
+    _Joint("", "", " before ", 2, "sg"),
+    _Joint("", "", " before ", 0.7, "ss"),
+    _Joint("after ", ",", " ", 1.5, "gs"),
+    _Joint("after ", ",", " ", 0.7, "ss"),
+    _Joint("once ", ",", " ", 0.7, "ss"),
+    _Joint("having finished ", ",", " ", 0.3, "gs"),
+    _Joint("when done ", ",", " ", 0.2, "gs"),
+    _Joint("", "", " after ", 1.5, "sg"),
+    _Joint("", "", " after ", 0.5, "ss"),
+    _Joint("", "", " once ", 0.5, "ss"),
+    _Joint("before ", ",", " ", 1.5, "gs"),
+    _Joint("before ", ",", " ", 0.4, "ss"),
+    _Joint("", ",", " but first ", 0.5),
+    _Joint("", ";", " before that ", 0.3),
+    _Joint("", "", " while ", 1.5, "sg", at_once=True),
+    _Joint("", "", " as ", 0.7, "ss", at_once=True),
+    _Joint("", "", " and at the same time ", 0.5, "vv", at_once=True),
+    _Joint("while ", ",", " ", 1, "gs", at_once=True),
+    _Joint("while ", ",", " ", 0.4, "ss", at_once=True),
+    _Joint("as ", ",", " ", 0.3, "ss", at_once=True),
+    _Joint("", ",", " ", 0.8, "sg", at_once=True),
+    _Joint("", "", " at the same time as ", 0.3, "sg", at_once=True),
+)
+_WEIGHTS = [joint.weight for joint in _JOINTS]
+_LATER = tuple(joint for joint in _JOINTS if not joint.first)
+_LATER_WEIGHTS = [joint.weight for joint in _LATER]
+
+
+def parted_texts(seed: int) -> list[PartedText]:
+    """Return all texts but those of prompts that something is measured by; made ones by a seed."""
+    single = [each for each in labelled_texts(seed) if each.asks != SEVERAL]
+    texts = [
+        *(PartedText(parts, WRITTEN) for parts in written_parts()),
+        *_made(single, seed),
+        *(PartedText((Part(each.text, each.asks),), SINGLE * each.weight) for each in single),
+    ]
+    unseen = held_out()
+    return [each for each in texts if each.text.casefold() not in unseen]
+
+
+def written_parts() -> Iterator[tuple[Part, ...]]:
+    """Yield the texts of `several.toml` in parts."""
+    for text, asks in several_texts():
+        marks = [ask.partition("#")[0] for ask in asks.split()]
+        pieces = text.split("|")
+        yield tuple(
+            Part(piece, {"-": CONTEXT, "?": OUTSIDE}.get(mark.lstrip("&"), mark.lstrip("&")), mark.startswith("&"))
+            for piece, mark in zip(pieces, marks, strict=True)
+        )
+
+
+@cache
+def several_texts() -> tuple[tuple[str, str], ...]:
+    """Return the texts of `several.toml` with bars, and what their parts ask for, as it stands there."""
+    table = tomllib.loads(Path(__file__).with_name("several.toml").read_text("utf-8"))
+    return tuple((text, asks) for text, asks in table["several"])
+
+
+def _made(single: Sequence[LabelledText], seed: int) -> Iterator[PartedText]:
+    rng = seeded("sequences", str(seed))
+    sentences = defaultdict[str, list[str]](list)
+    for each in single:
+        if len(each.text.split()) <= _MOST_WORDS:
+            sentences[each.asks].append(each.text.rstrip("."))
+    phrases = {action.id: words_alone(action.verbs) for action in load_vocabulary().actions.values()}
+    made = 0
+    while made < MADE:
+        text = PartedText(tuple(_finished(_joined(_Speaker(rng, phrases, sentences)), rng)), 1.0)
+        if len(text.text.split()) <= LONGEST:
+            made += 1
+            yield text
+
+
+class _Speaker:
+    """One way to speak: of whom, in verb phrases or in sentences."""
+
+    def __init__(
+        self, rng: random.Random, phrases: Mapping[str, Sequence[str]], sentences: Mapping[str, Sequence[str]]
+    ) -> None:
+        self.rng = rng
+        self._phrases, self._sentences = phrases, sentences
+        self._subject = rng.choice((*SUBJECTS, *_OTHERS, "", "", ""))
+        self._bends = bool(self._subject) or rng.random() < 0.3
+        self._in_verbs = rng.random() < _OF_VERBS
+
+    def actions(self) -> list[str]:
+        """Draw what the parts ask for; none asks for the same as the one before."""
+        drawn: list[str] = []
+        (count,) = self.rng.choices(_COUNTS, _SHARES_OF_COUNTS)
+        while len(drawn) < count:
+            name = OUTSIDE if self.rng.random() < _OUTSIDE else self.rng.choice(list(self._phrases))
+            if name not in drawn[-1:]:
+                drawn.append(name)
+        return drawn
+
+    def say(self, action: str, form: str, *, first: bool) -> str:
+        """Return words for an action.
+
+        Args:
+            action: id, or `OUTSIDE`.
+            form: as in `_Joint.forms`.
+            first: the subject is not known yet.
+        """
+        rng = self.rng
+        in_sentences = action == OUTSIDE or not (self._in_verbs or rng.random() < 0.5)
+        if in_sentences and (form != "g" or action == OUTSIDE):
+            return lower_first(rng.choice(self._sentences[action]))
+        phrase = rng.choice(self._phrases[action])
+        if form == "g":
+            verb, *rest = phrase.split()
+            return " ".join([gerund(verb), *rest])
+        subject = self._subject if first else self._pronoun(form)
+        bent = (self._bends or subject) and subject != "they"
+        return f"{subject} {phrase_in_third_person(phrase) if bent else phrase}".lstrip()
+
+    def _pronoun(self, form: str) -> str:
+        if form == "v":
+            return self.rng.choice(_PRONOUNS) if self._bends else ""
+        return self.rng.choice(("he", "she")) if self._subject or self.rng.random() < 0.7 else ""
+
+
+def _joined(speaker: _Speaker) -> list[Part]:
+    actions = speaker.actions()
+    (joint,) = speaker.rng.choices(_JOINTS, _WEIGHTS)
+    parts = [Part(joint.first + speaker.say(actions[0], joint.forms[0], first=joint.forms[0] != "g"), actions[0])]
+    for number, action in enumerate(actions[1:]):
+        if number:
+            (joint,) = speaker.rng.choices(_LATER, _LATER_WEIGHTS)
+        said = speaker.say(action, joint.forms[1], first=number == 0 and joint.forms[0] == "g")
+        said = f"{said[:1].upper()}{said[1:]}" if joint.ends == "." and joint.between == " " else said
+        parts[-1] = Part(parts[-1].text + joint.ends, parts[-1].asks, parts[-1].at_once)
+        parts.append(Part(joint.between + said, action, joint.at_once))
+    return parts
+
+
+def _finished(parts: list[Part], rng: random.Random) -> list[Part]:
+    """Write parts as a sentence, as a request, or as they are."""
+    first, last = parts[0], parts[-1]
+    if rng.random() < _SENTENCE:
+        parts[-1] = Part(f"{last.text}.", last.asks, last.at_once)
+        parts[0] = Part(f"{first.text[:1].upper()}{first.text[1:]}", first.asks)
+    elif rng.random() < _ASKED:
+        parts[0] = Part(rng.choice(_REQUESTS) + first.text, first.asks)
+    return parts

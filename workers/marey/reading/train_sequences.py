@@ -1,0 +1,276 @@
+"""Train the reader of sequences: `python -m marey.reading.train_sequences`, some ten minutes of one core.
+
+It writes `sequence_reader.safetensors`, and prints how many of the development prompts are read right.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from numpy.typing import NDArray
+from safetensors.numpy import save
+from torch import Tensor, nn
+
+from marey.checks.reader_prompts import outside_prompts, sequence_prompts
+from marey.data.captions import seeded
+from marey.motion.files import write_atomically
+from marey.reading.sequences import PartedText, parted_texts
+from marey.reading.train import layer_at
+from marey.referee.prompts import development_prompts
+from marey.text.action_reader import OUTSIDE
+from marey.text.encoders import Encoding, find_encoder
+from marey.text.minilm_encoder import MiniLMEncoder
+from marey.text.parsed import without_punctuation
+from marey.text.sequence_reader import (
+    CONTEXT,
+    FILE,
+    KERNEL,
+    STATE_SCALE,
+    SequenceReader,
+    clause_inputs,
+    without_joints,
+)
+from marey.vocabulary.entries import load_vocabulary
+
+CUT_UNITS, CUT_EPOCHS, CUT_BATCH, CUT_DROPOUT = 160, 8, 128, 0.35
+ACTION_UNITS, ACTION_MEMBERS, ACTION_EPOCHS, ACTION_BATCH, ACTION_DROPOUT = 256, 2, 25, 1024, 0.4
+"""Sizes and training of both networks; those of actions stand side by side, and their scores are averaged."""
+RATE, DECAY, SMOOTHING, WARMUP = 2e-3, 0.02, 0.05, 100
+WITHOUT_CONTEXT = 0.3
+"""Share of clauses that are read without the states around them."""
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _Labelled:
+    """Token states of a text with labels of each token.
+
+    Attributes:
+        states: (T, W).
+        asks: (T,) classes; -1 = no word.
+        begins: (T,) 1 where a part begins.
+        at_once: (T,) 1 where a part begins that comes at the same time as the one before, 0 where another does; -1
+            elsewhere.
+    """
+
+    states: Float32
+    asks: NDArray[np.int64]
+    begins: Float32
+    at_once: NDArray[np.int64]
+    weight: float
+
+
+class _Cuts(nn.Module):
+    """The network of beginnings; while it is trained, it also says what each token asks for."""
+
+    def __init__(self, width: int, classes: int) -> None:
+        super().__init__()
+        units = CUT_UNITS
+        self.states = nn.Linear(width, units)
+        self.first = nn.Conv1d(units, units, KERNEL, padding=KERNEL // 2)
+        self.second = nn.Conv1d(units, units, KERNEL, padding=KERNEL // 2)
+        self.begins = nn.Linear(units, 2)
+        self.asks = nn.Linear(units, classes)
+        self._some, self._most = nn.Dropout(CUT_DROPOUT / 2), nn.Dropout(CUT_DROPOUT)
+
+    def forward(self, states: Tensor, real: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, T, W) states and (B, T) marks of tokens to (B, T, 2) beginnings and (B, T, C) classes."""
+        shown = real[..., None]
+        hidden = F.relu(self.states(self._some(states * STATE_SCALE))) * shown
+        for layer in (self.first, self.second):
+            hidden = hidden + F.relu(layer(self._most(hidden).transpose(1, 2)).transpose(1, 2)) * shown
+        hidden = self._most(hidden)
+        return self.begins(hidden), self.asks(hidden)
+
+
+def labelled(text: PartedText, encoding: Encoding, classes: Sequence[str]) -> _Labelled:
+    """Return the labels of the tokens of a text."""
+    count = len(encoding.offsets)
+    asks, at_once = np.full(count, -1, np.int64), np.full(count, -1, np.int64)
+    begins = np.zeros(count, np.float32)
+    ends = np.cumsum([len(part.text) for part in text.parts])
+    begun = set[int]()
+    for place, (start, end) in enumerate(encoding.offsets):
+        if end <= start:
+            continue
+        number = int(np.searchsorted(ends, start, side="right"))
+        asks[place] = classes.index(text.parts[number].asks)
+        if number not in begun:
+            begun.add(number)
+            begins[place] = 1
+            at_once[place] = int(text.parts[number].at_once) if number else -1
+    return _Labelled(encoding.tokens, asks, begins, at_once, text.weight)
+
+
+def fit_cuts(texts: Sequence[_Labelled], classes: int, seed: int) -> _Cuts:
+    """Train the network of beginnings."""
+    torch.manual_seed(seed)
+    network = _Cuts(texts[0].states.shape[1], classes)
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+    rng = seeded("cuts", str(seed))
+    total, step = CUT_EPOCHS * -(-len(texts) // CUT_BATCH), 0
+    for _ in range(CUT_EPOCHS):
+        for batch in _batches(texts, rng):
+            for group in optimizer.param_groups:
+                group["lr"] = RATE * min(1, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
+            loss = _cut_loss(network, batch)
+            optimizer.zero_grad()
+            loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimizer.step()
+            step += 1
+    return network.eval()
+
+
+def _batches(texts: Sequence[_Labelled], rng: random.Random) -> Iterator[list[_Labelled]]:
+    """Yield all texts in random batches of nearly one length."""
+    order = rng.sample(range(len(texts)), len(texts))
+    reach = 20 * CUT_BATCH
+    batches: list[list[int]] = []
+    for low in range(0, len(order), reach):
+        near = sorted(order[low : low + reach], key=lambda row: len(texts[row].states))
+        batches += [near[start : start + CUT_BATCH] for start in range(0, len(near), CUT_BATCH)]
+    rng.shuffle(batches)
+    yield from ([texts[row] for row in batch] for batch in batches)
+
+
+def _cut_loss(network: _Cuts, batch: Sequence[_Labelled]) -> Tensor:
+    def padded(rows: Sequence[NDArray[np.generic]], value: float) -> Tensor:
+        return nn.utils.rnn.pad_sequence([torch.from_numpy(row) for row in rows], True, value)
+
+    asks = padded([each.asks for each in batch], -1)
+    at_once = padded([each.at_once for each in batch], -1)
+    real = padded([np.ones(len(each.states), np.float32) for each in batch], 0)
+    begins, named = network(padded([each.states.astype(np.float32) for each in batch], 0), real)
+    words = (asks >= 0).float()
+    of_begins = F.binary_cross_entropy_with_logits(
+        begins[..., 0], padded([each.begins for each in batch], 0), reduction="none"
+    )
+    of_asks = F.cross_entropy(named.transpose(1, 2), asks, ignore_index=-1, reduction="none", label_smoothing=SMOOTHING)
+    of_order = F.binary_cross_entropy_with_logits(begins[..., 1], at_once.clamp(min=0).float(), reduction="none")
+    means = ((2 * of_begins + of_asks) * words).sum(1) / words.sum(1).clamp(min=1)
+    weights = torch.tensor([each.weight for each in batch])
+    return ((means + 0.3 * (of_order * (at_once >= 0)).sum(1)) * weights).sum() / weights.sum()
+
+
+def clauses_of(
+    texts: Sequence[PartedText], encodings: Sequence[Encoding], encoder: MiniLMEncoder, classes: Sequence[str]
+) -> tuple[Float32, list[int], Float32]:
+    """Return the inputs (N, I) of clauses, their classes and weights: those of each part, and of two parts together,
+    which ask for several."""
+    several = len(classes)
+    found: list[tuple[str, Encoding, tuple[int, int], int, float]] = []
+    for number, (text, encoding) in enumerate(zip(texts, encodings, strict=True)):
+        edges = np.cumsum([0, *(len(part.text) for part in text.parts)]).tolist()
+        for place, part in enumerate(text.parts):
+            wanted = classes.index(part.asks)
+            found.append((part.text, encoding, (edges[place], edges[place + 1]), wanted, text.weight))
+        if len(text.parts) > 1:
+            place = number % (len(text.parts) - 1)
+            one, other = text.parts[place : place + 2]
+            if one.asks != other.asks and CONTEXT not in (one.asks, other.asks):
+                span = edges[place], edges[place + 2]
+                found.append((one.text + other.text, encoding, span, several, text.weight))
+    bare = [without_joints(text) for text, *_ in found]
+    vectors = encoder.pooled([without_punctuation(text) for text in bare])
+    rows = [
+        clause_inputs(text, vector, encoding, span, classes)
+        for text, vector, (_, encoding, span, _, _) in zip(bare, vectors, found, strict=True)
+    ]
+    return np.stack(rows), [wanted for *_, wanted, _ in found], np.array([weight for *_, weight in found], np.float32)
+
+
+def fit_actions(inputs: Float32, wanted: Sequence[int], weights: Float32, width: int, seed: int) -> nn.Sequential:
+    """Train a network of actions on inputs (N, I), whose last `width` are the states around a clause."""
+    torch.manual_seed(seed)
+    rows, classes, shares = torch.from_numpy(inputs), torch.tensor(wanted), torch.from_numpy(weights / weights.mean())
+    network = nn.Sequential(
+        nn.Dropout(ACTION_DROPOUT / 2),
+        nn.Linear(rows.shape[1], ACTION_UNITS),
+        nn.ReLU(),
+        nn.Dropout(ACTION_DROPOUT),
+        nn.Linear(ACTION_UNITS, int(classes.max()) + 1),
+    )
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+    for epoch in range(ACTION_EPOCHS):
+        for group in optimizer.param_groups:
+            group["lr"] = RATE * (1 - epoch / ACTION_EPOCHS)
+        for part in torch.randperm(len(rows)).split(ACTION_BATCH):
+            shown = rows[part].clone()
+            shown[torch.rand(len(part)) < WITHOUT_CONTEXT, -width:] = 0
+            losses = F.cross_entropy(network(shown), classes[part], reduction="none", label_smoothing=SMOOTHING)
+            loss = (losses * shares[part]).mean()
+            optimizer.zero_grad()
+            loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            optimizer.step()
+    return network.eval()
+
+
+def _weights_of(cuts: _Cuts, actions: Sequence[nn.Sequential]) -> dict[str, Float32]:
+    found: dict[str, Tensor | None] = {}
+    layers = {"states": cuts.states, "first": cuts.first, "second": cuts.second, "begins": cuts.begins}
+    for name, layer in layers.items():
+        found |= {name: layer.weight, f"{name}_bias": layer.bias}
+    first, last = ([layer_at(network, place) for network in actions] for place in (1, 4))
+    found |= {
+        "hidden": torch.cat([layer.weight for layer in first]),
+        "hidden_bias": torch.cat([layer.bias for layer in first]),
+        "out": torch.cat([layer.weight for layer in last], dim=1) / len(actions),
+        "out_bias": torch.stack([layer.bias for layer in last]).mean(dim=0),
+    }
+    return {name: part.detach().numpy().astype(np.float32) for name, part in found.items() if part is not None}
+
+
+def train(texts: Sequence[PartedText], encoder: MiniLMEncoder, seed: int) -> tuple[list[str], dict[str, Float32]]:
+    """Return the classes and the weights of a reader."""
+    classes = [*load_vocabulary().actions, OUTSIDE, CONTEXT]
+    encodings = [encoder.encode(text.text) for text in texts]
+    pairs = zip(texts, encodings, strict=True)
+    cuts = fit_cuts([labelled(text, encoding, classes) for text, encoding in pairs], len(classes), seed)
+    inputs, wanted, weights = clauses_of(texts, encodings, encoder, classes)
+    actions = [fit_actions(inputs, wanted, weights, encoder.width, seed + member) for member in range(ACTION_MEMBERS)]
+    return classes, _weights_of(cuts, actions)
+
+
+def main() -> None:
+    """Train and write a reader."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=FILE)
+    parser.add_argument("--seed", type=int, default=0)
+    chosen = parser.parse_args()
+    torch.set_num_threads(1)
+    encoder = MiniLMEncoder(find_encoder("minilm"))
+    classes, weights = train(parted_texts(chosen.seed), encoder, chosen.seed)
+    facts = {"classes": json.dumps(classes), "encoder_sha256": encoder.sha256}
+    write_atomically(chosen.output, save({name: part.astype(np.float16) for name, part in weights.items()}, facts))
+    sys.stdout.write(_rates(SequenceReader.load(chosen.output), encoder))
+
+
+def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
+    """Return how many held-out sequences are read right, and how many other prompts are taken for some."""
+    lines: list[str] = []
+    read = {text: reader.read(text, encoder.encode(text), encoder.pooled) for text, _ in sequence_prompts()}
+    right = sum([each.action for each in read[text]] == list(actions) for text, actions in sequence_prompts())
+    lines.append(f"sequences: {right} of {len(read)} right\n")
+    others = {
+        "one action": [prompt.text for prompt in development_prompts()],
+        "outside": list(outside_prompts()),
+    }
+    for kind, prompts in others.items():
+        taken = sum(bool(reader.read(text, encoder.encode(text), encoder.pooled)) for text in prompts)
+        lines.append(f"{kind}: {taken} of {len(prompts)} read as a sequence\n")
+    return "".join(lines)
+
+
+if __name__ == "__main__":
+    main()
