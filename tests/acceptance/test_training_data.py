@@ -9,7 +9,7 @@ import pytest
 
 from marey.data.dataset import known_set
 from marey.data.pack import JointsPack, PackClip
-from tests.support.bodies import walker
+from tests.support.bodies import bower
 from tests.support.marey import Marey
 
 
@@ -20,13 +20,13 @@ def alone(tmp_path: Path) -> Marey:
 
 
 def test_a_pack_is_prepared_and_inspected_where_the_archive_is_not(alone: Marey, tmp_path: Path) -> None:
-    clip = PackClip("stroll", "cmu", "walk", "", "train", 0, 0)
-    JointsPack.of([(clip, walker(4.0).astype(np.float32))], [known_set("cmu").terms]).save(tmp_path / "a.pack.npz")
+    clip = PackClip("curtsy", "cmu", "bow", "", "train", 0, 0)  # no gesture is made on a bow, and dozens on a walk
+    JointsPack.of([(clip, bower(3.0).astype(np.float32))], [known_set("cmu").terms]).save(tmp_path / "a.pack.npz")
     alone("data", "prepare", "pack", tmp_path / "a.pack.npz", "-o", tmp_path / "prepared").ok()
-    assert "stroll" in alone("data", "inspect", tmp_path / "prepared", "--clip", "stroll").ok().out
+    assert "curtsy" in alone("data", "inspect", tmp_path / "prepared", "--clip", "curtsy").ok().out
     alone("data", "inspect", tmp_path / "prepared", "--write").refused(2, "--write", "this folder is prepared")
     (tmp_path / "take.bvh").touch()
-    alone("data", "inspect", tmp_path, "--clip", "stroll").refused(2, "--clip", "this folder is not prepared")
+    alone("data", "inspect", tmp_path, "--clip", "curtsy").refused(2, "--clip", "this folder is not prepared")
 
 
 def test_unknown_sources_missing_archives_and_foreign_packs_are_told(alone: Marey, tmp_path: Path) -> None:

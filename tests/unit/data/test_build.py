@@ -311,6 +311,7 @@ def test_a_folder_with_something_in_it_is_not_written_to(copy):
     assert sorted(p.name for p in copy.iterdir()) == before
 
 
+@pytest.mark.usefixtures("few_gestures")
 def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
     clip = PackClip("stroll", "cmu", "walk", "", "train", 0, 0)
     terms = [known_set("cmu").terms]
@@ -318,12 +319,20 @@ def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
     assert {c.dataset for c in PreparedData.open(tmp_path / "out").clips} == {"cmu"}
 
 
+@pytest.mark.usefixtures("few_gestures")
+def test_gestures_are_made_on_the_clips_of_the_training_split(tmp_path):
+    idle = Body(4.0, speed=steady(0.0)).joints().astype(np.float32)
+    clips = [(PackClip(split, "cmu", "idle", "", split, 0, 0, source=split), idle) for split in ("train", "test")]
+    build([JointsPack.of(clips, [known_set("cmu").terms])], tmp_path / "out")
+    made = {clip.id: clip.split for clip in PreparedData.open(tmp_path / "out").clips if not clip.spliced}
+    of_captured = {f"{m}{split}": split for m in ("", "M") for split in ("train", "test")}
+    assert made == {**of_captured, "G-wave-00000": "train", "G-wave-00001": "train"}
+
+
 @pytest.mark.parametrize(("idles_of", "lengthened"), [("g1_moves", True), ("hdm05", False)])
-def test_a_short_action_without_an_idle_in_its_set_stands_between_those_of_its_tier(
-    tmp_path, monkeypatch, idles_of, lengthened
-):
+@pytest.mark.usefixtures("few_gestures")
+def test_a_short_action_without_an_idle_in_its_set_stands_between_those_of_its_tier(tmp_path, idles_of, lengthened):
     """`cmu` and `g1_moves` allow commercial use, `hdm05` wants weights to be shared alike."""
-    monkeypatch.setattr("marey.data.build.made_gestures", lambda clips: ())  # hundreds on the idle; not looked at here
     terms = [known_set(name).terms for name in ("cmu", idles_of)]
     action = PackClip("hand", "cmu", "raise-arm", "", "train", 0, 0, source="hand")
     idle = PackClip("idle", idles_of, "idle", "", "train", 0, 0, source="idle")

@@ -35,6 +35,7 @@ def folder(tmp_path: Path) -> Path:
     return out
 
 
+@pytest.mark.usefixtures("few_gestures")
 def test_captions_of_all_authors_join_those_of_the_index_and_the_manifest_names_them(folder: Path) -> None:
     pack = pack_set(CaptureSet.own(folder), processes=1)
     assert pack.clips[0].captions == (
@@ -83,6 +84,7 @@ def test_every_clip_of_a_known_set_that_is_used_is_captioned(name: str) -> None:
     assert {row.id for row in rows if row.action != UNUSED} - captioned == set()
 
 
+@pytest.mark.usefixtures("few_gestures")
 def test_training_clips_come_slower_and_faster_too_and_are_said_so_truly(folder: Path) -> None:
     (folder / INDEX).write_text(
         "file,start,end,action,captions,split\n"
