@@ -59,7 +59,7 @@ def few(count: int) -> dict[str, gestures.Kind]:
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gestures, "KINDS", few(24))
+        patch.setattr(gestures, "KINDS", few(12))
         return list(made_gestures([idle(), idle(2.0), idle(content="walk"), idle(content="walk", speed=1.2)]))
 
 
@@ -79,7 +79,7 @@ def tilt(part: Part) -> np.ndarray:
 
 
 def test_as_many_as_asked_for_are_made_of_every_action(made: list[Part]) -> None:
-    assert Counter(part.content for part in made) == dict.fromkeys(KINDS.keys() - ABSENT, 24)
+    assert Counter(part.content for part in made) == dict.fromkeys(KINDS.keys() - ABSENT, 12)
     assert all(part.made and part.source.split == "train" for part in made)
     assert len({part.id for part in made}) == len(made)
 
