@@ -24,6 +24,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import typer
+
 IMPORTED = (
     *("torch", "numpy", "scipy", "safetensors.torch", "tokenizers", "httpx2", "sqlalchemy", "alembic", "fastapi"),
     *("marey.cli.main", "marey.client.transport", "marey.client.fetching", "marey.core.settings", "rich.progress"),
@@ -197,6 +199,8 @@ if __name__ == "__main__":
     atexit.register(_leave)  # before any other, to run after them
     for module in IMPORTED:
         importlib.import_module(module)
+    typer.main.get_command = functools.cache(typer.main.get_command)  # which `app()` calls: a tenth of a second
+    typer.main.get_command(importlib.import_module("marey.cli.main").app)
     gc.freeze()
     with socket.socket(fileno=int(sys.argv[1])) as link:
         forked = _command(link)
