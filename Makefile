@@ -13,6 +13,9 @@ PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
+# Tests start hundreds of processes, and rewrite a thousand modules for their assertions: what is compiled is kept.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all clients pytest mutants chaos soak lint docs check-deploy format bench lock wheels clean
 

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import itertools
 import os
 import shutil
@@ -69,6 +70,18 @@ def pytest_configure(config: pytest.Config) -> None:
                 f"the installed package has no entry point {min(missing)!r} of {group!r}: run `make setup`, or "
                 "`.venv/bin/pip install --no-deps --no-build-isolation -e .`"
             )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collect no garbage while tests are collected, nor look at all that they are in each collection to come."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 SERVED = ("tests/acceptance/extended/", "tests/acceptance/served/")
