@@ -29,7 +29,7 @@ from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import add_streamer
 from tests.support.named_fields import names_the_field
 
-EXAMPLES = 12
+EXAMPLES = 6
 """Of each operation, beside those that cover its document value by value, wrong ones too; `slow` runs many more."""
 CHECKS = [not_a_server_error, response_schema_conformance, names_the_field]
 PROMPT = "a secretive person waltzes"
