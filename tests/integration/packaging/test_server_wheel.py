@@ -1,5 +1,8 @@
 """Server, worker and training tools from the wheel, with bundles from wheels, in an environment that borrows the
-development packages: commands run outside the checkout, which is closed to them."""
+development packages: commands run outside the checkout, which is closed to them.
+
+`make test` starts no server from it: that the wheel holds every file is checked in `test_client_wheel.py`.
+"""
 
 from __future__ import annotations
 
@@ -79,6 +82,7 @@ def test_a_motion_is_generated_converted_and_drawn(marey: Release) -> None:
     assert "<script" in (made / "walk.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_server_makes_motions_and_pages_to_review_them(served: Release) -> None:
     line = json.loads(served.run("submit", "a person waves", "--seconds", "1", "--fetch", "fetched", "--json"))
     assert line["state"] == "succeeded"
@@ -91,6 +95,7 @@ def test_a_server_makes_motions_and_pages_to_review_them(served: Release) -> Non
     }
 
 
+@pytest.mark.slow
 def test_pages_and_files_of_the_api_are_in_the_wheel(served: Release, home: Path) -> None:
     import httpx2
 

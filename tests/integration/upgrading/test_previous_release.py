@@ -1,6 +1,7 @@
 """The previous release and this one on the same rows, as server, worker and client of each other.
 
-Each is a wheel in an environment of its own, to which this checkout is closed.
+Each is a wheel in an environment of its own, to which this checkout is closed. `make test` holds the same by parts:
+statements (`test_statements.py`), columns (`test_expanding.py`) and routes (`tests/contracts`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from tests.support.marey import TINY
 from tests.support.releases import Release, earlier_release, installed_release, wait_until
 from tests.support.wheels import make_environment, this_wheel
 
+pytestmark = pytest.mark.slow
 PREVIOUS = "26b0fe97"
 """The last commit in which the code was three packages."""
 FORMAT_1 = "03315bd6"
@@ -61,7 +63,7 @@ def fetched_by(client: Release, job_id: str, folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*.bvh"))
 
 
-@pytest.mark.parametrize("commit", [PREVIOUS, pytest.param(FORMAT_1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("commit", [PREVIOUS, FORMAT_1])
 def test_each_release_finishes_what_the_other_has_queued(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, models: Path, values: Mapping[str, str], commit: str
 ) -> None:
@@ -95,7 +97,6 @@ def test_each_release_finishes_what_the_other_has_queued(
         assert len(ours) == COUNT
 
 
-@pytest.mark.slow
 def test_a_bundle_of_format_2_is_refused_by_a_release_that_reads_format_1_and_named(
     tmp_path: Path, models: Path, values: Mapping[str, str]
 ) -> None:
