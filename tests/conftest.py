@@ -107,10 +107,17 @@ COPY = f"TEMPLATE {TEMPLATE} STRATEGY FILE_COPY"
 _numbers = itertools.count()
 
 
+MEMORY = Path("/dev/shm")
+"""Files in memory, on Linux: a third of the work of making and dropping a database for each test."""
+ROOM = 4 << 30
+"""Bytes that must be free there."""
+
+
 @pytest.fixture(scope="session")
 def servers_home() -> Iterator[Path]:
-    """Folder of the run's servers."""
-    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    """Folder of the run's servers, in memory where there is room for them."""
+    in_memory = MEMORY.is_dir() and shutil.disk_usage(MEMORY).free >= ROOM
+    home = Path(tempfile.mkdtemp(prefix="marey-", dir=MEMORY if in_memory else None))
     yield home
     shutil.rmtree(home, ignore_errors=True)
 
