@@ -22,6 +22,7 @@ from pathlib import Path
 import psycopg
 import pytest
 import sqlalchemy as sa
+import typer.main
 import typer.testing
 from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
@@ -46,7 +47,7 @@ settings.load_profile("shared machine")
 """No test depends on the time that it takes: other work may be on the machine."""
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 """Tests run in several processes, which share the cores already; those of more threads set their number."""
-typer.testing._get_command = functools.cache(typer.testing._get_command)  # pyright: ignore[reportPrivateUsage]
+typer.testing._get_command = functools.cache(typer.main.get_command)  # pyright: ignore[reportPrivateImportUsage]
 """`CliRunner` builds all commands anew for each that it invokes: a tenth of a second."""
 
 
