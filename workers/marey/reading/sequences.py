@@ -145,7 +145,8 @@ _LATER_WEIGHTS = [joint.weight for joint in _LATER]
 
 def parted_texts(seed: int) -> list[PartedText]:
     """Return all texts but those of prompts that something is measured by; made ones by a seed."""
-    single = [each for each in labelled_texts(seed) if each.asks != SEVERAL]
+    written = {text.replace("|", "") for text, _ in several_texts()}
+    single = [each for each in labelled_texts(seed) if each.asks != SEVERAL and each.text not in written]
     texts = [
         *(PartedText(parts, WRITTEN) for parts in written_parts()),
         *_made(single, seed),

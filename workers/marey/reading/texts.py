@@ -1,8 +1,8 @@
 """Texts that the reader of actions learns from: sentences that ask for one action, for several, and for none.
 
 One action: the sentences of `sayings.toml`, the vocabulary's own words, and the captions of known sets whose terms
-allow commercial use. Several: two and three of these, joined, and `several.toml`. None: `outside.toml`. The authors of
-the two files saw the definitions and no prompts.
+allow commercial use. Several: two and three of these, joined, and `several.toml`, which also has texts of one action that
+sound like several. None: `outside.toml`. The authors of the two files saw the definitions and no prompts.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def labelled_texts(seed: int) -> list[LabelledText]:
     texts = [
         *single,
         *several,
-        *(LabelledText(text.replace("|", ""), SEVERAL, WRITTEN) for text, _ in _written("several")),
+        *(_whole(text, asks) for text, asks in _written("several")),
         *(LabelledText(text, OUTSIDE, WRITTEN) for text in _written("outside")),
     ]
     unseen = held_out()
@@ -86,6 +86,11 @@ def held_out() -> set[str]:
 
 def _written(kind: str) -> list[Any]:
     return tomllib.loads(Path(__file__).with_name(f"{kind}.toml").read_text("utf-8"))[kind]
+
+
+def _whole(text: str, asks: str) -> LabelledText:
+    """Return a text of `several.toml`, whose parts are divided by bars."""
+    return LabelledText(text.replace("|", ""), SEVERAL if "|" in text else asks, WRITTEN)
 
 
 def _of_people() -> Iterator[LabelledText]:
