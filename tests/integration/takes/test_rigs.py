@@ -87,6 +87,8 @@ def there(api: LiveApi, data: bytes) -> bool:
         (BVH, {"name": "a.glb"}, 422, "name", ""),
         (BVH, {"map": "[1"}, 422, "map", ""),
         (BVH, {"map": "[1]"}, 422, "map", "parts and joint names"),
+        (BVH, {"map": "[]"}, 422, "map", "parts and joint names"),
+        (BVH, {"map": '{"hips": null}'}, 422, "map", "no rig is without hips"),
         (BVH, {"map": '{"left_hand": "nobody"}'}, 422, "map", "has no joint 'nobody'"),
         (BVH, {"map": '{"left_foot": null}'}, 422, "body", "no joint found for left foot"),
         (BVH, {"mpa": "{}"}, 422, "mpa", "unknown parameter"),

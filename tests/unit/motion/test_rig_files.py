@@ -163,6 +163,20 @@ def test_a_map_overrides_what_is_found():
             map_joints(rig, wrong)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"hips": None}, "map: no rig is without hips"),
+        ({"hips": "mixamorig:Spine"}, "the legs do not hang on the hips 'mixamorig:Spine'"),
+        ({"head": "mixamorig:LeftToeBase"}, "head: 'mixamorig:LeftToeBase' hangs on a leg"),
+        ({"right_upper_arm": "mixamorig:RightToeBase"}, "right_upper_arm: 'mixamorig:RightToeBase' hangs on a leg"),
+    ],
+)
+def test_a_map_that_leaves_no_body_is_refused(given, message):
+    with pytest.raises(InvalidInput, match=message):
+        map_joints(reference_rig("mixamo"), given)
+
+
 @pytest.mark.parametrize("skeleton", [HUMANML3D, SNAPMOGEN], ids=lambda each: each.name)
 @pytest.mark.parametrize("names", ["mixamo", "ue5", "humanik", "smplx", "vrm"])
 def test_renamed_joints_are_found_again(skeleton, names):

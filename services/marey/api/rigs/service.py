@@ -40,7 +40,8 @@ async def add(shared: Context, key: ApiKey, name: str, format: str, rig_map: str
 
 def _map_of(text: str | None) -> Any:
     """Return the JSON value of a map; None for an empty one. The process that reads the rig checks what it says."""
-    return None if text is None else parse_json(text, "map") or None
+    given = None if text is None else parse_json(text, "map")
+    return None if given == {} else given
 
 
 def _read(file: BinaryIO, limit: int) -> bytes:

@@ -67,9 +67,11 @@ def map_joints(rig: Rig, given: Mapping[str, str | None] | None = None, *, where
         where: names the map in errors.
 
     Raises:
-        InvalidInput: a map names unknown parts or joints, or the rig has no legs.
+        InvalidInput: a map names unknown parts or joints, no hips or such that the legs do not hang on, or an arm or a
+            head on a leg; or the rig has no legs.
     """
-    fixed = _given(rig, given or {}, where or "map")
+    where = where or "map"
+    fixed = _given(rig, given or {}, where)
     finder = Finder(rig)
     parts, how, family = finder.parts()
     if any(part not in parts for part in NEEDED):
@@ -81,7 +83,8 @@ def map_joints(rig: Rig, given: Mapping[str, str | None] | None = None, *, where
         if joint is not None:
             parts[part], how[part] = joint, "map"
     _need(parts, rig, {part for part, joint in fixed.items() if joint is None})
-    _add_trunk(rig, parts, how, fixed)
+    _off_the_legs(parts, rig, fixed, where)
+    _add_trunk(rig, parts, how, fixed, where)
     for part in [part for part in parts if fixed.get(part, 0) is None]:
         del parts[part]
     ordered = {part: parts[part] for part in PARTS if part in parts}
@@ -106,6 +109,10 @@ def _given(rig: Rig, given: Mapping[str, str | None], where: str) -> dict[str, i
         if name is not None and name not in rig.joint_names:
             raise InvalidInput(
                 f"{part}: the rig has no joint {name!r}", where=where, hint="`marey rigs show FILE` lists its joints."
+            )
+        if part == "hips" and name is None:
+            raise InvalidInput(
+                "no rig is without hips", where=where, hint="Name their joint, or leave them out of the map."
             )
         fixed[part] = None if name is None else rig.index(name)
     used = [joint for joint in fixed.values() if joint is not None]
@@ -134,7 +141,19 @@ def _need(parts: Mapping[str, int], rig: Rig, absent: set[str]) -> None:
             )
 
 
-def _add_trunk(rig: Rig, parts: dict[str, int], how: dict[str, str], fixed: Mapping[str, int | None]) -> None:
+def _off_the_legs(parts: dict[str, int], rig: Rig, fixed: Mapping[str, int | None], where: str) -> None:
+    """Leave out arms and a head that were found on a leg; refuse those that a map names there."""
+    legs = [parts[f"{side}_upper_leg"] for side in SIDES]
+    for part in ("left_upper_arm", "right_upper_arm", "head"):
+        if part in parts and any(hangs_on(rig.parents, parts[part], leg) for leg in legs):
+            if fixed.get(part) is not None:
+                raise InvalidInput(f"{part}: {rig.joint_names[parts[part]]!r} hangs on a leg", where=where)
+            del parts[part]
+
+
+def _add_trunk(
+    rig: Rig, parts: dict[str, int], how: dict[str, str], fixed: Mapping[str, int | None], where: str
+) -> None:
     """Add hips, spine, neck and shoulders, which follow from the tree."""
     arms = [parts[f"{side}_upper_arm"] for side in SIDES if f"{side}_upper_arm" in parts]
     legs = [parts[f"{side}_upper_leg"] for side in SIDES]
@@ -144,6 +163,12 @@ def _add_trunk(rig: Rig, parts: dict[str, int], how: dict[str, str], fixed: Mapp
         raise InvalidInput("the legs do not hang on one joint", where=rig.name)
     if fixed.get("hips") is None and hips != parts.get("hips"):
         parts["hips"], how["hips"] = hips, "tree"
+    if not all(hangs_on(rig.parents, leg, parts["hips"]) for leg in legs):
+        raise InvalidInput(
+            f"the legs do not hang on the hips {rig.joint_names[parts['hips']]!r}",
+            where=where,
+            hint=f"Leave the hips out of the map: {rig.joint_names[hips]!r} is found.",
+        )
     chest = common(rig.parents, arms if len(arms) == 2 else upper)
     for number, joint in enumerate(_up_to(rig, parts["hips"], chest)[:MAX_SPINE], start=1):
         _add(parts, how, f"spine{number}", joint)
