@@ -227,7 +227,11 @@ def confirm(question: str, *, yes: bool) -> None:
 def home_relative(path: str | os.PathLike[str]) -> str:
     """Return a path relative to the working directory if it is below it, else as it is."""
     text = os.fspath(path)
-    return os.path.relpath(text) if not os.path.relpath(text).startswith("..") else text
+    try:
+        relative = os.path.relpath(text)
+    except OSError:  # the working directory was removed
+        return text
+    return text if relative.startswith("..") else relative
 
 
 def length_of_time(seconds: float) -> str:

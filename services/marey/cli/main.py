@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
@@ -32,12 +34,19 @@ from marey.cli.commands import (
 )
 from marey.cli.operations import OperationsCommand
 from marey.core import tracing
-from marey.core.errors import MareyError
+from marey.core.errors import InvalidInput, MareyError
 from marey.core.validation import problem_of
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 CHOSEN = "marey.command"
 """Key of the context: the command that was chosen."""
+OF_THE_DISK = frozenset(
+    {
+        errno.EACCES, errno.EDQUOT, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOSPC,
+        errno.ENOTDIR, errno.EPERM, errno.EROFS,
+    }
+)  # fmt: skip
+"""What a file system refuses without a bug of ours; a file that is missing may be one."""
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
 
@@ -66,7 +75,8 @@ def _said(error: ValueError) -> str:
 
 
 class Commands(TyperGroup):
-    """Expected errors are printed verbatim and set the exit code; anything else is a bug and shows its traceback."""
+    """Expected errors are printed verbatim and set the exit code, as are paths that the file system refuses; anything
+    else is a bug and shows its traceback."""
 
     def main(self, *args: Any, **options: Any) -> Any:
         """Parse the arguments and run; usage errors quote them."""
@@ -101,6 +111,11 @@ class Commands(TyperGroup):
         except BrokenPipeError:
             sys.stderr.close()  # the reader of our output left; Python would complain at exit
             raise typer.Exit(0) from None
+        except OSError as error:
+            if error.filename is None or error.errno not in OF_THE_DISK:
+                raise
+            console.say(f"marey: {os.fsdecode(error.filename)}: {error.strerror}")
+            raise typer.Exit(InvalidInput.exit_code) from None
 
 
 app = typer.Typer(

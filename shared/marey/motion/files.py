@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import stat
 from pathlib import Path
 
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
@@ -26,16 +27,18 @@ def read_limited(path: Path, limit: int) -> bytes:
 
     Raises:
         NotFound: no such file.
-        InvalidFile: it cannot be read.
+        InvalidFile: it cannot be read, or is a pipe or a device, which may never end.
         TooLarge: over the limit.
     """
     try:
-        size = path.stat().st_size
-        if size > limit:
-            message = f"{size / 2**20:.0f} MiB, over the limit of {limit / 2**20:.0f} MiB"
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise InvalidFile("is not a regular file", where=str(path))
+        if status.st_size > limit:
+            message = f"{status.st_size / 2**20:.0f} MiB, over the limit of {limit / 2**20:.0f} MiB"
             raise TooLarge(message, where=str(path))
         return path.read_bytes()
-    except FileNotFoundError:
+    except (FileNotFoundError, ValueError):  # ValueError: a NUL in the path
         raise NotFound("no such file", where=str(path)) from None
     except OSError as error:
         raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None

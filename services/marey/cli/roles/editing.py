@@ -66,7 +66,10 @@ def edit_files(
         made += [(source, path, judged(clip)) for path, clip in zip(_numbered(target, len(clips)), clips, strict=True)]
     _check_targets([path for _, path, _ in made], overwrite=overwrite)
     for source, path, clip in made:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidInput(f"cannot write here: {error.strerror}", where=str(path.parent)) from error
         write_atomically(path, writer.write(clip, Coordinates.of(export)))
         yield _line(source, path, clip)
 
