@@ -6,11 +6,14 @@ import json
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, Unauthenticated, Unreachable
 
 MAX_BYTES = 2**16
+MAX_KEY = 2**12
+"""Bytes of a file with a key."""
 HINT = "Delete it and start `marey serve` again."
 
 
@@ -58,11 +61,30 @@ def server_at(url: str, key: str | None = None) -> Server:
 
     Raises:
         InvalidInput: it is not a URL.
-        Unauthenticated: there is no key.
+        Unauthenticated: there is no key, or one with characters that no key has.
     """
-    if not url.startswith(("http://", "https://")):
+    _check_address(url)
+    key = _key() if key is None else key
+    if not key.isascii() or not key.isprintable() or " " in key:  # no header could hold it
+        raise Unauthenticated("this is not an API key", hint="Keys look like marey_<8>_<43>; MAREY_KEY holds yours.")
+    return Server(url.rstrip("/"), key)
+
+
+def _check_address(url: str) -> None:
+    """Check that it is an http or https URL with a host, without a user: keys are sent in their own header.
+
+    Raises:
+        InvalidInput: it is not.
+    """
+    try:
+        parts = urlsplit(url)
+        known = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+    except ValueError:  # a port that is none, or an open bracket
+        known = False
+    if not known or not url.isprintable() or " " in url or "\\" in url:
         raise InvalidInput(f"MAREY_SERVER is {url!r}, not a URL", hint="Write it as https://marey.example.com")
-    return Server(url.rstrip("/"), _key() if key is None else key)
+    if "@" in urlsplit(url).netloc:
+        raise InvalidInput("MAREY_SERVER holds a user or a password", hint="Leave them out: MAREY_KEY is the key.")
 
 
 def write_server(server: Server, folder: Path) -> None:
@@ -118,7 +140,7 @@ def _is_starting(folder: Path) -> bool:
 
 def _key() -> str:
     path = os.environ.get("MAREY_KEY_FILE")
-    key = _key_of(Path(path).expanduser()) if path else os.environ.get("MAREY_KEY", "")
+    key = _key_of(Path(path).expanduser()) if path else os.environ.get("MAREY_KEY", "").strip()
     if not key:
         empty = "the file of MAREY_KEY_FILE" if path else "MAREY_KEY"
         raise Unauthenticated(f"MAREY_SERVER names a server, but {empty} is empty", hint="Set MAREY_KEY to your key.")
@@ -127,7 +149,8 @@ def _key() -> str:
 
 def _key_of(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8").strip()
+        with path.open("rb") as file:  # perhaps a pipe, or a device
+            return file.read(MAX_KEY).decode("utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise InvalidFile(

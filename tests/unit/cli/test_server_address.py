@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from marey.client.server_address import Server, find_server
-from marey.core.errors import InvalidFile, Unauthenticated, Unreachable
+from marey.core.errors import InvalidFile, InvalidInput, Unauthenticated, Unreachable
 
 URL = "https://marey.example.com"
 
@@ -40,6 +40,39 @@ def test_a_file_that_holds_no_key_is_told_by_its_name(
     with pytest.raises(InvalidFile, match="cannot be read") as told:
         find_server()
     assert str(path) in str(told.value)
+
+
+@pytest.mark.parametrize("key", ["marey_…", "mare\ny", "marey_1 2", "\x1b[2J"])
+def test_what_no_header_can_hold_is_no_key(monkeypatch: pytest.MonkeyPatch, key: str) -> None:
+    monkeypatch.setenv("MAREY_KEY", key)
+    with pytest.raises(Unauthenticated, match="this is not an API key"):
+        find_server()
+    monkeypatch.setenv("MAREY_KEY", " marey_key\r\n")
+    assert find_server().key == "marey_key"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "http://",
+        "https:///x",
+        "ftp://a",
+        "a:8400",
+        "http://a b",
+        "http://a\\b",
+        "http://[::1",
+        "http://a:99999",
+        "http://k@a",
+    ],
+)
+def test_what_is_no_address_is_told(monkeypatch: pytest.MonkeyPatch, url: str) -> None:
+    monkeypatch.setenv("MAREY_KEY", "marey_key")
+    monkeypatch.setenv("MAREY_SERVER", url)
+    with pytest.raises(InvalidInput, match=r"^MAREY_SERVER (is .*, not a URL|holds a user or a password)"):
+        find_server()
+    for fine in ("http://[::1]:8400", "https://a.example/marey"):
+        monkeypatch.setenv("MAREY_SERVER", fine)
+        assert find_server().url == fine
 
 
 def test_no_key_at_all_is_told_with_what_to_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
