@@ -123,7 +123,11 @@ def unescaped(stream: TextIO) -> TextIO:
 
 
 def escaping(stream: TextIO | None) -> TextIO | None:
-    """Wrap a stream in an `EscapingStream`; None stays None (a process without a console has no streams)."""
+    """Wrap a stream in an `EscapingStream`; None stays None (a process without a console has no streams). Characters
+    that its encoding does not have are escaped as well."""
     if stream is None or isinstance(stream, EscapingStream):
         return stream
+    reconfigure = getattr(stream, "reconfigure", None)
+    if reconfigure is not None:  # not of a stream that a test or a program put in its place
+        reconfigure(errors="backslashreplace")
     return cast("TextIO", EscapingStream(stream))

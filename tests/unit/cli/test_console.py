@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import subprocess
 import sys
@@ -138,6 +139,14 @@ def test_the_traceback_of_a_bug_is_escaped() -> None:
     assert "RuntimeError" in done.stderr
     assert r"a\x1b[2Jb" in done.stderr
     assert "\x1b" not in done.stderr
+
+
+def test_characters_that_the_terminal_does_not_have_are_escaped() -> None:
+    code = "from marey.cli import console; console.escape_output(); console.result('ü 😀')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, b"\\xfc \\U0001f600\n"), done.stderr
 
 
 def test_drawn_tables_shorten_ids_alone_and_fit_eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
