@@ -95,9 +95,13 @@ def test_a_scheme_of_its_own_comes_before_the_flag(endpoint: str, secure: bool, 
     assert options.address(endpoint) == address
 
 
-def test_an_authority_file_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
+def test_an_authority_file_that_cannot_be_used_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidInput, match="cannot be read"):
         trusting_context(tmp_path / "none.pem")
     (tmp_path / "empty.pem").write_text("no certificate")
     with pytest.raises(InvalidInput, match="holds no certificate"):
         trusting_context(tmp_path / "empty.pem")
+    for name in ("none.pem", "empty.pem"):
+        monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / name))
+        with pytest.raises(InvalidInput, match=f"SSL_CERT_FILE: .*{name}"):
+            trusting_context()

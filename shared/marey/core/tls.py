@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import ssl
 from pathlib import Path
 
@@ -17,11 +18,16 @@ def trusting_context(ca_file: Path | None = None) -> ssl.SSLContext:
     Trusts the machine's authorities (or `SSL_CERT_FILE`, `SSL_CERT_DIR`), and those of `ca_file` as well.
 
     Raises:
-        InvalidInput: the file cannot be read or holds no certificate.
+        InvalidInput: the file, or that of `SSL_CERT_FILE`, cannot be read or holds no certificate.
     """
     import httpx2  # costs 0.1 s of import, which commands without a server avoid
 
-    context = httpx2.create_ssl_context()
+    try:
+        context = httpx2.create_ssl_context()
+    except OSError as error:  # also SSLError
+        named = "SSL_CERT_FILE" if os.environ.get("SSL_CERT_FILE") else "SSL_CERT_DIR"
+        message = f"{os.environ.get(named)!r} holds no certificate authorities that can be read: {error.strerror}"
+        raise InvalidInput(message, where=named, hint="Correct it, or unset it.") from error
     if ca_file is not None:
         try:
             context.load_verify_locations(cafile=ca_file.expanduser())
