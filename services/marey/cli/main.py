@@ -46,7 +46,7 @@ OF_THE_DISK = frozenset(
         errno.ENOTDIR, errno.EPERM, errno.EROFS,
     }
 )  # fmt: skip
-"""What a file system refuses without a bug of ours; a file that is missing may be one."""
+"""Refusals of a file system that are no bug of ours; a file that is missing may be one."""
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
 
