@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import asdict, dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -24,6 +25,15 @@ class Server:
     url: str
     key: str
     pid: int | None = None
+
+    @property
+    def is_here(self) -> bool:
+        """Return True if its host is a loopback address: proxies of the environment cannot reach it."""
+        host = urlsplit(self.url).hostname or ""
+        try:
+            return host == "localhost" or ip_address(host).is_loopback
+        except ValueError:
+            return False
 
 
 def home() -> Path:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, cast
+from urllib.request import getproxies
 from uuid import uuid4
 
 import httpx2
@@ -79,9 +80,10 @@ class Transport:
                 headers={"Authorization": f"Bearer {server.key}"},
                 timeout=httpx2.Timeout(timeout, connect=5.0),
                 verify=trusting_context(ca_file()),
+                trust_env=not server.is_here,
             )
-        except httpx2.InvalidURL as error:
-            raise InvalidInput(f"is no address: {error}", where=server.url, hint="Correct MAREY_SERVER.") from error
+        except (httpx2.InvalidURL, ValueError, ImportError) as error:
+            raise _no_client(error, server) from error
 
     def __enter__(self) -> Transport:
         return self
@@ -406,6 +408,18 @@ def _retry_after(response: httpx2.Response) -> float:
         return min(float(response.headers.get("Retry-After", 0)), 60.0)
     except ValueError:
         return 0.0
+
+
+def _no_client(error: Exception, server: Server) -> InvalidInput:
+    """Return the error for an address of a server or of a proxy that the HTTP client does not take."""
+    if server.is_here or not getproxies():
+        return InvalidInput(f"is no address: {error}", where=server.url, hint="Correct MAREY_SERVER.")
+    reason = "SOCKS is not supported" if isinstance(error, ImportError) else str(error)
+    return InvalidInput(
+        f"a proxy that the environment names cannot be used: {reason}",
+        where=server.url,
+        hint="Unset or correct ALL_PROXY, HTTPS_PROXY and HTTP_PROXY: an http:// proxy can be used.",
+    )
 
 
 def _given(params: Mapping[str, Any]) -> dict[str, Any]:

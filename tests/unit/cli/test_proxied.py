@@ -94,6 +94,25 @@ def test_a_page_of_a_proxy_is_told_as_such(
     assert proxy.requests == requests
 
 
+@pytest.mark.parametrize("named", ["socks5://127.0.0.1:1", "ftp://a", "http://127.0.0.1:1"])
+def test_a_server_on_this_machine_is_not_asked_for_by_a_proxy(
+    start: Start, monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    monkeypatch.setenv("ALL_PROXY", named)
+    proxy = start(500)
+    for url in (proxy.url, proxy.url.replace("127.0.0.1", "localhost")):
+        with Transport(Server(url, "key")) as client, pytest.raises(Unreachable, match="nginx"):
+            client.get("/v1/jobs")
+    assert proxy.requests == 2
+
+
+@pytest.mark.parametrize(("named", "said"), [("socks5://127.0.0.1:1", "SOCKS is not supported"), ("ftp://a", "ftp")])
+def test_a_proxy_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, named: str, said: str) -> None:
+    monkeypatch.setenv("ALL_PROXY", named)
+    with pytest.raises(InvalidInput, match=f"a proxy that the environment names .*{said}(.*\n)*.*ALL_PROXY"):
+        Transport(Server("http://marey.example.com", "key"))
+
+
 def test_a_name_that_would_control_a_terminal_is_not_shown(start: Start) -> None:
     proxy = start(404, Server="x\x1b[2J")
     proxy.http.RequestHandlerClass.server_version = "evil\x1b[2J"  # pyright: ignore[reportAttributeAccessIssue]
