@@ -25,6 +25,7 @@ from marey.motion.kinematics import forward_kinematics
 from marey.motion.provenance import check_manifest
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton, skeleton_of
+from marey.motion.units import FARTHEST
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -171,25 +172,33 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
             array = need(key, "f", *shape).astype(np.float32, copy=False)
         return check_array(array, key, where, kinds="f", shape=shape)
 
-    joints = floats("joints", None, None, 3)
+    def places(key: str, *shape: int | None) -> Float32:
+        array = floats(key, *shape, 3)
+        if np.abs(array).max(initial=0) > FARTHEST:
+            raise InvalidFile(f"`{key}` holds numbers over {FARTHEST:,.0f}", where=where)
+        return array
+
+    joints = places("joints", None, None)
     frames, count = joints.shape[:2]
     rotations = floats("rotations", frames, count, 4)
     parents = tuple(int(p) for p in need("parents", "iu", count).tolist())
     fps, features_fps = float(need("fps", "f")), float(need("features_fps", "f"))
     if not frames or not 0 < fps <= 1000:
         raise InvalidFile(f"{frames} frames at {fps:g} fps", where=where)
-    if np.abs(np.linalg.norm(rotations, axis=-1) - 1).max(initial=0) > 1e-3:
+    if np.abs(np.linalg.norm(np.clip(rotations, -2, 2), axis=-1) - 1).max(initial=0) > 1e-3:
         raise InvalidFile("`rotations` holds quaternions that are not of unit length", where=where)
     try:
         names = tuple(str(n) for n in need("names", "U", count).tolist())
         manifest = parse_json(text_of(arrays["manifest"], "manifest", where), f"{where}: manifest", allow_nan=True)
-        skeleton = skeleton_of(names, parents, floats("offsets", count, 3))
+        skeleton = skeleton_of(names, parents, places("offsets", count))
+    except InvalidFile:  # it names the file already
+        raise
     except (ValueError, InvalidInput) as error:
         raise InvalidFile(str(error), where=where) from None
     return MotionClip(
         skeleton=skeleton,
         rotations=rotations,
-        root=floats("root", frames, 3),
+        root=places("root", frames),
         joints=joints,
         contacts=need("contacts", "b", frames, 4),
         fps=fps,

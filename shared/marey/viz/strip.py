@@ -6,6 +6,7 @@ and highlights of feet in contact. Left is blue and right is orange everywhere.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -24,6 +25,8 @@ from marey.viz.raster import Camera, shade
 
 SMOOTH = 2  # figures are drawn this much larger and shrunk
 GRID = 0.5  # metres
+MOST_LINES = 200
+"""Lines of the grid in one direction: around a body whose unit is wrong, of a kilometre, they are farther apart."""
 BLUR, SPREAD = 2.5, 10
 """Softness of a shadow, and how far it spreads by that: pixels."""
 LIGHT = np.array([-0.22, 1.0, 0.34])  # direction to the light, world axes
@@ -80,8 +83,13 @@ def make_strip(
 
     Args:
         centre: (T, 3) the middle of each pose's patch of floor; None = under the root.
+
+    Raises:
+        InvalidInput: the skeleton is a single joint.
     """
     body, camera = dress_clip(clip), Camera()
+    if not body.limbs:
+        raise InvalidInput("has no bones that could be drawn", where=clip.skeleton.name)
     root = np.asarray(clip.joints[:, 0], np.float32)
     centre = root if centre is None else centre
     joints = np.asarray(clip.joints[frames], np.float64)
@@ -129,9 +137,10 @@ def draw_patch(
     radius = (strip.cell[0] / 2 - 4) / strip.scale
     centre, rim = strip.centre[frame], view_points(pixels(_circle(radius)))
     draw.polygon(rim, fill=theme.floor)
+    step = GRID * 2.0 ** max(math.ceil(math.log2(2 * radius / (GRID * MOST_LINES))), 0)
     for axis in (0, 2):
-        first = np.ceil((centre[axis] - radius) / GRID) * GRID
-        for at in np.arange(first, centre[axis] + radius, GRID) - centre[axis]:
+        first = np.ceil((centre[axis] - radius) / step) * step
+        for at in np.arange(first, centre[axis] + radius, step) - centre[axis]:
             half = np.sqrt(max(radius**2 - at**2, 0))
             line = np.zeros((2, 3))
             line[:, axis], line[:, 2 - axis] = at, (-half, half)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -163,6 +164,19 @@ def test_an_option_that_cannot_be_is_refused(clip, tmp_path, options, message):
     with pytest.raises(InvalidInput, match=message):
         contact_sheet(clip, tmp_path / "a.png", **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_body_in_a_wrong_unit_is_drawn_and_a_single_joint_refused(tmp_path):
+    """Around a body of kilometres the grid would have millions of lines."""
+    clip = walker(seconds=0.2)
+    large = Skeleton("x", HUMANML3D.joint_names, HUMANML3D.parents, HUMANML3D.offsets * 1e5, HUMANML3D.mirror)
+    began = time.monotonic()
+    contact_sheet(MotionClip.of(large, clip.rotations, clip.root * 1e5, clip.contacts, 20.0), tmp_path / "a.png")
+    assert time.monotonic() - began < 10
+    joint = Skeleton("one", ("hips",), (-1,), np.zeros((1, 3), np.float32), (0,))
+    still = MotionClip.of(joint, clip.rotations[:, :1], clip.root, clip.contacts, 20.0)
+    with pytest.raises(InvalidInput, match="no bones that could be drawn"):
+        contact_sheet(still, tmp_path / "b.png")
 
 
 def test_no_clip_a_foreign_ending_and_a_missing_folder_are_refused(clip, tmp_path):

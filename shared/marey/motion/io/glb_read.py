@@ -23,9 +23,9 @@ from marey.motion.io.glb_write import BIN, FEET, FLOAT, GENERATOR, JSON, MAGIC, 
 from marey.motion.io.rigged_glb_read import hips_motion
 from marey.motion.provenance import check_manifest
 from marey.motion.rigs.landmarks import feet_and_facing
-from marey.motion.rigs.make_rig import FARTHEST
 from marey.motion.rotations import Array, conjugate, multiply, rotate
 from marey.motion.skeleton import skeleton_of
+from marey.motion.units import FARTHEST
 
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 FOREIGN = "Only glb files of Marey are read; export a BVH file from the program that wrote this one."

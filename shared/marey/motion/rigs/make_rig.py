@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidFile, TooLarge
 from marey.motion.rigs.rig import MAX_JOINTS, Rig
 from marey.motion.rotations import Z_TO_Y, from_matrix, multiply, rotate
-from marey.motion.units import Up
+from marey.motion.units import FARTHEST, Up
 
 MAX_NAME = 256
 """Characters of the name of a joint."""
-FARTHEST = 1e6
-"""Metres from the origin to a joint; of numbers beyond it nothing could be computed."""
 EVEN = 0.01
 """Relative difference of a node's three scales, and cosine between its axes, up to which it is neither stretched nor
 sheared; exporters round."""
