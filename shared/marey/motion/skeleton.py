@@ -7,6 +7,7 @@ forward, in metres. All local rotations zero give exactly that pose.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -82,6 +83,22 @@ class Skeleton:
     def index(self, name: str) -> int:
         """Return the index of a joint by name."""
         return self.joint_names.index(name)
+
+
+def distinct_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names that are all different: the second `a` is `a.2`, or `a.3` if that is the name of another joint."""
+    given = list(names)
+    taken = set(given)
+    found: list[str] = []
+    seen: set[str] = set()
+    for name in given:
+        own, number = name, 1
+        while own in seen or (number > 1 and own in taken):
+            number += 1
+            own = f"{name}.{number}"
+        seen.add(own)
+        found.append(own)
+    return tuple(found)
 
 
 def _sided(

@@ -14,7 +14,7 @@ from marey.motion.io import bvh, bvh_header
 from marey.motion.io.bvh import first_frame_stands_apart, format_bvh, parse_bvh, read_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import about, angle_between, multiply, to_euler
-from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS, distinct_names
 from marey.motion.units import METRES
 from tests.support.exported import tumbling
 from tests.support.walker import walker
@@ -101,6 +101,12 @@ def test_a_joint_without_channels_keeps_its_offset():
     clip = parse(still)
     joints = forward_kinematics(clip.skeleton, clip.rotations, clip.root)
     np.testing.assert_allclose(joints[:, 1] - joints[:, 0], [[-0.2, 0, 0]] * 2, atol=1e-6)
+
+
+def test_a_name_made_for_a_second_joint_is_not_that_of_a_third():
+    assert distinct_names(["a", "a", "a.2", "a", "b"]) == ("a", "a.3", "a.2", "a.4", "b")
+    clip = parse(SMALL.replace("\tEnd Site\n\t\t{", "\tJOINT Hips\n\t\t{\n\t\t\tCHANNELS 0").replace("Chest", "Hips.2"))
+    assert clip.skeleton.joint_names == ("Hips", "Hips.2", "Hips.3")
 
 
 def test_names_may_hold_spaces_and_other_encodings():

@@ -8,6 +8,7 @@ listed in `BvhClip.notes`; broken files raise InvalidFile with a line number.
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -20,7 +21,7 @@ from marey.motion.io.bvh_header import LARGEST, BvhHeader, Joint
 from marey.motion.io.bvh_write import format_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import AXES, Z_TO_Y, Array, angle_between, from_euler, multiply, rotate, unroll
-from marey.motion.skeleton import Skeleton, mirror_by_name
+from marey.motion.skeleton import Skeleton, distinct_names, mirror_by_name
 from marey.motion.units import METRES, Unit, Up
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "read_bvh", "write_bvh"]
@@ -104,7 +105,9 @@ def parse_bvh(
     joints, notes = header.joints, header.notes
     if header.frames != len(values):
         notes.append(f"line {header.frames_line}: the header says {header.frames} frames, the file holds {len(values)}")
-    names = _unique([j.name for j in joints], notes)
+    given = [j.name for j in joints]
+    notes += [f"there are several joints {name}" for name, count in Counter(given).items() if count > 1]
+    names = distinct_names(given)
     rotations = _rotations(joints, values)
     offsets, channels, given = _translations(joints, values)
     tree = Skeleton("bvh", names, tuple(j.parent for j in joints), offsets.astype(np.float32), mirror_by_name(names))
@@ -194,17 +197,6 @@ def _are_added(tree: Skeleton, rotations: Array, channels: Array, given: Array, 
     some = slice(None, None, max(1, len(rotations) // 64))
     lowest = float(forward_kinematics(tree, rotations[some], channels[some, 0])[..., axis].min())
     return abs(lowest + float(offsets[0, axis])) < abs(lowest)
-
-
-def _unique(names: list[str], notes: list[str]) -> tuple[str, ...]:
-    seen: dict[str, int] = {}
-    unique: list[str] = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        if seen[name] > 1:
-            notes.append(f"there are several joints {name}")
-        unique.append(name if seen[name] == 1 else f"{name}.{seen[name]}")
-    return tuple(unique)
 
 
 def _numbers(data: bytes, header: BvhHeader, where: str) -> Array:

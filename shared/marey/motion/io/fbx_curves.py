@@ -134,12 +134,13 @@ def _curves(
 def _curve(scene: Scene, node: ReadNode) -> Curve:
     file = scene.file
     times = file.array(node.first("KeyTime"), "l", most=MAX_KEYS) / TICKS
-    values = file.array(node.first("KeyValueFloat"), "fd", most=MAX_KEYS).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaN is looked for below
+        values = file.array(node.first("KeyValueFloat"), "fd", most=MAX_KEYS).astype(np.float64)
+        data = file.array(node.first("KeyAttrDataFloat"), "f", most=4 * MAX_KEYS).astype(np.float64)
     if not len(times) or len(times) != len(values) or (np.diff(times) <= 0).any() or not np.isfinite(values).all():
         raise file.broken(f"a curve has {len(times)} times and {len(values)} values, or they are not in order")
     counts = file.array(node.first("KeyAttrRefCount"), "i", most=MAX_KEYS).astype(np.int64)
     flags = file.array(node.first("KeyAttrFlags"), "i", most=MAX_KEYS).astype(np.int64)
-    data = file.array(node.first("KeyAttrDataFloat"), "f", most=4 * MAX_KEYS).astype(np.float64)
     if len(flags) != len(counts) or len(data) != 4 * len(counts) or (counts < 0).any() or counts.sum() != len(times):
         flags, data, counts = np.array([LINEAR]), np.zeros(4), np.array([len(times)])
     which = np.repeat(np.arange(len(counts)), counts)

@@ -14,7 +14,7 @@ from marey.motion.io.fbx_scene import Scene, read_scene
 from marey.motion.io.fbx_skeleton import bones_of, skeleton_order
 from marey.motion.io.fbx_transforms import World, world_transforms
 from marey.motion.rotations import Array, conjugate, from_matrix, multiply, rotate, unroll
-from marey.motion.skeleton import Skeleton, mirror_by_name
+from marey.motion.skeleton import Skeleton, distinct_names, mirror_by_name
 
 MAX_BYTES = 256 * 2**20
 MAX_POSES = 1_000_000
@@ -48,7 +48,7 @@ def parse_fbx(data: bytes, where: str = "fbx") -> BvhClip:
     animation = read_animation(scene, set(order))
     times = _times(animation, scene.fps, len(order), where)
     joints = [key for key in order if key in bones]
-    names = _names(scene, joints)
+    names = distinct_names(scene.models[key].name or "joint" for key in joints)
     rest = world_transforms(scene, order, {}, bind=True)
     moving = world_transforms(scene, order, animation.sample(scene, times))
     parents = _parents(scene, joints)
@@ -88,20 +88,6 @@ def _largest(scene: Scene, order: list[int], bones: set[int]) -> tuple[list[int]
     name = scene.models[root].name
     notes = (f"{count} skeletons in the file; that of {name!r} is read",) if count > 1 else ()
     return [key for key in order if key in kept], notes
-
-
-def _names(scene: Scene, joints: list[int]) -> tuple[str, ...]:
-    """Return a name for each joint, all different."""
-    names: list[str] = []
-    taken: set[str] = set()
-    for key in joints:
-        name, number = scene.models[key].name or "joint", 1
-        while name in taken:
-            number += 1
-            name = f"{scene.models[key].name or 'joint'}.{number}"
-        taken.add(name)
-        names.append(name)
-    return tuple(names)
 
 
 def _parents(scene: Scene, joints: list[int]) -> tuple[int, ...]:
