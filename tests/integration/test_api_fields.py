@@ -60,6 +60,25 @@ def test_of_a_body_that_cannot_be_read_the_body_is_named(http: httpx2.Client, pa
     assert SAID.get(broken, "") in answer.json()["detail"]
 
 
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        *(("POST", path) for path in WITH_BODY),
+        ("POST", "/v1/motions/review"),
+        ("POST", "/v1/motions/reroll"),
+        ("POST", f"/v1/motions/{NOBODY}/edits"),
+        ("POST", f"/v1/streams/{NOBODY}/end"),
+        ("PATCH", f"/v1/jobs/{NOBODY}"),
+        ("PATCH", f"/v1/webhooks/{NOBODY}"),
+        ("PATCH", f"/v1/schedules/{NOBODY}"),
+    ],
+)
+def test_a_body_that_gives_a_key_twice_is_refused(http: httpx2.Client, method: str, path: str) -> None:
+    answer = http.request(method, path, content=b'{"name": "a", "name": "b"}', headers=JSON)
+    assert answer.status_code == 422
+    assert "twice" in answer.json()["detail"], answer.text
+
+
 def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> None:
     assert refusal(http.post("/v1/jobs", content=b"\n \n", headers={"Content-Type": "application/x-ndjson"})) == (
         422, "body",

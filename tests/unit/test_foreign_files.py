@@ -132,6 +132,12 @@ def test_json_is_read_as_it_is() -> None:
     assert parse_json(json.dumps(deepest), "x") == deepest
 
 
+def test_a_key_that_an_object_gives_twice_is_refused_where_people_write_it() -> None:
+    assert parse_json('{"a": 1, "a": 2}', "x") == {"a": 2}
+    with pytest.raises(InvalidFile, match=r"^x: gives 'a' twice$"):
+        parse_json('[{"a": 1, "a": 2}]', "x", unique=True)
+
+
 def test_what_is_no_file_is_told(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to("loop")

@@ -1,7 +1,8 @@
 """JSON bodies with one long list, parsed from a file piece by piece: memory does not grow with the list.
 
-Every value is decoded by Python's own `json`, as for a whole body. So the same documents are accepted, and errors
-have the same words, line and column. Only the enclosing object and the list's commas are parsed here.
+Every value is decoded by Python's own `json`, as for a whole body. So the same documents are accepted, but for objects
+that give a key twice, and errors have the same words, line and column. Only the enclosing object and the list's commas
+are parsed here.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Iterator
 from json.decoder import JSONDecodeError
 from typing import Any, BinaryIO
 
-from marey.core.documents import json_problem
+from marey.core.documents import RepeatedKeyError, json_problem, unique_object
 from marey.core.errors import InvalidInput, TooLarge
 from marey.items.item import MAX_ITEMS
 
@@ -23,8 +24,10 @@ PIECE = 2**20
 """Bytes per read."""
 NEAR_END = 16
 """Characters: a truncated literal or escape is reported at its start, at most this far before the end."""
+MAX_NAME = 100
+"""Characters of a field's name that an error shows."""
 BLANK = re.compile(r"[ \t\n\r]*")
-_decoder = json.JSONDecoder()
+_decoder = json.JSONDecoder(object_pairs_hook=unique_object)
 
 
 class Document:
@@ -50,7 +53,7 @@ class Document:
         """Return all fields but the list; a value in its place that is not a list is included.
 
         Raises:
-            InvalidInput: not JSON, not an object, or the list occurs twice.
+            InvalidInput: not JSON, not an object, or a key occurs twice.
             TooLarge: an element, or the rest, is over `MAX_VALUE` characters.
         """
         found: dict[str, Any] = {}
@@ -77,7 +80,7 @@ class Document:
     def _object(self, window: _Window, path: tuple[str, ...], fields: dict[str, Any]) -> Iterator[tuple[int, object]]:
         window.step()
         listed, deeper = path[0], path[1:]
-        closed, seen = window.skip() == "}", False
+        closed, seen = window.skip() == "}", set[str]()
         while not closed:
             if window.skip() != '"':
                 raise window.error("Expecting property name enclosed in double quotes")
@@ -86,9 +89,10 @@ class Document:
                 raise window.error("Expecting ':' delimiter")
             window.step()
             begins = window.skip()
-            if name == listed and seen:
-                raise InvalidInput("is given twice", where=".".join(self._path), hint="Give it once.")
-            seen = seen or name == listed
+            if name in seen:
+                where = ".".join(self._path) if name == listed else name[:MAX_NAME]
+                raise InvalidInput("is given twice", where=where, hint="Give it once.")
+            seen.add(name)
             if name == listed and not deeper and begins == "[":
                 self.has_list = True
                 yield from self._list(window)
@@ -170,7 +174,7 @@ class _Window:
         """Parse the value that begins here.
 
         Raises:
-            InvalidInput: not JSON.
+            InvalidInput: not JSON, or a key occurs twice.
             TooLarge: it has over `MAX_VALUE` characters.
         """
         self._fill()
@@ -181,6 +185,8 @@ class _Window:
             if cut and not self._whole:
                 raise _too_large(where) from None
             raise self.error(error.msg, error.pos) from None
+        except RepeatedKeyError as error:
+            raise InvalidInput(json_problem(error), where=where, hint="Give it once.") from None
         except (ValueError, RecursionError) as error:
             raise InvalidInput(f"the body {json_problem(error)}", where="body") from error
         if end - self._at > MAX_VALUE or (end == len(self._text) and not self._whole):

@@ -87,7 +87,7 @@ def given_operations(context: typer.Context, file: Path | None) -> Any:
     if file is not None:
         if steps:
             raise InvalidInput("cannot be combined with operations", where="--ops", hint="Write them into the file.")
-        return parse_json(read_limited(file, MOST), str(file))
+        return parse_json(read_limited(file, MOST), str(file), unique=True)
     if not steps:
         raise InvalidInput(
             "no operation is given", hint=f"Name one, such as --loop; `{context.command_path} --help` lists them."

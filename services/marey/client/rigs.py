@@ -55,7 +55,7 @@ class Rigs(Resource):
         data = read_bytes(path, limit=MAX_BYTES, hint="Export the skeleton without the scene.")
         asked = {"name": path.stem if name is None else name, "format": path.suffix.removeprefix(".").lower()}
         if rig_map is not None:
-            given = rig_map if isinstance(rig_map, Mapping) else read_json(Path(rig_map))
+            given = rig_map if isinstance(rig_map, Mapping) else read_json(Path(rig_map), unique=True)
             asked["map"] = json.dumps(given, ensure_ascii=False, separators=(",", ":"))
         where = {"body": str(path), "format": str(path)}
         if isinstance(rig_map, str | Path):

@@ -13,6 +13,7 @@ from typing import Literal
 from marey.client import manifest
 from marey.client.csv_cells import TAG_SEPARATOR, restore, split_tags
 from marey.core.characters import find_forbidden
+from marey.core.documents import unique_object
 from marey.core.errors import InvalidInput
 from marey.core.suggestions import did_you_mean, nearest
 from marey.items.item import Unreadable
@@ -179,7 +180,7 @@ def _value(name: str, cell: str) -> object:
         if name == "settings":
             return read_settings(cell)
         if name == "constraints":
-            return json.loads(cell)
+            return json.loads(cell, object_pairs_hook=unique_object)
     except (ValueError, RecursionError, InvalidInput):
         pass
     return cell if name == "prompt" else cell.strip(BLANK)

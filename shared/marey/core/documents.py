@@ -55,6 +55,24 @@ def read_bytes(
         raise NotFound("there is no such file", where=where, hint=hint) from None
 
 
+class RepeatedKeyError(ValueError):
+    """A key that a JSON object has twice."""
+
+
+def unique_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the object of these members; the `object_pairs_hook` of `json` for documents that people write: it would
+    keep the last of equal keys, and the author cannot have meant both.
+
+    Raises:
+        RepeatedKeyError: two members have one key.
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise RepeatedKeyError(next(key for key in keys if keys.count(key) > 1))
+    return found
+
+
 def json_problem(error: Exception, *, before: int = 0) -> str:
     """Return why `json` could not read a document, for people who do not know Python.
 
@@ -64,6 +82,8 @@ def json_problem(error: Exception, *, before: int = 0) -> str:
     """
     if isinstance(error, RecursionError):
         return "is nested too deeply"
+    if isinstance(error, RepeatedKeyError):
+        return f"gives {error.args[0]!r} twice"
     if isinstance(error, UnicodeDecodeError):
         place = f"byte 0x{error.object[error.start]:02x} at position {before + error.start}"
         return f"is not {error.encoding.upper()} ({place})"
@@ -80,6 +100,7 @@ def parse_json(
     hint: str | None = None,
     allow_nan: bool = False,
     max_depth: int = MAX_DEPTH,
+    unique: bool = False,
 ) -> Any:
     """Parse JSON in UTF-8.
 
@@ -88,13 +109,14 @@ def parse_json(
         where, error, hint: for the error.
         allow_nan: accept NaN and infinite numbers, which Python writes and JSON does not have.
         max_depth: levels of nesting.
+        unique: refuse objects that give a key twice.
 
     Raises:
-        InvalidFile: not JSON, nested too deeply, or with text that is not Unicode.
+        InvalidFile: not JSON, nested too deeply, a repeated key, or with text that is not Unicode.
     """
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
-        value = json.loads(text)
+        value = json.loads(text, object_pairs_hook=unique_object if unique else None)
         problem = _problem(value, allow_nan, max_depth)
     except RecursionError:
         problem = f"is nested more than {max_depth} levels deep"
@@ -113,6 +135,7 @@ def read_json(
     error: type[InvalidFile] = InvalidFile,
     hint: str | None = None,
     allow_nan: bool = False,
+    unique: bool = False,
 ) -> Any:
     """Read a JSON file.
 
@@ -120,7 +143,7 @@ def read_json(
         NotFound, InvalidFile: as `read_bytes` and `parse_json`.
     """
     data = read_bytes(path, limit=limit, error=error, hint=hint)
-    return parse_json(data, str(path), error=error, hint=hint, allow_nan=allow_nan)
+    return parse_json(data, str(path), error=error, hint=hint, allow_nan=allow_nan, unique=unique)
 
 
 def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
-from marey.core.documents import json_problem
+from marey.core.documents import json_problem, unique_object
 from marey.core.errors import InvalidInput
 from marey.core.suggestions import did_you_mean
 from marey.items.constraint_values import (
@@ -89,7 +89,7 @@ def parse_constraints(text: str | bytes) -> list[Constraint]:
         InvalidInput: not JSON, or as `read_constraints`.
     """
     try:
-        value: object = json.loads(text)
+        value: object = json.loads(text, object_pairs_hook=unique_object)
     except (ValueError, RecursionError) as error:
         hint = 'Write {"constraints": [{"type": "root_path", …}]}.'
         raise InvalidInput(json_problem(error), where="constraints", hint=hint) from None

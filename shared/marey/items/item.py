@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar, cast
 
-from marey.core.documents import json_problem
+from marey.core.documents import json_problem, unique_object
 from marey.core.errors import InvalidInput, TooLarge
 from marey.core.suggestions import did_you_mean
 from marey.items.constraints import read_constraints
@@ -110,25 +110,11 @@ def read_json(line: str | bytes) -> object:
     """Parse the JSON value of one line, or return `Unreadable`, also where an object gives a key twice: JSON would keep
     the last, and the caller cannot have meant both."""
     try:
-        return json.loads(line, object_pairs_hook=_object)
-    except _RepeatedKeyError as error:
-        return Unreadable(f"gives {error.args[0]!r} twice")
+        return json.loads(line, object_pairs_hook=unique_object)
     except json.JSONDecodeError as error:  # which counts lines of its own
         return Unreadable(f"is not JSON: {error.msg} at character {error.pos + 1}")
     except (ValueError, RecursionError) as error:
         return Unreadable(json_problem(error))
-
-
-class _RepeatedKeyError(ValueError):
-    """A key that an object has twice."""
-
-
-def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        keys = [key for key, _ in pairs]
-        raise _RepeatedKeyError(next(key for key in keys if keys.count(key) > 1))
-    return found
 
 
 def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[Problem]]:

@@ -14,6 +14,7 @@ from typing import Any, Literal, cast, get_args
 
 import redis
 
+from marey.core.documents import RepeatedKeyError, json_problem, unique_object
 from marey.core.errors import InvalidInput
 from marey.streams.redis import BLOCK_MS, KEEP_MS, reached, stream_entries, stream_key
 
@@ -60,7 +61,9 @@ class StreamControl:
             InvalidInput: unknown to this release.
         """
         try:
-            message = json.loads(data)
+            message = json.loads(data, object_pairs_hook=unique_object)
+        except RepeatedKeyError as error:
+            raise InvalidInput(json_problem(error), where="stream control") from error
         except (ValueError, RecursionError) as error:
             raise InvalidInput("not JSON", where="stream control") from error
         if not isinstance(message, dict) or not set(cast("dict[str, Any]", message)) <= {"kind", "prompt", "pose"}:

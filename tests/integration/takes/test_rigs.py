@@ -87,6 +87,7 @@ def there(api: LiveApi, data: bytes) -> bool:
         (BVH, {"name": "a.glb"}, 422, "name", ""),
         (BVH, {"map": "[1"}, 422, "map", ""),
         (BVH, {"map": "[1]"}, 422, "map", "parts and joint names"),
+        (BVH, {"map": '{"head": null, "head": "head"}'}, 422, "map", "gives 'head' twice"),
         (BVH, {"map": "[]"}, 422, "map", "parts and joint names"),
         (BVH, {"map": '{"hips": null}'}, 422, "map", "no rig is without hips"),
         (BVH, {"map": '{"left_hand": "nobody"}'}, 422, "map", "has no joint 'nobody'"),

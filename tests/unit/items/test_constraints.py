@@ -50,6 +50,8 @@ def constraints(draw: st.DrawFn) -> list[dict[str, Any]]:
 def test_what_was_read_reads_as_itself(given: list[dict[str, Any]]) -> None:
     read = read_constraints(given)
     assert read_constraints(read) == read == parse_constraints(json.dumps({"constraints": read}))
+    with pytest.raises(InvalidInput, match="constraints: gives 'frame' twice"):
+        parse_constraints('[{"type": "pose_keyframe", "frame": 1, "frame": 5}]')
     assert [each["type"] for each in read] == [each["type"] for each in given]
 
 

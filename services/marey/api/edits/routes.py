@@ -25,6 +25,7 @@ from marey.bundles import named_by
 from marey.bundles.scope import examine_prompts
 from marey.core import tracing
 from marey.core.errors import InvalidInput, NotFound
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import IdempotencyKey
 from marey.motion.edits.steps import prompts_of_steps, read_steps
@@ -34,7 +35,7 @@ from marey.vocabulary.scope import Scope
 
 log = logger(__name__)
 
-router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
 @router.post(

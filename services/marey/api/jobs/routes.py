@@ -37,6 +37,7 @@ from marey.core import metrics, tracing
 from marey.core.errors import InvalidInput
 from marey.http import schemas
 from marey.http.bodies import kept_body
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from marey.jobs.quality_counts import count_quality
@@ -47,7 +48,7 @@ from marey.vocabulary.scope import ScopePolicy
 
 log = logger(__name__)
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 NDJSON = "application/x-ndjson"
 JSON = "application/json"

@@ -40,7 +40,7 @@ async def add(shared: Context, key: ApiKey, name: str, format: str, rig_map: str
 
 def _map_of(text: str | None) -> Any:
     """Return the JSON value of a map; None for an empty one. The process that reads the rig checks what it says."""
-    given = None if text is None else parse_json(text, "map")
+    given = None if text is None else parse_json(text, "map", unique=True)
     return None if given == {} else given
 
 

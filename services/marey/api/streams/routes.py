@@ -15,10 +15,11 @@ from marey.api.streams import service
 from marey.api.streams.accept import accept_connection
 from marey.api.streams.end_pose import read_end_pose
 from marey.api.streams.schemas import EndStreamBody, NewStreamBody, StreamDetailView, StreamView
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, Limit, PageView
 
-router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
 @router.post("", status_code=201)

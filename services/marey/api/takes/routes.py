@@ -41,12 +41,13 @@ from marey.api.takes.service import file_stem, made_again
 from marey.core.disposition import download_name
 from marey.core.validation import worded
 from marey.exporters import extension_of
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
 from marey.items.values import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
 FORMAT = worded(r"^[a-z0-9]{1,16}$", "names of formats, as npz, bvh, glb or mp4")
-router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
 def motion_filter(

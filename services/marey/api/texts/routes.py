@@ -7,10 +7,11 @@ from starlette.responses import Response
 
 from marey.api.auth import Parser
 from marey.api.context import Shared
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.text_service.routes import GraphsView, ParseBody
 
-router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
 @router.post("/parse", response_model=GraphsView)

@@ -20,12 +20,13 @@ from marey.api.webhooks.schemas import (
     WebhookView,
 )
 from marey.core.addresses import Allowed
+from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, Limit, PageView
 from marey.webhooks.addresses import check_url
 from marey.webhooks.vault import Vault, new_signing_secret
 
-router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
 @router.post("", status_code=201)

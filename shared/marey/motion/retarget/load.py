@@ -57,7 +57,7 @@ def _unknown(rig: str) -> InvalidInput:
 
 @lru_cache(maxsize=16)
 def _load(rig: str, stamp: tuple[int, int], rig_map: str | None, map_stamp: tuple[int, int]) -> RigBody:
-    given = None if rig_map is None else read_map(read_json(Path(rig_map)), rig_map)
+    given = None if rig_map is None else read_map(read_json(Path(rig_map), unique=True), rig_map)
     if rig in REFERENCES:
         found = reference_rig(rig)
     elif Path(rig).suffix.lower().removeprefix(".") in READERS:
