@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.build import LAYOUT
-from marey.data.dataset import DATASET, INDEX, SETS, known_set, known_sets
+from marey.data.dataset import DATASET, INDEX, SETS, known_set, known_sets, read_dataset
 from marey.data.floor import levelled, on_floor
 from marey.data.index import parse_index, read_index
 from marey.data.licences import Terms, Tier, check_mix, tier_of
@@ -53,6 +53,12 @@ def test_a_folder_without_a_description_is_told_how_to_get_one(folder: Path) -> 
     (folder / DATASET).unlink()
     with pytest.raises(NotFound, match=r"no dataset\.toml"):
         CaptureSet.own(folder)
+
+
+def test_a_description_nested_too_deeply_is_refused(tmp_path: Path) -> None:
+    (tmp_path / DATASET).write_text("a = " + "[" * 100_000)
+    with pytest.raises(InvalidFile, match="is not TOML"):
+        read_dataset(tmp_path / DATASET)
 
 
 def test_a_file_that_the_index_lists_must_be_there(folder: Path) -> None:

@@ -90,7 +90,7 @@ def read_dataset(path: Path) -> Dataset:
     where = str(path)
     try:
         table: dict[str, Any] = tomllib.loads(read_bytes(path, limit=MAX_BYTES).decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InvalidFile(f"is not TOML: {error}", where=where) from None
     try:
         return Dataset.model_validate(table)
