@@ -128,6 +128,18 @@ def test_a_body_longer_than_it_says_is_not_taken_for_more(api: LiveApi) -> None:
         assert len(http.get("/v1/jobs").json()["items"]) == 1
 
 
+def test_a_request_with_two_lengths_is_refused_and_none_is_taken_from_behind_it(api: LiveApi) -> None:
+    """A proxy that heeds the length would take what follows for the body, the server for another request."""
+    behind = f"GET /livez HTTP/1.1\r\n{HOST}\r\n".encode()
+    for path in ("/v1/jobs", "/v1/motions/review"):
+        with RawClient(api.url) as client:
+            length = f"Content-Length: {5 + len(behind)}"
+            client.send(head(api, length, CHUNKED, path=path) + b"0\r\n\r\n" + behind)
+            answer = client.answer()
+        assert (answer.status, answer.headers["connection"], answer.ended) == (400, "close", True)
+        assert "both Content-Length and Transfer-Encoding" in answer.problem["detail"]
+
+
 def test_a_body_of_somebody_without_a_key_is_not_read(api: LiveApi) -> None:
     lines = f"POST /v1/jobs HTTP/1.1\r\n{HOST}{CHUNKED}\r\n\r\n".encode()
     chunk = b"%x\r\n" % MIB + b" " * MIB + b"\r\n"

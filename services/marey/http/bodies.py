@@ -15,7 +15,7 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from marey.core.errors import InvalidInput, MareyError, TooLarge, TooSlow
+from marey.core.errors import InvalidInput, MalformedRequest, MareyError, TooLarge, TooSlow
 from marey.core.spool import IN_MEMORY, Spool
 from marey.http.body_budget import BodyBudget
 from marey.http.problems import problem_response
@@ -29,6 +29,8 @@ SMALL_BODY = 2**16
 OTHER_BODIES = 64 * MAX_OTHER_BODY
 """Total bytes of larger bodies in memory. They are read before authentication."""
 NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
+TWO_LENGTHS = "the request gives both Content-Length and Transfer-Encoding"
+ONE_LENGTH = "Send one of them; a proxy between may have added the other."
 LARGE_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules", "/v1/rigs")
 """Paths of such bodies; their routes read them, after authentication."""
 MIN_RATE = 4096
@@ -131,6 +133,13 @@ class BodyGuard:
         """Pass the request on with its whole body, or refuse it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
+            return
+        if _has_two_lengths(scope):
+            answer = problem_response(
+                MalformedRequest("gives both Content-Length and Transfer-Encoding", hint=ONE_LENGTH)
+            )
+            answer.headers["connection"] = "close"
+            await answer(scope, receive, send)
             return
         incoming = Incoming(scope, receive, self.deadline)
         answer = _Answer(incoming, send)
@@ -282,6 +291,12 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
             yield part
     except ClientDisconnect:  # the client is gone, but this is no bug
         raise InvalidInput("the client disconnected before the end of the body", where="body") from None
+
+
+def _has_two_lengths(scope: Scope) -> bool:
+    """Return True if a proxy that heeds the other header would see another request behind this one."""
+    headers = Headers(scope=scope)
+    return "content-length" in headers and "transfer-encoding" in headers
 
 
 def _may_be_large(scope: Scope) -> bool:
