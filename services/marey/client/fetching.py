@@ -12,6 +12,7 @@ from typing import Any
 
 from marey.client.file_requests import made_file
 from marey.client.file_to_fetch import FORMAT, FileToFetch
+from marey.client.folder_lock import alone_in
 from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
@@ -37,6 +38,9 @@ Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
 
 class FetchObserver:
     """Callbacks of a fetch; each method does nothing by default."""
+
+    def waiting(self, folder: Path) -> None:
+        """Handle another fetch that writes into the folder; this one goes on when that has ended."""
 
     def planned(self, total: int) -> None:
         """Handle the number of files, which is known before the first is fetched."""
@@ -96,15 +100,15 @@ def fetch_job(
     wanted = [file for _, files in planned for file in files]
     for recipe in dict.fromkeys(file.making for file in wanted if file.making is not None):
         recipe.check()
-    check_folder(folder)
-    check_manifest(folder, overwrite=overwrite)
-    make_folders(folder, (file.path for file in wanted))
-    observer.planned(len(wanted))
-    with _part_on_error(folder, job, planned, observer, overwrite=overwrite) as note:
-        download_all(transport, wanted, overwrite=overwrite, done=note)
-    left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
-    if prune:
-        remove_left(folder, left)
+    with alone_in(check_folder(folder), lambda: observer.waiting(folder)):
+        check_manifest(folder, overwrite=overwrite)
+        make_folders(folder, (file.path for file in wanted))
+        observer.planned(len(wanted))
+        with _part_on_error(folder, job, planned, observer, overwrite=overwrite) as note:
+            download_all(transport, wanted, overwrite=overwrite, done=note)
+        left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
+        if prune:
+            remove_left(folder, left)
     if left:
         observer.left_over(left, removed=prune)
     return planned

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from marey.client.fetching import check_folder, download_all
 from marey.client.file_requests import format_of, made_file
 from marey.client.file_to_fetch import FORMAT, FileToFetch
+from marey.client.folder_lock import alone_in
 from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
 from marey.client.resources import Resource, identifier, identifiers
 from marey.client.rigs import Rigs
@@ -212,7 +213,8 @@ class Motions(Resource):
             _download(motion, file_format, place / f"{motion.id}.{extension_of(file_format)}", export)
             for motion in motions
         ]
-        download_all(self._transport, downloads, overwrite=overwrite, done=lambda _: None)
+        with alone_in(place):
+            download_all(self._transport, downloads, overwrite=overwrite, done=lambda _: None)
         return [download.path for download in downloads]
 
     def _check(self, export: ExportOptions) -> None:

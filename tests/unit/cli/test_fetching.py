@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from marey.client.fetching import ATTEMPTS, BLOCK, download_all, plan
+from marey.client.fetching import ATTEMPTS, BLOCK, FetchObserver, download_all, fetch_job, plan
 from marey.client.file_to_fetch import FileToFetch
+from marey.client.folder_lock import alone_in
 from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
@@ -70,3 +71,42 @@ def test_no_more_is_read_than_the_size_that_was_told(tmp_path: Path, endless: st
         download_all(client, [wanted], overwrite=False, done=lambda _: None)
     assert list(tmp_path.iterdir()) == []
     assert Endless.sent < ATTEMPTS * 100 * BLOCK
+
+
+class Empty(BaseHTTPRequestHandler):
+    """Answers every listing with no items."""
+
+    def do_GET(self) -> None:
+        body = b'{"items": [], "next": null}'
+        self.send_response(200)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_fetch_waits_for_another_one_into_the_folder(tmp_path: Path) -> None:
+    waits = threading.Event()
+
+    class Observer(FetchObserver):
+        def waiting(self, folder: Path) -> None:
+            assert folder == tmp_path
+            waits.set()
+
+    http = ThreadingHTTPServer(("127.0.0.1", 0), Empty)
+    threading.Thread(target=http.serve_forever, args=(0.05,), daemon=True).start()
+    with Transport(Server(f"http://127.0.0.1:{http.server_port}", "key")) as transport:
+        second = threading.Thread(target=fetch_job, args=(transport, "j", tmp_path), kwargs={"observer": Observer()})
+        with alone_in(tmp_path):
+            second.start()
+            assert waits.wait(20)
+            second.join(0.2)
+            assert second.is_alive()
+            assert list(tmp_path.iterdir()) == []
+        second.join(20)
+    http.shutdown()
+    http.server_close()
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.csv"]

@@ -123,6 +123,9 @@ def fetch_job(
     with ExitStack() as stack:
 
         class Observer(FetchObserver):
+            def waiting(self, folder: Path) -> None:
+                console.say(f"{shown}: another fetch writes into this folder; waiting for its end.")
+
             def planned(self, total: int) -> None:
                 self.bar = stack.enter_context(console.bar())
                 self.task = self.bar.add_task("fetching", total=total)
