@@ -167,6 +167,13 @@ def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: h
             )
 
 
+def test_a_parameter_of_one_value_is_given_once(http: httpx2.Client) -> None:
+    assert refusal(http.get("/v1/jobs?limit=5&limit=6")) == (422, "limit")
+    assert refusal(http.get(f"/v1/motions/{NOBODY}/files/bvh?fps=30&fps=60")) == (422, "fps")
+    assert http.get("/v1/motions?tag=a&tag=b&review=kept&review=new").status_code == 200
+    assert http.get("/v1/jobs?state=queued&state=failed").status_code == 200
+
+
 def test_a_misspelt_filter_is_told_with_those_there_are(http: httpx2.Client) -> None:
     response = http.get("/v1/motions", params={"tags": "show=zzz"})
     assert refusal(response) == (422, "tags")

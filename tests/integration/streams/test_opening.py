@@ -49,7 +49,17 @@ def test_a_socket_that_cannot_be_opened_is_closed_with_a_code_that_says_why(
     assert close_code(api, stream, new_key(api, "submit")) == 4403
     assert close_code(api, str(uuid4()), secret) == 4404
     assert close_code(api, "nothing", secret) == 4404
-    for query in ("from=-1", "from=x", "from=1.5", "from=4294967296", "from=１", "slow=stop", "slow=", "form=5"):
+    for query in (
+        "from=-1",
+        "from=x",
+        "from=1.5",
+        "from=4294967296",
+        "from=１",
+        "slow=stop",
+        "slow=",
+        "form=5",
+        "from=1&from=2",
+    ):
         assert close_code(api, f"{stream}?{query}", secret) == 4422, query
 
 

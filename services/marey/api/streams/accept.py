@@ -91,6 +91,8 @@ def _check_names(query: QueryParams) -> None:
     for name in query:
         if name not in QUERY:
             raise InvalidInput(f"unknown parameter {name[:40]!r}; known: {', '.join(QUERY)}", where="query")
+        if len(query.getlist(name)) > 1:
+            raise InvalidInput("is given twice", where=name, hint="Give it once.")
 
 
 def first_frame(given: str | None) -> int:
