@@ -55,6 +55,16 @@ def test_a_bundle_without_actions_says_so(
     assert "actions      not listed" in capsys.readouterr().out
 
 
+def test_a_folder_is_shown_from_this_machine_though_a_server_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_bundle(tmp_path)
+    monkeypatch.setenv("MAREY_SERVER", "http://127.0.0.1:1")
+    monkeypatch.setenv("MAREY_KEY", "marey_key")
+    models.show(str(tmp_path / BUNDLE))
+    assert BUNDLE in capsys.readouterr().out
+
+
 def test_broken_bundles_are_told_beside_the_list(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

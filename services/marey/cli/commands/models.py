@@ -44,7 +44,8 @@ def show(
     as_json: console.Json = False,
 ) -> None:
     """Show one bundle: the actions that it supports, terms, data and settings; figures with --metrics."""
-    found = _local_model(name) if local or not _server_named() else _server_model(name)
+    here = local or "/" in name or not _server_named()  # a folder is one of this machine
+    found = _local_model(name) if here else _server_model(name)
     if as_json:
         console.result_json(found)
         return
