@@ -47,6 +47,9 @@ ACTION_WEIGHT = 4.0
 """Weight of the actions of clauses beside that of the cuts."""
 SURE = 0.4
 """Probability that each movement of a sequence has at least."""
+FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
+SEAT = frozenset({"sit", "sit-down", "drive"})
+"""Actions that end on the floor, and on a seat: whoever "gets up" or "stands up" then does so from there."""
 PLAIN = 0.5
 """Probability from which on the action of a clause is said in plain words."""
 
@@ -157,7 +160,7 @@ class SequenceReader:
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
-        return tuple(map(_movement, groups))
+        return tuple(_risen_from_there(list(map(_movement, groups))))
 
     def _clauses(
         self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
@@ -271,6 +274,19 @@ def _merged(groups: Sequence[list[Clause]]) -> list[list[Clause]]:
         else:
             merged.append(group)
     return merged
+
+
+def _risen_from_there(movements: Sequence[Movement]) -> Iterator[Movement]:
+    """Yield movements; those that stand up do so from where the movement before has ended."""
+    before: str | None = None
+    for movement in movements:
+        action = movement.action
+        if action == "stand-up" and before in FLOOR:
+            action = "get-up"
+        elif action == "get-up" and before in SEAT:
+            action = "stand-up"
+        yield Movement(movement.text, action)
+        before = action
 
 
 def _movement(group: Sequence[Clause]) -> Movement:

@@ -52,6 +52,8 @@ def test_it_knows_every_action_and_the_shipped_encoder() -> None:
         ("before sitting down she waves at the crowd", ["wave", "sit-down"]),
         ("he claps after a deep bow", ["bow", "clap"]),
         ("jog -> jump -> cheer", ["run", "jump", "cheer"]),
+        ("The knight kneels, then stands up and bows.", ["kneel", "get-up", "bow"]),
+        ("she sits on a chair for a bit, then gets up and leaves", ["sit", "stand-up", "walk"]),
         ("A kid dances. Then he lies down on the floor.", ["dance", "lie-down"]),
     ],
 )

@@ -1,8 +1,8 @@
 """Texts that the reader of actions learns from: sentences that ask for one action, for several, and for none.
 
 One action: the sentences of `sayings.toml`, the vocabulary's own words, and the captions of known sets whose terms
-allow commercial use. Several: two and three of these, joined, and `several.toml`, which also has texts of one action that
-sound like several. None: `outside.toml`. The authors of the two files saw the definitions and no prompts.
+allow commercial use. Several: two and three of these, joined, and `several.toml`, which also has texts of one action
+that sound like several. None: `outside.toml`. The authors of the two files saw the definitions and no prompts.
 """
 
 from __future__ import annotations
