@@ -30,7 +30,7 @@ from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_plain_action
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
-from marey.text.sequence_reader import Movement, sequence_reader
+from marey.text.sequence_reader import ReadMovement, sequence_reader
 from marey.text.words import EDGE_PUNCTUATION
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4
 
 @dataclass(frozen=True)
 class _Reading:
-    """What a prompt asks for.
+    """The text that is read for a prompt, and its movements.
 
     Attributes:
         worded: the text that the model reads.
@@ -51,7 +51,7 @@ class _Reading:
     """
 
     worded: str
-    movements: tuple[Movement, ...] = ()
+    movements: tuple[ReadMovement, ...] = ()
 
 
 class TextPipeline:
@@ -211,7 +211,7 @@ class TextPipeline:
             for prompt, rewrite, reading, (graph, actions) in zip(checked, rewritten, readings, read, strict=True)
         ]
 
-    def _movements(self, movements: Sequence[Movement]) -> tuple[TextFeatures, ...]:
+    def _movements(self, movements: Sequence[ReadMovement]) -> tuple[TextFeatures, ...]:
         """Return the features of each movement of a sequence, which is one action."""
         graphs = self._graphs([with_plain_action(each.text, each.action) for each in movements])
         return tuple(
@@ -234,7 +234,7 @@ class TextPipeline:
             return _Reading(text, movements)
         return _Reading(with_plain_action(text, read.action))
 
-    def _movements_in(self, text: str, action: str | None) -> tuple[Movement, ...]:
+    def _movements_in(self, text: str, action: str | None) -> tuple[ReadMovement, ...]:
         with self._lock:
             encoding = self.encoder.encode(text)
         return sequence_reader().read(text, encoding, self.pooled, action)

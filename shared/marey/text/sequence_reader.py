@@ -49,7 +49,7 @@ SURE = 0.4
 """Probability that each movement of a sequence has at least."""
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
-"""Actions that end on the floor, and on a seat: whoever "gets up" or "stands up" then does so from there."""
+"""Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""
 PLAIN = 0.5
 """Probability from which on the action of a clause is said in plain words."""
 
@@ -75,7 +75,7 @@ Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Movement:
+class ReadMovement:
     """One movement of a prompt.
 
     Attributes:
@@ -88,7 +88,7 @@ class Movement:
 
 
 @dataclass(frozen=True)
-class Clause:
+class ReadClause:
     """A part of a prompt with what it asks for.
 
     Attributes:
@@ -139,12 +139,12 @@ class SequenceReader:
         encoding: Encoding,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
         action: str | None = None,
-    ) -> tuple[Movement, ...]:
+    ) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
         other, or that is in doubt.
 
         Standing still beside the one action that a prompt is taken for is no movement, and prompts that say what is not
-        done are not taken apart.
+        done are not split.
 
         Args:
             prompt: as `check_prompt` returns it.
@@ -164,7 +164,7 @@ class SequenceReader:
 
     def _clauses(
         self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
-    ) -> list[Clause]:
+    ) -> list[ReadClause]:
         """Return the likeliest clauses of a prompt, as they are written."""
         begins, at_once = self.beginnings(encoding.tokens)
         places = [place for place in _word_starts(prompt, encoding.offsets) if begins[place] > LEAST_CUT]
@@ -178,12 +178,12 @@ class SequenceReader:
         ]
         shares = dict(zip(spans, self.actions(np.stack(rows)), strict=True))
         cuts = _likeliest([float(begins[place]) for place in places], shares)
-        found: list[Clause] = []
+        found: list[ReadClause] = []
         for low, high in itertools.pairwise(cuts):
             best = int(shares[low, high].argmax())
             together = low > 0 and bool(at_once[places[low - 1]])
             text = prompt[edges[low] : edges[high]].strip()
-            found.append(Clause(self.classes[best], float(shares[low, high][best]), text, together))
+            found.append(ReadClause(self.classes[best], float(shares[low, high][best]), text, together))
         return found
 
     def beginnings(self, states: Float32) -> tuple[Float32, NDArray[np.bool_]]:
@@ -238,13 +238,13 @@ def without_joints(text: str) -> str:
     return bare or text.strip()
 
 
-def in_order(clauses: Sequence[Clause]) -> list[list[Clause]]:
+def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
     """Return clauses in groups, in the order of time; those of a group come at once.
 
     Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
     down" and "before leaving, he bows" are told in the other order.
     """
-    groups: list[list[Clause]] = []
+    groups: list[list[ReadClause]] = []
     at = 0
     for before, clause in zip([None, *clauses], clauses, strict=False):
         if clause.name == CONTEXT:
@@ -264,19 +264,19 @@ def in_order(clauses: Sequence[Clause]) -> list[list[Clause]]:
     return _merged(groups)
 
 
-def _merged(groups: Sequence[list[Clause]]) -> list[list[Clause]]:
-    merged: list[list[Clause]] = []
+def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
+    merged: list[list[ReadClause]] = []
     for group in groups:
         last = merged[-1] if merged else []
         if len(group) == len(last) == 1 and group[0].name == last[0].name:
             surer = max(group[0].probability, last[0].probability)
-            merged[-1] = [Clause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
+            merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
         else:
             merged.append(group)
     return merged
 
 
-def _risen_from_there(movements: Sequence[Movement]) -> Iterator[Movement]:
+def _risen_from_there(movements: Sequence[ReadMovement]) -> Iterator[ReadMovement]:
     """Yield movements; those that stand up do so from where the movement before has ended."""
     before: str | None = None
     for movement in movements:
@@ -285,14 +285,14 @@ def _risen_from_there(movements: Sequence[Movement]) -> Iterator[Movement]:
             action = "get-up"
         elif action == "get-up" and before in SEAT:
             action = "stand-up"
-        yield Movement(movement.text, action)
+        yield ReadMovement(movement.text, action)
         before = action
 
 
-def _movement(group: Sequence[Clause]) -> Movement:
+def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     text = without_joints(" ".join(clause.text for clause in group))
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
-    return Movement(text, group[0].name if single else None)
+    return ReadMovement(text, group[0].name if single else None)
 
 
 def _word_starts(prompt: str, offsets: Sequence[tuple[int, int]]) -> Iterator[int]:

@@ -28,7 +28,7 @@ def generator(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return load("hgm3", tmp_path_factory.mktemp("models"))
 
 
-def told(generator: Any) -> TextFeatures:
+def prompt_of(generator: Any) -> TextFeatures:
     width = generator.limits.text_width
     return replace(text_of(PROMPT, width), movements=tuple(text_of(part, width) for part in PARTS))
 
@@ -41,14 +41,14 @@ def alone(generator: Any, request: Request) -> list[int]:
 
 
 def test_each_movement_is_a_row_as_long_as_it_is_alone(generator: Any) -> None:
-    request = resolve_request(generator, Request(told(generator), 3))
+    request = resolve_request(generator, Request(prompt_of(generator), 3))
     assert request.timeline is not None
     assert [row.text.prompt for row in request.timeline] == [*PARTS]
     assert request.timeline[0].start == 0
     assert [row.end for row in request.timeline[:-1]] == [row.start for row in request.timeline[1:]]
-    other = resolve_request(generator, Request(told(generator), 4))
+    other = resolve_request(generator, Request(prompt_of(generator), 4))
     assert min(alone(generator, request)) >= generator.limits.min_frames
-    assert alone(generator, resolve_request(generator, Request(told(generator), 3))) == alone(generator, request)
+    assert alone(generator, resolve_request(generator, Request(prompt_of(generator), 3))) == alone(generator, request)
     (made,) = generate_any(generator, [request])
     (again, *_) = generate_any(generator, [request, other])
     assert made is not None
@@ -58,43 +58,43 @@ def test_each_movement_is_a_row_as_long_as_it_is_alone(generator: Any) -> None:
 
 
 def test_rows_share_the_length_that_is_asked_for(generator: Any) -> None:
-    request = resolve_request(generator, Request(told(generator), 3, frames=120))
+    request = resolve_request(generator, Request(prompt_of(generator), 3, frames=120))
     assert sum(alone(generator, request)) == 120
-    free = alone(generator, resolve_request(generator, Request(told(generator), 3)))
+    free = alone(generator, resolve_request(generator, Request(prompt_of(generator), 3)))
     ratios = np.array(alone(generator, request)) / np.array(free)
     assert np.ptp(ratios) < 0.1
 
 
 def test_what_is_too_short_for_its_movements_stays_one_text(generator: Any) -> None:
-    request = resolve_request(generator, Request(told(generator), 3, frames=40))
+    request = resolve_request(generator, Request(prompt_of(generator), 3, frames=40))
     assert (request.timeline, request.frames) == (None, 40)
 
 
 def test_a_length_out_of_range_is_refused_as_ever(generator: Any) -> None:
     with pytest.raises(InvalidInput, match="out of range"):
-        resolve_request(generator, Request(told(generator), 3, frames=4000))
+        resolve_request(generator, Request(prompt_of(generator), 3, frames=4000))
 
 
 def test_a_model_that_cannot_generate_around_frames_reads_one_text(
     generator: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(generator, "limits", replace(generator.limits, keeps=0))
-    assert resolve_request(generator, Request(told(generator), 3)).timeline is None
+    assert resolve_request(generator, Request(prompt_of(generator), 3)).timeline is None
 
 
 def test_rows_of_a_timeline_and_motions_on_a_path_are_one_text_each(generator: Any) -> None:
     rows = timeline_rows(read_timeline(f"0-4 {PROMPT.replace(';', ',')}; 4-6 a person bows"))
-    request = timeline_request(rows, [told(generator), told(generator)], 3, None)
+    request = timeline_request(rows, [prompt_of(generator), prompt_of(generator)], 3, None)
     resolved = resolve_request(generator, request)
     assert resolved.timeline is not None
     assert len(resolved.timeline) == 2
     path = [{"type": "root_path", "frames": [0, 60], "positions_xz": [[0.0, 0.0], [0.0, 3.0]]}]
-    assert constrained_request(generator, Request(told(generator), 3), path, None, None).timeline is None
+    assert constrained_request(generator, Request(prompt_of(generator), 3), path, None, None).timeline is None
 
 
 def test_the_manifest_tells_the_prompt_as_it_was_written_and_the_rows(generator: Any) -> None:
     settings = generator.settings({})
-    request = resolve_request(generator, Request(told(generator), 3))
+    request = resolve_request(generator, Request(prompt_of(generator), 3))
     (made,) = generate_any(generator, [request], settings)
     assert made is not None
     manifest = finish(generator, request, made, settings).manifest
@@ -107,7 +107,7 @@ def test_the_manifest_tells_the_prompt_as_it_was_written_and_the_rows(generator:
 
 
 def test_candidates_are_drawn_of_each_movement(generator: Any) -> None:
-    request = resolve_request(generator, Request(told(generator), 3))
+    request = resolve_request(generator, Request(prompt_of(generator), 3))
     (clip,) = best_clips(generator, [request], generator.settings({}), DrawPlan(None, 2, 0))
     assert clip is not None
     assert clip.manifest["prompt"] == PROMPT

@@ -18,8 +18,8 @@ from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
     CONTEXT,
     MOST_CUTS,
-    Clause,
-    Movement,
+    ReadClause,
+    ReadMovement,
     SequenceReader,
     in_order,
     sequence_reader,
@@ -30,13 +30,13 @@ from tests.support.texts import shared_encoder, shared_pipeline
 
 
 @pytest.fixture(scope="module")
-def told() -> TextPipeline:
+def reading() -> TextPipeline:
     pipeline = shared_pipeline()
     spec = pipeline.spec.model_copy(update={"plain_action": True, "movements": True})
     return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
 
 
-def read(prompt: str) -> tuple[Movement, ...]:
+def read(prompt: str) -> tuple[ReadMovement, ...]:
     return sequence_reader().read(prompt, shared_encoder().encode(prompt), shared_encoder().pooled)
 
 
@@ -76,23 +76,20 @@ def test_three_of_four_development_prompts_are_read_right() -> None:
     assert np.mean(right) >= 0.7
 
 
-def test_few_other_prompts_are_taken_apart(told: TextPipeline) -> None:
-    single = told.features([prompt.text for prompt in development_prompts()][::4])
-    outside = told.features(outside_prompts()[::2])
+def test_few_other_prompts_are_split(reading: TextPipeline) -> None:
+    single = reading.features([prompt.text for prompt in development_prompts()][::4])
+    outside = reading.features(outside_prompts()[::2])
     assert np.mean([bool(each.movements) for each in single]) <= 0.1
     assert np.mean([bool(each.movements) for each in outside]) <= 0.15
 
 
-def clauses(*told: str) -> list[Clause]:
-    return [Clause(name, 0.9, text.strip(), at_once=text.startswith("&")) for name, _, text in map(split, told)]
-
-
-def split(told: str) -> tuple[str, str, str]:
-    return told.partition(":")
+def clauses(*written: str) -> list[ReadClause]:
+    named = [each.partition(":") for each in written]
+    return [ReadClause(name, 0.9, text.strip(), at_once=text.startswith("&")) for name, _, text in named]
 
 
 @pytest.mark.parametrize(
-    ("told", "groups"),
+    ("written", "groups"),
     [
         (["walk:he walks", "bow:and bows"], [["walk"], ["bow"]]),
         (["bow:he bows", "sit:after sitting", "wave:then waves"], [["sit"], ["bow"], ["wave"]]),
@@ -106,32 +103,32 @@ def split(told: str) -> tuple[str, str, str]:
         (["hop:hops", "hop:and hops again", "bow:then bows"], [["hop"], ["bow"]]),
     ],
 )
-def test_the_order_of_time(told: list[str], groups: list[list[str]]) -> None:
-    assert [[clause.name for clause in group] for group in in_order(clauses(*told))] == groups
+def test_the_order_of_time(written: list[str], groups: list[list[str]]) -> None:
+    assert [[clause.name for clause in group] for group in in_order(clauses(*written))] == groups
 
 
 def test_a_long_list_of_clauses_is_read_in_bounded_time() -> None:
     assert len(read(", then he waves, then he bows" * 40)) <= MOST_CUTS + 1
 
 
-def test_a_bundle_says_whether_its_prompts_are_read_so(told: TextPipeline) -> None:
+def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) -> None:
     prompt = "she bows low, then strolls off"
-    (features,) = told.features([prompt])
+    (features,) = reading.features([prompt])
     assert [each.prompt for each in features.movements] == ["she bows low", "strolls off"]
     assert features.movements[1].rewritten == "a person walks, strolls off"
     assert features.rewritten == prompt
-    (parsed,) = told.explain([prompt])
+    (parsed,) = reading.explain([prompt])
     assert parsed.to_json()["movements"] == [each.rewritten for each in features.movements]
-    plain = told.spec.model_copy(update={"movements": False})
-    assert feature_key(prompt, plain) != feature_key(prompt, told.spec)
+    plain = reading.spec.model_copy(update={"movements": False})
+    assert feature_key(prompt, plain) != feature_key(prompt, reading.spec)
     assert "movements" not in TextSpec().model_dump()
     with pytest.raises(ValueError, match="needs plain_action"):
         TextSpec(movements=True)
 
 
-def test_one_action_is_one_text(told: TextPipeline) -> None:
+def test_one_action_is_one_text(reading: TextPipeline) -> None:
     prompts = ["The waiter takes a bow", "a person waves both arms high over the head, left and right"]
-    assert [each.movements for each in told.features(prompts)] == [(), ()]
+    assert [each.movements for each in reading.features(prompts)] == [(), ()]
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ _REQUESTS = ("please ", "can you do ", "I need ", "make him ", "just ")
 
 
 @dataclass(frozen=True)
-class Part:
+class TextPart:
     """A part of a prompt.
 
     Attributes:
@@ -54,7 +54,7 @@ class Part:
 class PartedText:
     """A prompt in parts."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[TextPart, ...]
     weight: float
 
     @property
@@ -150,19 +150,19 @@ def parted_texts(seed: int) -> list[PartedText]:
     texts = [
         *(PartedText(parts, WRITTEN) for parts in written_parts()),
         *_made(single, seed),
-        *(PartedText((Part(each.text, each.asks),), SINGLE * each.weight) for each in single),
+        *(PartedText((TextPart(each.text, each.asks),), SINGLE * each.weight) for each in single),
     ]
     unseen = held_out()
     return [each for each in texts if each.text.casefold() not in unseen]
 
 
-def written_parts() -> Iterator[tuple[Part, ...]]:
+def written_parts() -> Iterator[tuple[TextPart, ...]]:
     """Yield the texts of `several.toml` in parts."""
     for text, asks in several_texts():
         marks = [ask.partition("#")[0] for ask in asks.split()]
         pieces = text.split("|")
         yield tuple(
-            Part(piece, {"-": CONTEXT, "?": OUTSIDE}.get(mark.lstrip("&"), mark.lstrip("&")), mark.startswith("&"))
+            TextPart(piece, {"-": CONTEXT, "?": OUTSIDE}.get(mark.lstrip("&"), mark.lstrip("&")), mark.startswith("&"))
             for piece, mark in zip(pieces, marks, strict=True)
         )
 
@@ -237,26 +237,26 @@ class _Speaker:
         return self.rng.choice(("he", "she")) if self._subject or self.rng.random() < 0.7 else ""
 
 
-def _joined(speaker: _Speaker) -> list[Part]:
+def _joined(speaker: _Speaker) -> list[TextPart]:
     actions = speaker.actions()
     (joint,) = speaker.rng.choices(_JOINTS, _WEIGHTS)
-    parts = [Part(joint.first + speaker.say(actions[0], joint.forms[0], first=joint.forms[0] != "g"), actions[0])]
+    parts = [TextPart(joint.first + speaker.say(actions[0], joint.forms[0], first=joint.forms[0] != "g"), actions[0])]
     for number, action in enumerate(actions[1:]):
         if number:
             (joint,) = speaker.rng.choices(_LATER, _LATER_WEIGHTS)
         said = speaker.say(action, joint.forms[1], first=number == 0 and joint.forms[0] == "g")
         said = f"{said[:1].upper()}{said[1:]}" if joint.ends == "." and joint.between == " " else said
-        parts[-1] = Part(parts[-1].text + joint.ends, parts[-1].asks, parts[-1].at_once)
-        parts.append(Part(joint.between + said, action, joint.at_once))
+        parts[-1] = TextPart(parts[-1].text + joint.ends, parts[-1].asks, parts[-1].at_once)
+        parts.append(TextPart(joint.between + said, action, joint.at_once))
     return parts
 
 
-def _finished(parts: list[Part], rng: random.Random) -> list[Part]:
+def _finished(parts: list[TextPart], rng: random.Random) -> list[TextPart]:
     """Write parts as a sentence, as a request, or as they are."""
     first, last = parts[0], parts[-1]
     if rng.random() < _SENTENCE:
-        parts[-1] = Part(f"{last.text}.", last.asks, last.at_once)
-        parts[0] = Part(f"{first.text[:1].upper()}{first.text[1:]}", first.asks)
+        parts[-1] = TextPart(f"{last.text}.", last.asks, last.at_once)
+        parts[0] = TextPart(f"{first.text[:1].upper()}{first.text[1:]}", first.asks)
     elif rng.random() < _ASKED:
-        parts[0] = Part(rng.choice(_REQUESTS) + first.text, first.asks)
+        parts[0] = TextPart(rng.choice(_REQUESTS) + first.text, first.asks)
     return parts
