@@ -27,6 +27,7 @@ from marey.core.errors import InvalidFile
 from marey.core.hashing import sha256_of
 from marey.text.action_reader import OUTSIDE, STANDING, named_actions
 from marey.text.encoders import Encoding
+from marey.text.plain_action import TURNING
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
@@ -50,6 +51,8 @@ SURE = 0.4
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
 """Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""
+TURNS = frozenset({TURNING, "walk", "run"})
+"""What a prompt names that asks for a turn while walking or running."""
 PLAIN = 0.5
 """Probability from which on the action of a clause is said in plain words."""
 
@@ -143,8 +146,8 @@ class SequenceReader:
         """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
         other, or that is in doubt.
 
-        Standing still beside the one action that a prompt is taken for is no movement, and prompts that say what is not
-        done are not split.
+        Standing still beside the one action that a prompt is taken for is no movement, nor is the way before a turn.
+        Prompts that say what is not done are not split.
 
         Args:
             prompt: as `check_prompt` returns it.
@@ -156,7 +159,7 @@ class SequenceReader:
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
-        if action is not None and len({clause.name for clause in clauses} - {STANDING}) < 2:
+        if _is_one_action({clause.name for clause in clauses}, action):
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
@@ -274,6 +277,13 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
         else:
             merged.append(group)
     return merged
+
+
+def _is_one_action(names: set[str], action: str | None) -> bool:
+    """Return True if clauses with these names are one action: "stands and waves" of a prompt that is taken for one, and
+    "walks ahead, then veers off", since who turns walks."""
+    moving = names - {STANDING}
+    return (TURNING in moving and moving <= TURNS) or (action is not None and len(moving) < 2)
 
 
 def _risen_from_there(movements: Sequence[ReadMovement]) -> Iterator[ReadMovement]:

@@ -127,8 +127,12 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) ->
 
 
 def test_one_action_is_one_text(reading: TextPipeline) -> None:
-    prompts = ["The waiter takes a bow", "a person waves both arms high over the head, left and right"]
-    assert [each.movements for each in reading.features(prompts)] == [(), ()]
+    prompts = [
+        "The waiter takes a bow",
+        "a person waves both arms high over the head, left and right",
+        "he walks forward, then turns left around the corner",
+    ]
+    assert [each.movements for each in reading.features(prompts)] == [(), (), ()]
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:
