@@ -52,7 +52,7 @@ FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "p
 SEAT = frozenset({"sit", "sit-down", "drive"})
 """Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""
 TURNS = frozenset({TURNING, "walk", "run"})
-"""Actions that a prompt names which asks for a turn while walking or running."""
+"""Actions that a prompt for a turn while walking or running names."""
 PLAIN = 0.5
 """Probability from which on the action of a clause is said in plain words."""
 
