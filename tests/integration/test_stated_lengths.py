@@ -24,7 +24,7 @@ def test_the_motion_has_the_length_of_the_words(tmp_path: Path) -> None:
     assert part["frames"] != 40
     for said in (
         "1 of 3 prompts, index 1 (from 0), 'a person waves for a minute': a stated length is not used: it is out of",
-        "1 of 3 prompts, index 2 (from 0), 'waves, then walks for two seconds': a stated length is not used: it is",
+        "1 of 3 prompts, index 2 (from 0), 'waves, then walks for two seconds': a stated length is that of a part",
     ):
         assert said in ran.err
 
