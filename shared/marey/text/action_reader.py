@@ -7,20 +7,16 @@ of several, and on those that no action covers: `python -m marey.reading.train` 
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
-from safetensors import safe_open
 
-from marey.core.errors import InvalidFile
 from marey.core.hashing import sha256_of
+from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
@@ -38,8 +34,6 @@ _JOINTS = re.compile(
     r"\b(?:then|after|afterwards?|before|until|till|followed|next|finally|first|lastly?|once|having)\b|->|→|>|\+|;"
 )
 """Words and signs that put one action before another."""
-
-Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -62,34 +56,13 @@ class ReadAction:
         return None if self.name in (SEVERAL, OUTSIDE) or self.probability < self.least else self.name
 
 
-class ActionReader:
-    """The network: two layers, on what `inputs_of` returns.
+class ActionReader(Reader):
+    """The network: two layers, on what `inputs_of` returns. Its classes are the ids of the vocabulary's actions,
+    `SEVERAL` and `OUTSIDE`."""
 
-    Attributes:
-        classes: ids of the vocabulary's actions, `SEVERAL`, `OUTSIDE`.
-        encoder_sha256: hash of the encoder whose sentence vectors it reads.
-    """
-
-    def __init__(
-        self, classes: Sequence[str], encoder_sha256: str, weights: Mapping[str, NDArray[np.floating]]
-    ) -> None:
-        self.classes = tuple(classes)
-        self.encoder_sha256 = encoder_sha256
-        self._weights = {name: np.asarray(tensor, np.float32) for name, tensor in weights.items()}
-
-    @classmethod
-    def load(cls, path: Path = FILE) -> ActionReader:
-        """Load the reader.
-
-        Raises:
-            InvalidFile: it has other tensors.
-        """
-        with cast("Any", safe_open)(path, framework="np") as file:
-            facts: dict[str, str] = file.metadata() or {}
-            weights: dict[str, Float32] = {name: file.get_tensor(name) for name in sorted(file.keys())}
-        if set(weights) != {"hidden", "hidden_bias", "out", "out_bias"}:
-            raise InvalidFile("is not a reader of actions", where=str(path))
-        return cls(json.loads(facts["classes"]), facts["encoder_sha256"], weights)
+    file = FILE
+    reads = "actions"
+    tensors = frozenset({"hidden", "hidden_bias", "out", "out_bias"})
 
     def read(self, prompt: str, vector: Float32) -> ReadAction:
         """Return what a prompt asks for.

@@ -131,7 +131,7 @@ class TextPipeline:
                 graph,
                 self._rewrite_reason(prompt, rewrite, reading.worded, graph),
                 self._warnings(graph),
-                tuple(with_plain_action(each.text, each.action) for each in reading.movements),
+                tuple(each.worded for each in reading.movements),
             )
             for prompt, rewrite, reading, graph in zip(checked, rewritten, readings, graphs, strict=True)
         ]
@@ -213,7 +213,7 @@ class TextPipeline:
 
     def _movements(self, movements: Sequence[ReadMovement]) -> tuple[TextFeatures, ...]:
         """Return the features of each movement of a sequence, which is one action."""
-        graphs = self._graphs([with_plain_action(each.text, each.action) for each in movements])
+        graphs = self._graphs([each.worded for each in movements])
         return tuple(
             self._features(each.text, graph, (graph.text,)) for each, graph in zip(movements, graphs, strict=True)
         )

@@ -2,32 +2,28 @@
 
 A convolution over the token states of the sentence encoder finds where movements may begin, and a second network reads
 the action of each clause that these cuts make, from the clause's own sentence vector, its words and the states around
-it.
-The cuts that both find likeliest together are taken. `python -m marey.reading.train_sequences` makes
+it. The cuts that both find likeliest together are taken. `python -m marey.reading.train_sequences` makes
 `sequence_reader.safetensors` anew.
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import safe_open
 
-from marey.core.errors import InvalidFile
 from marey.core.hashing import sha256_of
 from marey.text.action_reader import OUTSIDE, STANDING, named_actions
 from marey.text.encoders import Encoding
-from marey.text.plain_action import TURNING
+from marey.text.plain_action import TURNING, with_plain_action
+from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
@@ -74,8 +70,6 @@ _JOINING = re.compile(
 )
 """Words and signs at the beginning of a clause that join it to others."""
 
-Float32 = NDArray[np.float32]
-
 
 @dataclass(frozen=True)
 class ReadMovement:
@@ -88,6 +82,11 @@ class ReadMovement:
 
     text: str
     action: str | None
+
+    @property
+    def worded(self) -> str:
+        """Its text as the model reads it, behind its action in plain words."""
+        return with_plain_action(self.text, self.action)
 
 
 @dataclass(frozen=True)
@@ -107,34 +106,14 @@ class ReadClause:
     at_once: bool = False
 
 
-class SequenceReader:
-    """Both networks.
+class SequenceReader(Reader):
+    """Both networks. Their classes are the ids of the vocabulary's actions, `OUTSIDE` and `CONTEXT`."""
 
-    Attributes:
-        classes: ids of the vocabulary's actions, `OUTSIDE`, `CONTEXT`.
-        encoder_sha256: hash of the encoder whose states it reads.
-    """
-
-    def __init__(
-        self, classes: Sequence[str], encoder_sha256: str, weights: Mapping[str, NDArray[np.floating]]
-    ) -> None:
-        self.classes = tuple(classes)
-        self.encoder_sha256 = encoder_sha256
-        self._weights = {name: np.asarray(tensor, np.float32) for name, tensor in weights.items()}
-
-    @classmethod
-    def load(cls, path: Path = FILE) -> SequenceReader:
-        """Load the reader.
-
-        Raises:
-            InvalidFile: it has other tensors.
-        """
-        with cast("Any", safe_open)(path, framework="np") as file:
-            facts: dict[str, str] = file.metadata() or {}
-            weights: dict[str, Float32] = {name: file.get_tensor(name) for name in sorted(file.keys())}
-        if set(weights) != set(TENSORS):
-            raise InvalidFile("is not a reader of sequences", where=str(path))
-        return cls(json.loads(facts["classes"]), facts["encoder_sha256"], weights)
+    file = FILE
+    reads = "sequences"
+    tensors = frozenset(
+        f"{name}{end}" for name in ("states", "first", "second", "begins", "hidden", "out") for end in ("", "_bias")
+    )
 
     def read(
         self,
@@ -163,7 +142,7 @@ class SequenceReader:
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
-        return tuple(_risen_from_there(list(map(_movement, groups))))
+        return tuple(_risen_from_there(map(_movement, groups)))
 
     def _clauses(
         self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
@@ -207,11 +186,6 @@ class SequenceReader:
         scores = hidden @ weights["out"].T + weights["out_bias"]
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return (shares / shares.sum(axis=1, keepdims=True))[:, : len(self.classes)]
-
-
-TENSORS = tuple(
-    f"{name}{end}" for name in ("states", "first", "second", "begins", "hidden", "out") for end in ("", "_bias")
-)
 
 
 def clause_inputs(
@@ -286,7 +260,7 @@ def _is_one_action(names: set[str], action: str | None) -> bool:
     return (TURNING in moving and moving <= TURNS) or (action is not None and len(moving) < 2)
 
 
-def _risen_from_there(movements: Sequence[ReadMovement]) -> Iterator[ReadMovement]:
+def _risen_from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     """Yield movements; those that stand up do so from where the movement before has ended."""
     before: str | None = None
     for movement in movements:

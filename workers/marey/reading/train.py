@@ -5,83 +5,29 @@ It writes `action_reader.safetensors`, and prints how many of the development pr
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
-from safetensors.numpy import save
-from torch import Tensor, nn
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
-from marey.motion.files import write_atomically
+from marey.reading.networks import Recipe, Trained, fit, side_by_side, train_and_write
 from marey.reading.texts import LabelledText, labelled_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import FILE, OUTSIDE, SEVERAL, ActionReader, inputs_of
-from marey.text.encoders import TextEncoder, find_encoder
+from marey.text.encoders import TextEncoder
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.parsed import without_punctuation
 from marey.vocabulary.entries import load_vocabulary
 
-HIDDEN, MEMBERS = 200, 3
-"""Units of each of the networks whose scores are averaged; side by side they are one network."""
-EPOCHS, BATCH, RATE, DECAY, DROPOUT = 45, 1024, 3e-3, 0.02, 0.4
-SMOOTHING = 0.05
+RECIPE = Recipe(units=200, epochs=45, batch=1024, rate=3e-3, decay=0.02, dropout=0.4, smoothing=0.05)
+MEMBERS = 3
+"""Number of networks whose scores are averaged; side by side they are one network."""
 BALANCE = 0.5
 """Exponent of a class's number of texts by which each of them weighs less."""
 
-Float32 = NDArray[np.float32]
 
-
-def fit(inputs: Float32, classes: Sequence[int], weights: Float32, count: int, seed: int) -> nn.Sequential:
-    """Train one network on inputs (N, I) with their classes, of `count`."""
-    torch.manual_seed(seed)
-    rows, wanted, shares = torch.tensor(inputs), torch.tensor(classes), torch.tensor(weights)
-    network = nn.Sequential(
-        nn.Dropout(DROPOUT / 2),
-        nn.Linear(rows.shape[1], HIDDEN),
-        nn.ReLU(),
-        nn.Dropout(DROPOUT),
-        nn.Linear(HIDDEN, count),
-    )
-    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    loss_of = nn.CrossEntropyLoss(reduction="none", label_smoothing=SMOOTHING)
-    for epoch in range(EPOCHS):
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * (1 - epoch / EPOCHS)
-        for part in torch.randperm(len(rows)).split(BATCH):
-            loss: Tensor = (loss_of(network(rows[part]), wanted[part]) * shares[part]).mean()
-            optimizer.zero_grad()
-            loss.backward()  # pyright: ignore[reportUnknownMemberType]
-            optimizer.step()
-    return network.eval()
-
-
-def side_by_side(networks: Sequence[nn.Sequential]) -> dict[str, Float32]:
-    """Return one network whose scores are the mean of those of several."""
-    first, last = ([layer_at(network, place) for network in networks] for place in (1, 4))
-    parts = {
-        "hidden": torch.cat([layer.weight for layer in first]),
-        "hidden_bias": torch.cat([layer.bias for layer in first]),
-        "out": torch.cat([layer.weight for layer in last], dim=1) / len(networks),
-        "out_bias": torch.stack([layer.bias for layer in last]).mean(dim=0),
-    }
-    return {name: part.detach().numpy().astype(np.float32) for name, part in parts.items()}
-
-
-def layer_at(network: nn.Sequential, place: int) -> nn.Linear:
-    """Return the linear layer at a place of a network."""
-    layer = network[place]
-    assert isinstance(layer, nn.Linear)
-    return layer
-
-
-def train(texts: Sequence[LabelledText], encoder: TextEncoder, seed: int) -> tuple[list[str], dict[str, Float32]]:
+def train(texts: Sequence[LabelledText], encoder: TextEncoder, seed: int) -> Trained:
     """Return the classes and the weights of a reader."""
     classes = [*load_vocabulary().actions, SEVERAL, OUTSIDE]
     vectors = encoder.pooled([without_punctuation(each.text) for each in texts])
@@ -89,22 +35,18 @@ def train(texts: Sequence[LabelledText], encoder: TextEncoder, seed: int) -> tup
     counts = Counter(each.asks for each in texts)
     weights = np.array([each.weight / counts[each.asks] ** BALANCE for each in texts], np.float32)
     wanted = [classes.index(each.asks) for each in texts]
-    networks = [fit(inputs, wanted, weights / weights.mean(), len(classes), seed + k) for k in range(MEMBERS)]
+    networks = [fit(inputs, wanted, weights, len(classes), seed + member, RECIPE) for member in range(MEMBERS)]
     return classes, side_by_side(networks)
 
 
 def main() -> None:
     """Train and write a reader."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, default=FILE)
-    parser.add_argument("--seed", type=int, default=0)
-    chosen = parser.parse_args()
-    torch.set_num_threads(1)
-    encoder = MiniLMEncoder(find_encoder("minilm"))
-    classes, weights = train(labelled_texts(chosen.seed), encoder, chosen.seed)
-    facts = {"classes": json.dumps(classes), "encoder_sha256": encoder.sha256}
-    write_atomically(chosen.output, save({name: part.astype(np.float16) for name, part in weights.items()}, facts))
-    sys.stdout.write(_rates(ActionReader.load(chosen.output), encoder))
+    train_and_write(
+        __doc__,
+        FILE,
+        lambda encoder, seed: train(labelled_texts(seed), encoder, seed),
+        lambda path, encoder: _rates(ActionReader.load(path), encoder),
+    )
 
 
 def _rates(reader: ActionReader, encoder: MiniLMEncoder) -> str:

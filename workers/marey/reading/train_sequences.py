@@ -5,31 +5,26 @@ It writes `sequence_reader.safetensors`, and prints how many of the development 
 
 from __future__ import annotations
 
-import argparse
-import json
 import random
-import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 import torch.nn.functional as F
 from numpy.typing import NDArray
-from safetensors.numpy import save
 from torch import Tensor, nn
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.data.captions import seeded
-from marey.motion.files import write_atomically
+from marey.reading.networks import Recipe, Trained, as_arrays, fit, side_by_side, train_and_write
 from marey.reading.sequences import PartedText, parted_texts
-from marey.reading.train import layer_at
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
-from marey.text.encoders import Encoding, find_encoder
+from marey.text.encoders import Encoding
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.parsed import without_punctuation
+from marey.text.reader_file import Float32
 from marey.text.sequence_reader import (
     CONTEXT,
     FILE,
@@ -42,13 +37,14 @@ from marey.text.sequence_reader import (
 from marey.vocabulary.entries import load_vocabulary
 
 CUT_UNITS, CUT_EPOCHS, CUT_BATCH, CUT_DROPOUT = 160, 8, 128, 0.35
-ACTION_UNITS, ACTION_MEMBERS, ACTION_EPOCHS, ACTION_BATCH, ACTION_DROPOUT = 256, 2, 25, 1024, 0.4
-"""Sizes and training of both networks; those of actions stand side by side, and their scores are averaged."""
 RATE, DECAY, SMOOTHING, WARMUP = 2e-3, 0.02, 0.05, 100
-WITHOUT_CONTEXT = 0.3
-"""Share of clauses that are read without the states around them."""
-
-Float32 = NDArray[np.float32]
+"""Sizes and training of the network of beginnings; the others have its rate, decay and smoothing."""
+ACTIONS = Recipe(
+    units=256, epochs=25, batch=1024, rate=RATE, decay=DECAY, dropout=0.4, smoothing=SMOOTHING, hidden_share=0.3
+)
+"""Networks of actions, which read some clauses without the states around them."""
+ACTION_MEMBERS = 2
+"""Number of them; their scores are averaged."""
 
 
 @dataclass(frozen=True)
@@ -190,70 +186,36 @@ def clauses_of(
     return np.stack(rows), [wanted for *_, wanted, _ in found], np.array([weight for *_, weight in found], np.float32)
 
 
-def fit_actions(inputs: Float32, wanted: Sequence[int], weights: Float32, width: int, seed: int) -> nn.Sequential:
-    """Train a network of actions on inputs (N, I), whose last `width` are the states around a clause."""
-    torch.manual_seed(seed)
-    rows, classes, shares = torch.from_numpy(inputs), torch.tensor(wanted), torch.from_numpy(weights / weights.mean())
-    network = nn.Sequential(
-        nn.Dropout(ACTION_DROPOUT / 2),
-        nn.Linear(rows.shape[1], ACTION_UNITS),
-        nn.ReLU(),
-        nn.Dropout(ACTION_DROPOUT),
-        nn.Linear(ACTION_UNITS, int(classes.max()) + 1),
-    )
-    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    for epoch in range(ACTION_EPOCHS):
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * (1 - epoch / ACTION_EPOCHS)
-        for part in torch.randperm(len(rows)).split(ACTION_BATCH):
-            shown = rows[part].clone()
-            shown[torch.rand(len(part)) < WITHOUT_CONTEXT, -width:] = 0
-            losses = F.cross_entropy(network(shown), classes[part], reduction="none", label_smoothing=SMOOTHING)
-            loss = (losses * shares[part]).mean()
-            optimizer.zero_grad()
-            loss.backward()  # pyright: ignore[reportUnknownMemberType]
-            optimizer.step()
-    return network.eval()
-
-
-def _weights_of(cuts: _Cuts, actions: Sequence[nn.Sequential]) -> dict[str, Float32]:
-    found: dict[str, Tensor | None] = {}
+def _weights_of(cuts: _Cuts) -> dict[str, Float32]:
+    found: dict[str, Tensor] = {}
     layers = {"states": cuts.states, "first": cuts.first, "second": cuts.second, "begins": cuts.begins}
     for name, layer in layers.items():
+        assert layer.bias is not None
         found |= {name: layer.weight, f"{name}_bias": layer.bias}
-    first, last = ([layer_at(network, place) for network in actions] for place in (1, 4))
-    found |= {
-        "hidden": torch.cat([layer.weight for layer in first]),
-        "hidden_bias": torch.cat([layer.bias for layer in first]),
-        "out": torch.cat([layer.weight for layer in last], dim=1) / len(actions),
-        "out_bias": torch.stack([layer.bias for layer in last]).mean(dim=0),
-    }
-    return {name: part.detach().numpy().astype(np.float32) for name, part in found.items() if part is not None}
+    return as_arrays(found)
 
 
-def train(texts: Sequence[PartedText], encoder: MiniLMEncoder, seed: int) -> tuple[list[str], dict[str, Float32]]:
+def train(texts: Sequence[PartedText], encoder: MiniLMEncoder, seed: int) -> Trained:
     """Return the classes and the weights of a reader."""
     classes = [*load_vocabulary().actions, OUTSIDE, CONTEXT]
     encodings = [encoder.encode(text.text) for text in texts]
     pairs = zip(texts, encodings, strict=True)
     cuts = fit_cuts([labelled(text, encoding, classes) for text, encoding in pairs], len(classes), seed)
     inputs, wanted, weights = clauses_of(texts, encodings, encoder, classes)
-    actions = [fit_actions(inputs, wanted, weights, encoder.width, seed + member) for member in range(ACTION_MEMBERS)]
-    return classes, _weights_of(cuts, actions)
+    recipe = replace(ACTIONS, hidden_columns=encoder.width)
+    members = range(ACTION_MEMBERS)
+    actions = [fit(inputs, wanted, weights, len(classes) + 1, seed + member, recipe) for member in members]
+    return classes, {**_weights_of(cuts), **side_by_side(actions)}
 
 
 def main() -> None:
     """Train and write a reader."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, default=FILE)
-    parser.add_argument("--seed", type=int, default=0)
-    chosen = parser.parse_args()
-    torch.set_num_threads(1)
-    encoder = MiniLMEncoder(find_encoder("minilm"))
-    classes, weights = train(parted_texts(chosen.seed), encoder, chosen.seed)
-    facts = {"classes": json.dumps(classes), "encoder_sha256": encoder.sha256}
-    write_atomically(chosen.output, save({name: part.astype(np.float16) for name, part in weights.items()}, facts))
-    sys.stdout.write(_rates(SequenceReader.load(chosen.output), encoder))
+    train_and_write(
+        __doc__,
+        FILE,
+        lambda encoder, seed: train(parted_texts(seed), encoder, seed),
+        lambda path, encoder: _rates(SequenceReader.load(path), encoder),
+    )
 
 
 def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
