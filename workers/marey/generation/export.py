@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from marey.generation.asked import AskedMotion
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.shots.timelines import TimelineMotion
-from marey.generation.sides import MirroredMotion
 from marey.generation.software import origin_of
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import QUALITY, MotionClip
@@ -73,8 +73,8 @@ def finish(
     body = body or standard_body(generator.layout.skeleton)
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
-    mirrored = {"mirrored": True} if isinstance(generated, MirroredMotion) else {}
-    manifest = {**manifest_of(generator, request, settings), **mirrored, CLEANED: clean, "body": body.describe()}
+    changes = generated.changes if isinstance(generated, AskedMotion) else {}
+    manifest = {**manifest_of(generator, request, settings), **changes, CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
     return judged(clip, request)
 

@@ -7,16 +7,13 @@ action, joined as people join them. Sentences of one action are texts of one par
 from __future__ import annotations
 
 import random
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 from marey.data.captions import lower_first, seeded
 from marey.data.spoken import SUBJECTS
-from marey.reading.texts import LONGEST, LabelledText, held_out, labelled_texts, words_alone
+from marey.reading.texts import LONGEST, LabelledText, held_out, labelled_texts, several_texts, words_alone
 from marey.text.action_reader import OUTSIDE, SEVERAL
 from marey.text.sequence_reader import CONTEXT
 from marey.vocabulary.entries import load_vocabulary
@@ -157,7 +154,7 @@ def parted_texts(seed: int) -> list[PartedText]:
 
 
 def written_parts() -> Iterator[tuple[TextPart, ...]]:
-    """Yield the texts of `several.toml` in parts."""
+    """Yield the texts that people wrote, in parts."""
     for text, asks in several_texts():
         marks = [ask.partition("#")[0] for ask in asks.split()]
         pieces = text.split("|")
@@ -165,13 +162,6 @@ def written_parts() -> Iterator[tuple[TextPart, ...]]:
             TextPart(piece, {"-": CONTEXT, "?": OUTSIDE}.get(mark.lstrip("&"), mark.lstrip("&")), mark.startswith("&"))
             for piece, mark in zip(pieces, marks, strict=True)
         )
-
-
-@cache
-def several_texts() -> tuple[tuple[str, str], ...]:
-    """Return the texts of `several.toml` with bars, and what their parts ask for, as it stands there."""
-    table = tomllib.loads(Path(__file__).with_name("several.toml").read_text("utf-8"))
-    return tuple((text, asks) for text, asks in table["several"])
 
 
 def _made(single: Sequence[LabelledText], seed: int) -> Iterator[PartedText]:

@@ -2,7 +2,8 @@
 
 One action: the sentences of `sayings.toml`, the vocabulary's own words, and the captions of known sets whose terms
 allow commercial use. Several: two and three of these, joined, and `several.toml`, which also has texts of one action
-that sound like several. None: `outside.toml`. The authors of the two files saw the definitions and no prompts.
+that sound like several. None: `outside.toml`. `manner.toml` has texts of one action that say how fast or how often. The
+authors of these files saw the definitions and no prompts.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +22,17 @@ from marey.data.captions import lower_first, seeded
 from marey.data.dataset import INDEX, SETS, known_set, known_sets
 from marey.data.index import read_index
 from marey.data.spoken import MARKED, SUBJECTS, all_sayings
+from marey.referee.pairs import development_pairs, pair_prompts
 from marey.referee.prompts import action_prompts, development_prompts, sequence_prompts, studio_prompts
 from marey.text.action_reader import OUTSIDE, SEVERAL
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
+from marey.vocabulary.paces import Pace
 
 SEQUENCES = 4000
 """Number of texts of several actions that are made of those of single ones."""
 WRITTEN = 3.0
-"""Weight of the texts of `several.toml` and `outside.toml`."""
+"""Weight of the texts of `several.toml`, `manner.toml` and `outside.toml`."""
 LONGEST = 45
 """Most words of them."""
 _OF_THREE, _OF_ONE_SUBJECT = 0.2, 0.6
@@ -63,6 +67,21 @@ class LabelledText:
     weight: float
 
 
+@dataclass(frozen=True)
+class MannerText:
+    """A text that asks for one action.
+
+    Attributes:
+        pace: that it asks for; empty = none.
+        count: how often; None = it gives no number.
+    """
+
+    text: str
+    action: str
+    pace: Pace
+    count: int | None
+
+
 def labelled_texts(seed: int) -> list[LabelledText]:
     """Return all texts but those of prompts that something is measured by; joined ones by a seed."""
     single = list(dict.fromkeys((*_of_people(), *_of_clips(), *_of_vocabulary())))
@@ -70,7 +89,7 @@ def labelled_texts(seed: int) -> list[LabelledText]:
     texts = [
         *single,
         *several,
-        *(_whole(text, asks) for text, asks in _written("several")),
+        *(_whole(text, asks) for text, asks in several_texts()),
         *(LabelledText(text, OUTSIDE, WRITTEN) for text in _written("outside")),
     ]
     unseen = held_out()
@@ -80,8 +99,26 @@ def labelled_texts(seed: int) -> list[LabelledText]:
 def held_out() -> set[str]:
     """Return the prompts by which the readers, and the motions of what they read, are measured."""
     asked = (*action_prompts(), *studio_prompts(), *development_prompts(), *sequence_prompts())
+    pairs = (*pair_prompts(), *development_pairs())
     others = (*reader_prompts.outside_prompts(), *(text for text, _ in reader_prompts.sequence_prompts()))
-    return {text.casefold() for text in (*(prompt.text for prompt in asked), *others)}
+    return {text.casefold() for text in (*(prompt.text for prompt in (*asked, *pairs)), *others)}
+
+
+@cache
+def several_texts() -> tuple[tuple[str, str], ...]:
+    """Return the texts of `several.toml` with bars, and what their parts ask for, as it stands there; and those of
+    `manner.toml`, which have one part."""
+    several = ((text, asks) for text, asks in _written("several"))
+    return (*several, *((each.text, each.action) for each in manner_texts()))
+
+
+@cache
+def manner_texts() -> tuple[MannerText, ...]:
+    """Return the texts of `manner.toml`."""
+    rows = _written("manner")
+    return tuple(
+        MannerText(text, action, "" if pace == "none" else pace, count or None) for text, action, pace, count in rows
+    )
 
 
 def _written(kind: str) -> list[Any]:

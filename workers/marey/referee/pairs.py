@@ -85,8 +85,18 @@ class PropertyRate:
 
 @lru_cache(maxsize=1)
 def pair_prompts() -> tuple[PairPrompt, ...]:
-    """Return the prompts of all pairs, the two of a pair one after the other."""
-    pairs = tomllib.loads(Path(__file__).with_name("prompts_pairs.toml").read_text("utf-8"))["pair"]
+    """Return the held-out prompts of all pairs, the two of a pair one after the other."""
+    return _pairs("prompts_pairs.toml")
+
+
+@lru_cache(maxsize=1)
+def development_pairs() -> tuple[PairPrompt, ...]:
+    """Return the prompts of the pairs by which settings are chosen, in the same order."""
+    return _pairs("prompts_pairs_development.toml")
+
+
+def _pairs(file: str) -> tuple[PairPrompt, ...]:
+    pairs = tomllib.loads(Path(__file__).with_name(file).read_text("utf-8"))["pair"]
     return tuple(
         PairPrompt(
             text, number, pair["property"], pair.get("action", ""), tuple(want) if isinstance(want, list) else want

@@ -7,9 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from marey.quality.record import SHOWN
 from marey.selector.gaits import circle
 from marey.selector.motion import SHORTEST, Motion
+from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES, TURNS, WHILE_TURNING, Rule
+from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
@@ -18,6 +21,11 @@ LEAST_PART = 0.5
 CUTS = {2: 14, 3: 9}
 """Moments that are tried as ends of an action, by the number of actions; of more actions 7."""
 FEWEST_CUTS = 7
+
+NOT_AS_OFTEN = 0.4
+"""Best value of a motion with another number of repetitions than was asked for."""
+SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2}
+"""Repetitions that the definition of an action asks for; a prompt may ask for fewer."""
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
@@ -33,11 +41,13 @@ class WantedAction:
         action: id in the vocabulary, one that `RULES` has.
         side: `left`, `right`, `both`, or empty: any.
         circle: a `turn` that the words say goes all the way round, beyond the angles of its definition.
+        count: how often, of an action that `REPETITIONS` has; None: any number.
     """
 
     action: str
     side: str = ""
     circle: bool = False
+    count: int | None = None
 
 
 Step = tuple[WantedAction, ...]
@@ -91,9 +101,15 @@ def _step(sentence: str) -> Step | None:
     wanted = [name for name in names if name not in beside] or names
     side = side_of(sentence)
     circles = {each.action for each in scope.actions if _CIRCLE.search(each.text)} if goes_round(sentence) else set()
+    counted = wanted[0] if len(wanted) == 1 and wanted[0] in REPETITIONS else None
     return (
         tuple(
-            WantedAction(name, side if actions[name].sided else "", circle=name == "turn" and name in circles)
+            WantedAction(
+                name,
+                side if actions[name].sided else "",
+                circle=name == "turn" and name in circles,
+                count=stated_count(sentence, name) if name == counted else None,
+            )
             for name in wanted
         )
         or None
@@ -136,7 +152,21 @@ def _grade(motion: Motion, step: Step) -> float:
 
 
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
-    return circle if wanted.circle else rules[wanted.action]
+    rule = circle if wanted.circle else rules[wanted.action]
+    return rule if wanted.count is None else _counted(rule, wanted.action, wanted.count)
+
+
+def _counted(rule: Rule, action: str, count: int) -> Rule:
+    """Return a rule that passes no motion with another number of repetitions, and those with the number even where the
+    definition of the action asks for more of them."""
+
+    def grade(m: Motion, side: str) -> float:
+        found = rule(m, side)
+        if len(REPETITIONS[action](m)) != count:
+            return min(found, NOT_AS_OFTEN)
+        return max(found, SHOWN) if count < SEVERAL.get(action, 0) else found
+
+    return grade
 
 
 def _in_order(motion: Motion, rules: Sequence[Callable[[Motion], float]]) -> float:

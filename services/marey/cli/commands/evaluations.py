@@ -411,6 +411,9 @@ def pairs(
     ] = None,
     seeds: Seeds = 4,
     settings: evaluating.Settings = None,
+    development: Annotated[
+        bool, typer.Option("--development", help="By the prompts by which settings are chosen, not the held-out ones.")
+    ] = False,
     threads: Threads = 0,
     output: ReportFolder = None,
     as_json: console.Json = False,
@@ -418,7 +421,14 @@ def pairs(
     """Measure whether a bundle tells left from right, two from three, slow from fast. Needs no server."""
     from marey.cli.roles.actions import measure_pairs
 
-    _measure(lambda how: measure_pairs(bundle, chosen or (), how), seeds, settings, threads, output, as_json)
+    _measure(
+        lambda how: measure_pairs(bundle, chosen or (), how, development=development),
+        seeds,
+        settings,
+        threads,
+        output,
+        as_json,
+    )
 
 
 @app.command()

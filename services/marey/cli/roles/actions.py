@@ -210,11 +210,14 @@ def measure_sequences(bundle: str, options: MeasureOptions, *, development: bool
     return run.report(sequence_markdown(run.reference, found), document(run.reference, run.settings, trials, found))
 
 
-def measure_pairs(bundle: str, properties: Sequence[str], options: MeasureOptions) -> RefereeReport:
+def measure_pairs(
+    bundle: str, properties: Sequence[str], options: MeasureOptions, *, development: bool = False
+) -> RefereeReport:
     """Generate minimal pairs of prompts with a bundle, and count the pairs whose motions differ as asked.
 
     Args:
         properties: side, count, order, direction, speed or duration; none = all.
+        development: take the prompts by which settings are chosen, instead of the held-out ones.
 
     Raises:
         NotFound, InvalidBundle: of the bundle.
@@ -223,6 +226,7 @@ def measure_pairs(bundle: str, properties: Sequence[str], options: MeasureOption
     from marey.referee import Body
     from marey.referee.pairs import (
         PROPERTIES,
+        development_pairs,
         pair_prompts,
         pairs_document,
         pairs_markdown,
@@ -234,7 +238,8 @@ def measure_pairs(bundle: str, properties: Sequence[str], options: MeasureOption
         hint = f"Known: {', '.join(PROPERTIES)}."
         raise InvalidInput(f"there are no pairs for {unknown[0]!r}", where="--property", hint=hint)
     run = _Run.of(bundle, options)
-    asked = [prompt for prompt in pair_prompts() if not properties or prompt.property in properties]
+    known = development_pairs() if development else pair_prompts()
+    asked = [prompt for prompt in known if not properties or prompt.property in properties]
     readings = [read_property(prompt, seed, Body(clip.joints, clip.fps)) for prompt, seed, clip in run.motions(asked)]
     table = pairs_markdown(run.reference, property_rates(readings))
     return run.report(table, pairs_document(run.reference, run.settings, readings))

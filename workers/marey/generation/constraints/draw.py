@@ -77,7 +77,7 @@ def constrained_request(
     # A path runs through one motion; movements that are made one by one would not follow it together.
     known = resolve_request(generator, replace(request, text=replace(request.text, movements=())))
     if seconds is None and request.timeline is None and request.recording is None:
-        known = replace(known, frames=_reaching(known, constraints, limits, rate))
+        known = replace(known, frames=_reaching(known, constraints, limits, rate), open=False)
     _asked(constraints, known, limits, generator.layout.skeleton, rate)
     return known
 

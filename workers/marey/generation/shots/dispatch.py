@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from marey.core.errors import InvalidInput
+from marey.generation.asked import generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.sequences import as_timeline
 from marey.generation.shots.timelines import check_timelines, generate_timelines
-from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText
 from marey.items.timeline import TimelineRow
 from marey.text.features import TextFeatures
@@ -52,7 +52,7 @@ def resolve_request(generator: Generator[S], request: Request) -> Request:
     generator.limits.check(request)
     request = as_timeline(generator, request)
     if request.timeline is None:
-        return generator.resolve_length(request)
+        return replace(generator.resolve_length(request), open=request.open or request.frames is None)
     check_timelines(generator)
     for row in request.timeline:
         generator.limits.check(Request(row.text, request.seed))
@@ -78,7 +78,7 @@ def generate_any(
     """
     timed = [row for row, request in enumerate(requests) if request.timeline is not None]
     if not timed:
-        return generate_sided(generator, requests, settings, control=control)
+        return generate_as_asked(generator, requests, settings, control=control)
     plain = [row for row, request in enumerate(requests) if request.timeline is None]
     made: list[MotionFeatures | None] = [None] * len(requests)
 
@@ -90,7 +90,7 @@ def generate_any(
         return PassControl(control or NoControl(), rows, before, len(requests))
 
     if plain:
-        keep(plain, generate_sided(generator, [requests[row] for row in plain], settings, control=watched(plain, 0)))
+        keep(plain, generate_as_asked(generator, [requests[row] for row in plain], settings, control=watched(plain, 0)))
     several = [requests[row] for row in timed]
     keep(timed, generate_timelines(generator, several, settings, control=watched(timed, len(plain))))
     return made

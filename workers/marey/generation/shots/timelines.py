@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.generation.asked import generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
-from marey.generation.sides import generate_sided
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.motion.features import FeatureLayout
@@ -133,9 +133,9 @@ def generate_timelines(
     timelines = [_Timeline(request, generator.limits) for request in requests]
     windows = _Windows(generator, settings, control or NoControl(), timelines)
     windows.make([strand for timeline in timelines for strand in timeline.rows])
-    for timeline, request in zip(timelines, requests, strict=True):
-        if request.text.movements and request.frames is None and not timeline.dropped:
-            timeline.leave_time(generator.layout)
+    for timeline in timelines:
+        if timeline.open and not timeline.dropped:
+            timeline.settle(generator.layout)
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions()])
     return [timeline.motion() for timeline in timelines]
 
@@ -192,7 +192,7 @@ class _Row(_Strand):
 
     def request(self) -> Request:
         """Return the request of the first window."""
-        return Request(self.text, self.seed, self.lengths[0])
+        return Request(self.text, self.seed, self.lengths[0], open=self.timeline.open and len(self.lengths) == 1)
 
     def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
@@ -242,12 +242,17 @@ class _Transition(_Strand):
 
 
 class _Timeline:
-    """A timeline while it is generated."""
+    """A timeline while it is generated.
+
+    Attributes:
+        open: nobody asked for its times, which may change with what is made: those of the movements of a prompt.
+    """
 
     def __init__(self, request: Request, limits: Limits) -> None:
         assert request.timeline is not None
         self.limits = limits
         self.dropped = False
+        self.open = bool(request.text.movements) and request.frames is None
         self.timeline = request.timeline
         self.seed = request.seed
         self.plan = plan_timeline(request.timeline, request.seed, limits)
@@ -266,17 +271,21 @@ class _Timeline:
         between = sum(len(even_parts(part.frames, *most)) for part in self.plan.transitions)
         return sum(len(row.lengths) - len(row.windows) for row in self.rows) + between
 
-    def leave_time(self, layout: FeatureLayout) -> None:
-        """Begin movements later that begin much higher or lower than those before them end; not where people stand on
-        something, since all movements begin on one floor."""
+    def settle(self, layout: FeatureLayout) -> None:
+        """Set the times of rows that are made: each is as long as its motion, and begins later where that begins much
+        higher or lower than the one before ends; not where people stand on something, since all movements begin on one
+        floor."""
         later, times = 0.0, list[TimedText]()
         heights = [_pelvis_heights(row.features, layout) for row in self.rows]
-        for number, timed in enumerate(self.timeline):
+        for number, (timed, row) in enumerate(zip(self.timeline, self.rows, strict=True)):
+            assert row.features is not None
             if number:
                 rise = abs(float(heights[number][0] - heights[number - 1][-1]))
                 raised = _is_raised(timed.text) or _is_raised(self.timeline[number - 1].text)
                 later += self._whole_tokens(rise / RISE_SPEED) if rise > RISE and not raised else 0.0
-            times.append(replace(timed, start=timed.start + later, end=timed.end + later))
+            start = timed.start + later
+            later += (len(row.features) - row.part.frames) / self.limits.fps
+            times.append(replace(timed, start=start, end=timed.end + later))
         self.timeline = tuple(times)
         self.plan = plan_timeline(self.timeline, self.seed, self.limits)
         for row, part in zip(self.rows, self.plan.rows, strict=True):
@@ -325,7 +334,7 @@ class _Windows:
         self._done = 0
 
         def first(rows: Sequence[_Row], watched: GenerationControl) -> list[Window | None]:
-            made = generate_sided(generator, [row.request() for row in rows], settings, control=watched)
+            made = generate_as_asked(generator, [row.request() for row in rows], settings, control=watched)
             return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
 
         def following(strands: Sequence[_Row | _Transition], watched: GenerationControl) -> list[Window | None]:

@@ -1,4 +1,4 @@
-"""Motions on the side that their prompt names: mirrored where only that shows it."""
+"""Motions on the side, as often and at the pace that their prompt names."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marey.generation.port import KeptFrames, Request
+from marey.generation.asked import SPEEDS, AskedMotion, generate_as_asked
+from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
-from marey.generation.sides import MirroredMotion, generate_sided
 from marey.motion.features import HUMANML3D_263
 from tests.support.bodies import raiser, waver
 
@@ -25,11 +25,13 @@ class OneMotion:
     """A generator that makes the same motion for every request."""
 
     layout = HUMANML3D_263
+    limits = Limits(16, 400, 20.0, 4)
 
     def __init__(self, joints: np.ndarray[Any, Any]) -> None:
         self.made = RawMotion(self.layout.encode(joints))
 
     def generate(self, requests: Sequence[Request], settings: Any, *, control: Any) -> list[Any]:
+        self.frames = [request.frames for request in requests]
         return [self.made for _ in requests]
 
 
@@ -38,13 +40,14 @@ def ask(prompt: str) -> Request:
 
 
 def make(joints: np.ndarray[Any, Any], request: Request) -> Any:
-    (made,) = generate_sided(OneMotion(joints), [request])  # type: ignore[arg-type]
+    (made,) = generate_as_asked(OneMotion(joints), [request])  # type: ignore[arg-type]
     return made
 
 
 def test_the_wrong_hand_is_mirrored() -> None:
     made = make(waver("left"), ask("a man waves with his right hand"))
-    assert isinstance(made, MirroredMotion)
+    assert isinstance(made, AskedMotion)
+    assert made.changes == {"mirrored": True}
     mirrored = HUMANML3D_263.decode(made.features)
     left = HUMANML3D_263.canonicalize(waver("left"))[: len(mirrored)]
     np.testing.assert_allclose(mirrored, HUMANML3D_263.mirror_joints(left), atol=1e-4)

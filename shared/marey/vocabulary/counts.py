@@ -1,0 +1,101 @@
+"""How often a prompt asks for its action: "twice", "three times", "x5", "two deep squats", "clap clap clap"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import pairwise
+
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import noun_forms
+from marey.vocabulary.word_lists import load_word_lists
+
+MOST = 20
+"""More repetitions than these are not read."""
+_TO_TWELVE = "one two three four five six seven eight nine ten eleven twelve"
+_NUMBERS = {word: number for number, word in enumerate(_TO_TWELVE.split(), 1)} | {
+    "single": 1,
+    "double": 2,
+    "couple": 2,
+    "couple of": 2,
+    "pair of": 2,
+    "triple": 3,
+    "trio of": 3,
+    "half dozen": 6,
+    "half a dozen": 6,
+    "dozen": 12,
+}
+_NUMBER = rf"(?P<number>\d{{1,3}}|{'|'.join(sorted(_NUMBERS, key=len, reverse=True))})"
+_TIMES = re.compile(
+    rf"\b{_NUMBER} ?(?:(?:more|whole|separate|consecutive) )?"
+    r"(?:times|time|occasions?|reps?|repetitions?|x|×)\b(?! as\b| (?:the )?(?:speed|pace|tempo|normal)\b)"
+)
+_BY = re.compile(rf"(?:\bx|×) ?(?P<by>\d{{1,2}})\b|\b(?:reps|times|count): ?{_NUMBER}\b")
+_ADVERBS = {"twice": 2, "thrice": 3}
+_ADVERB = re.compile(r"\b(?:twice|thrice)\b(?! (?:as|the)\b)")
+_ONCE = re.compile(
+    r"\b(?:just|only|exactly) once\b"
+    r"|(?<!^)(?<!\bat )(?<!\bmore than )\bonce\b(?=\W*$|\s*[,.;!?:)—-]|\s+(?:and|only|to|then|with|because|before|after"
+    r"|while|in|at|on|for|from|like|over|up|down|as|towards?|into|when|so|but|by)\b)(?!\s+in a while)"
+)
+_COUNTED = re.compile(rf"\b{_NUMBER}(?P<words>(?:[ -]+[a-z'’]+){{1,5}})")
+_WORDS = re.compile(r"[a-z]+")
+
+
+def stated_count(prompt: str, action: str) -> int | None:
+    """Return how often a prompt asks for an action; None = it does not say, or says several numbers.
+
+    Args:
+        prompt: as a user typed it.
+        action: id of the one action that it asks for.
+    """
+    text = " ".join(prompt.lower().split())
+    found = {*_of_times(text), *_of_things(text, action), *_of_words_again(text, action)}
+    return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
+
+
+def _of_times(text: str) -> Iterator[int]:
+    """Yield numbers of times: "twice", "x3"."""
+    yield from (_value(match["number"]) for match in _TIMES.finditer(text))
+    yield from (_value(match["by"] or match["number"]) for match in _BY.finditer(text))
+    yield from (_ADVERBS[match[0]] for match in _ADVERB.finditer(text))
+    yield from (1 for _ in _ONCE.finditer(text))
+
+
+def _of_things(text: str, action: str) -> Iterator[int]:
+    """Yield numbers before the action as a thing: "two deep squats", but not "two hands"."""
+    nouns, uncounted = _nouns(action), load_word_lists().uncounted
+    for match in _COUNTED.finditer(text):
+        words = _WORDS.findall(match["words"])
+        for word, after in pairwise([*words, ""]):
+            if word in nouns:
+                yield _value(match["number"])
+            elif after in nouns or not {word, word.removesuffix("s")} & uncounted:
+                continue  # "two arm circles"
+            break
+
+
+def _of_words_again(text: str, action: str) -> Iterator[int]:
+    """Yield how often a word for the action is said in a row."""
+    words, times = _WORDS.findall(text), 1
+    for word, after in pairwise([*words, ""]):
+        if word == after and word in _nouns(action):
+            times += 1
+        elif times > 1:
+            yield times
+            times = 1
+
+
+def _value(number: str) -> int:
+    return int(number) if number.isdecimal() else _NUMBERS[number]
+
+
+@lru_cache(maxsize=128)
+def _nouns(action: str) -> frozenset[str]:
+    """Return the words that name an action as a thing, in both numbers: the last of each noun, the first of each
+    verb."""
+    known = load_vocabulary().need(action)
+    nouns = {form for noun in known.nouns for form in noun_forms(noun.split()[-1])}
+    verbs = {verb.split()[0] for verb in (*known.verbs, *known.near)}
+    return frozenset(nouns | verbs | {f"{verb}s" for verb in verbs})

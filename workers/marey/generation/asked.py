@@ -1,0 +1,171 @@
+"""Motions as the words of their prompt ask: on the side, as often, and at the pace that they name.
+
+A network knows what an action looks like, but seldom reads one word that changes it: its training motions are
+mirrored, so both sides are as likely to it; it repeats an action as often as its length has room for; and it does so
+at the pace of its data. All three can be mended in the motion that it made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
+from marey.generation.repetitions import repeated
+from marey.motion.features import FeatureLayout
+from marey.motion.paced_features import pace_features
+from marey.motion.skeleton import HUMANML3D
+from marey.quality.record import SHOWN
+from marey.selector.limbs import Limb, limb_of
+from marey.selector.matching import Step, wanted_of
+from marey.selector.motion import SHORTEST, Motion
+from marey.selector.records import match_joints
+from marey.selector.repetitions import REPETITIONS, Repetition
+from marey.vocabulary.counts import stated_count
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.paces import stated_pace
+
+Float32 = NDArray[np.float32]
+
+SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.4}
+"""How many times as fast a motion is played as the network made it, by the pace that its prompt names."""
+LEARNED = frozenset({"walk", "run", "sprint"})
+"""Actions whose pace the network reads from the prompt itself; it has learned them at many."""
+FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
+"""Actions whose pace gravity decides."""
+STRETCHED = (0.6, 1.6)
+"""Bounds of the speed at which a motion with another number of repetitions is brought to a length that is fixed."""
+
+
+@dataclass(frozen=True, eq=False)
+class AskedMotion:
+    """A motion that was changed to what its prompt asks for.
+
+    Attributes:
+        features: (T, D), in the layout's own units.
+        changes: for the manifest: `mirrored`, true where left and right are exchanged; `repetitions`, how often the
+            network `made` and the prompt `asked` for the action; `speed`, how many times as fast the motion is played
+            as the network made it.
+    """
+
+    features: Float32 = field(repr=False)
+    changes: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class _Wish:
+    """What the words of a prompt ask for beside its action.
+
+    Attributes:
+        steps: the actions in their order; None = none that is known.
+        action: id of the only one; empty = several, or none that is known.
+        limb: that acts, on one side; empty = either.
+        count: repetitions; None = any number.
+        speed: in relation to what the network makes.
+    """
+
+    steps: tuple[Step, ...] | None = None
+    action: str = ""
+    limb: Limb | None = None
+    count: int | None = None
+    speed: float = 1.0
+
+    @classmethod
+    def of(cls, request: Request) -> _Wish:
+        """Read the prompt. Of streams, and of motions around kept frames, nothing is changed."""
+        if request.kept or request.free or request.recording is not None:
+            return cls()
+        text = request.text
+        steps = wanted_of(text.actions or (text.rewritten,))
+        single = steps[0][0].action if steps and len(steps) == 1 == len(steps[0]) else ""
+        action = load_vocabulary().said_first(text.rewritten) or single
+        if not action:
+            return cls(steps, limb=limb_of(text.prompt) if steps is None else None)
+        count = stated_count(text.prompt, action) if action in REPETITIONS else None
+        own_pace = action in LEARNED or action in FALLING
+        speed = 1.0 if own_pace else SPEEDS.get(stated_pace(text.prompt), 1.0)
+        return cls(steps, action, limb_of(text.prompt, action), count, speed)
+
+    def names_side(self) -> bool:
+        """Return True if an action is asked for on one side."""
+        return any(wanted.side in ("left", "right") for step in self.steps or () for wanted in step)
+
+    def drawn(self, request: Request, limits: Limits) -> Request:
+        """Return the request that the network draws: as many frames as become the length asked for, if that is
+        fixed."""
+        if self.speed == 1.0 or request.open or request.frames is None:
+            return request
+        return replace(request, frames=limits.within(round(request.frames * self.speed)))
+
+
+def generate_as_asked(
+    generator: Generator[S],
+    requests: Sequence[Request],
+    settings: S | None = None,
+    *,
+    control: GenerationControl | None = None,
+) -> list[MotionFeatures | None]:
+    """Generate one motion per request, as `Generator.generate`, and change those that do not show what their prompt
+    says of a side, a number or a pace.
+
+    Raises:
+        InvalidInput: as `Limits.check`.
+    """
+    wishes = [_Wish.of(request) for request in requests]
+    drawn = [wish.drawn(request, generator.limits) for wish, request in zip(wishes, requests, strict=True)]
+    made = generator.generate(drawn, settings, control=control)
+    return [
+        None if motion is None else _as_asked(generator.layout, request, wish, motion)
+        for request, wish, motion in zip(requests, wishes, made, strict=True)
+    ]
+
+
+def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: MotionFeatures) -> MotionFeatures:
+    """Return the motion, changed where the wish is not fulfilled and can be."""
+    features: Float32 = motion.features
+    changes: dict[str, Any] = {}
+    if (wish.limb or wish.names_side()) and _is_better_mirrored(features, layout, wish):
+        features, changes["mirrored"] = layout.mirror(features), True
+    fixed = None if request.open else request.frames
+    if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
+        often = repeated(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
+        if often is not None and often is not features and _fits(len(often), fixed, wish.speed):
+            made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
+            features = often
+            changes["repetitions"] = {"made": made, "asked": wish.count}
+    frames = fixed or max(round(len(features) / wish.speed), 2)
+    if frames != len(features):
+        changes["speed"] = round(len(features) / frames, 3)
+        features = pace_features(features, layout.slices, frames)
+    return AskedMotion(features, changes) if changes else motion
+
+
+def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
+    """Return True if only the mirror image matches the prompt, or both or neither does, and the other limb acts than
+    the one that the prompt names."""
+    if layout.skeleton.name != HUMANML3D.name or len(features) < SHORTEST:
+        return False
+    joints = layout.decode(features)
+    as_made, mirrored = (
+        match_joints(each, layout.skeleton, layout.fps, wish.steps) or 0.0
+        for each in (joints, layout.mirror_joints(joints))
+    )
+    if (as_made >= SHOWN) != (mirrored >= SHOWN):
+        return mirrored >= SHOWN
+    if wish.limb is not None:
+        return wish.limb.is_other(Motion(joints, layout.fps))
+    return SHOWN > mirrored > as_made
+
+
+def _repetitions(joints: NDArray[np.floating], fps: float, action: str) -> Sequence[Repetition]:
+    return REPETITIONS[action](Motion(joints, fps)) if len(joints) >= SHORTEST else []
+
+
+def _fits(frames: int, fixed: int | None, speed: float) -> bool:
+    """Return True if a motion can be brought to a length that is fixed without a pace that shows."""
+    low, high = STRETCHED
+    return fixed is None or low <= frames / fixed / speed <= high
