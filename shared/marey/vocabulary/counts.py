@@ -26,9 +26,9 @@ _NUMBERS = {word: number for number, word in enumerate(_TO_TWELVE.split(), 1)} |
     "half a dozen": 6,
     "dozen": 12,
 }
-_NUMBER = rf"(?P<number>\d{{1,3}}|{'|'.join(sorted(_NUMBERS, key=len, reverse=True))})"
+_NUMBER = rf"(?<!\bor )(?<!\bto )\b(?P<number>\d{{1,3}}|{'|'.join(sorted(_NUMBERS, key=len, reverse=True))})"
 _TIMES = re.compile(
-    rf"\b{_NUMBER} ?(?:(?:more|whole|separate|consecutive) )?"
+    rf"{_NUMBER} ?(?:(?:more|whole|separate|consecutive) )?"
     r"(?:times|time|occasions?|reps?|repetitions?|x|×)\b(?! as\b| (?:the )?(?:speed|pace|tempo|normal)\b)"
 )
 _BY = re.compile(rf"(?:\bx|×) ?(?P<by>\d{{1,2}})\b|\b(?:reps|times|count): ?{_NUMBER}\b")
@@ -39,7 +39,8 @@ _ONCE = re.compile(
     r"|(?<!^)(?<!\bat )(?<!\bmore than )\bonce\b(?=\W*$|\s*[,.;!?:)—-]|\s+(?:and|only|to|then|with|because|before|after"
     r"|while|in|at|on|for|from|like|over|up|down|as|towards?|into|when|so|but|by)\b)(?!\s+in a while)"
 )
-_COUNTED = re.compile(rf"\b{_NUMBER}(?P<words>(?:[ -]+[a-z'’]+){{1,5}})")
+_COUNTED = re.compile(rf"{_NUMBER}(?P<words>(?:[ -]+[a-z'’]+){{1,5}})")
+_ALTERNATIVES = ("or", "to")
 _WORDS = re.compile(r"[a-z]+")
 
 
@@ -71,7 +72,7 @@ def _of_things(text: str, action: str) -> Iterator[int]:
         for word, after in pairwise([*words, ""]):
             if word in nouns:
                 yield _value(match["number"])
-            elif after in nouns or not {word, word.removesuffix("s")} & uncounted:
+            elif word not in _ALTERNATIVES and (after in nouns or not {word, word.removesuffix("s")} & uncounted):
                 continue  # "two arm circles"
             break
 

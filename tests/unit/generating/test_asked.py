@@ -13,7 +13,9 @@ from marey.generation.asked import SPEEDS, AskedMotion, generate_as_asked
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
-from tests.support.bodies import raiser, waver
+from marey.selector.motion import Motion
+from marey.selector.repetitions import REPETITIONS
+from tests.support.bodies import Body, lift, raiser, waver
 
 
 @dataclass(frozen=True)
@@ -73,3 +75,63 @@ def test_motions_around_kept_frames_are_not_mirrored() -> None:
     kept = KeptFrames(0, np.zeros((4, 263), np.float32))
     assert isinstance(make(waver("left"), replace(asked, kept=(kept,))), RawMotion)
     assert isinstance(make(waver("left"), replace(asked, free=True)), RawMotion)
+
+
+def bower(times: int) -> np.ndarray[Any, Any]:
+    curves = [lift(0.4 + 1.8 * number, 1.4 + 1.8 * number) for number in range(times)]
+    return Body(0.8 + 1.8 * times, lean=lambda t: 45 * sum(curve(t) for curve in curves)).joints()
+
+
+def count(made: Any) -> int:
+    return len(REPETITIONS["bow"](Motion(HUMANML3D_263.decode(made.features), 20.0)))
+
+
+def test_repetitions_become_as_many_as_asked_for() -> None:
+    made = make(bower(3), replace(ask("a man bows twice"), open=True))
+    assert made.changes == {"repetitions": {"made": 3, "asked": 2}}
+    assert count(made) == 2
+
+
+def test_a_motion_of_a_fixed_length_keeps_it() -> None:
+    features = HUMANML3D_263.encode(bower(3))
+    made = make(bower(3), replace(ask("a man bows twice"), frames=len(features)))
+    assert len(made.features) == len(features)
+    assert count(made) == 2
+    assert made.changes["speed"] < 1
+
+
+def test_repetitions_stay_where_the_fixed_length_would_change_the_pace_too_much() -> None:
+    features = HUMANML3D_263.encode(bower(4))
+    assert isinstance(make(bower(4), replace(ask("a man bows once"), frames=len(features))), RawMotion)
+
+
+@pytest.mark.parametrize(("word", "pace"), [("slowly", "slow"), ("quickly", "fast")])
+def test_the_pace_of_an_open_length_changes_it(word: str, pace: str) -> None:
+    features = HUMANML3D_263.encode(bower(1))
+    made = make(bower(1), replace(ask(f"a man bows {word}"), frames=len(features), open=True))
+    assert len(made.features) == round(len(features) / SPEEDS[pace])
+    assert made.changes == {"speed": pytest.approx(SPEEDS[pace], rel=0.02)}
+
+
+def test_the_pace_of_a_fixed_length_changes_what_is_drawn() -> None:
+    generator = OneMotion(bower(1))
+    (made,) = generate_as_asked(generator, [replace(ask("a man bows slowly"), frames=100)])  # type: ignore[arg-type]
+    assert generator.frames == [round(100 * SPEEDS["slow"])]
+    assert made is not None
+    assert len(made.features) == 100
+
+
+@pytest.mark.parametrize(
+    "prompt", ["a man walks slowly", "a man jumps quickly", "a man bows", "a man bows beside a fast car"]
+)
+def test_learned_paces_and_those_of_gravity_stay(prompt: str) -> None:
+    assert isinstance(make(bower(1), replace(ask(prompt), open=True)), RawMotion)
+
+
+def test_the_limb_that_acts_is_the_one_that_the_prompt_names() -> None:
+    """Of an action that no rule knows, and of one that both images show."""
+    salute = make(raiser("left"), ask("a guard salutes with his right hand"))
+    assert isinstance(salute, AskedMotion)
+    assert salute.changes == {"mirrored": True}
+    assert isinstance(make(raiser("left"), ask("a guard salutes with his left hand")), RawMotion)
+    assert isinstance(make(raiser("left"), ask("a guard salutes to the right")), RawMotion)
