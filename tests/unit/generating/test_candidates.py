@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from marey.generation import candidates
 from marey.generation.candidates import DrawPlan, best_clips, candidate_seed, split_settings
-from marey.generation.port import Request
+from marey.generation.port import Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.items.values import MAX_SEED
+from marey.motion.features import HUMANML3D_263
 from marey.quality.record import Flag, MotionQuality, PromptMatch
 from marey.quality.selection import read_selection
 from tests.support.generating import Dropping
@@ -54,6 +55,9 @@ class FakeClip:
 
 class FakeGenerator:
     """Makes motions of which the seed is all that is known."""
+
+    limits = Limits(16, 196, 20.0, 4)
+    layout = HUMANML3D_263
 
     def __init__(self) -> None:
         self.seeds: list[list[int]] = []

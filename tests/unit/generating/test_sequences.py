@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
+from marey.generation.asked import SPEEDS
 from marey.generation.candidates import DrawPlan, best_clips
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.export import finish
@@ -55,6 +56,38 @@ def test_each_movement_is_a_row_as_long_as_it_is_alone(generator: Any) -> None:
     assert again is not None
     assert np.array_equal(made.features, again.features)
     assert len(made.features) == sum(alone(generator, request))
+
+
+def test_a_slow_movement_takes_longer_and_those_after_it_begin_later(generator: Any) -> None:
+    text = prompt_of(generator)
+    slow = text_of("waves slowly", generator.limits.text_width)
+    text = replace(text, movements=(text.movements[0], slow, text.movements[2]))
+    request = resolve_request(generator, Request(text, 3))
+    assert request.timeline is not None
+    asked = alone(generator, request)
+    (made,) = generate_any(generator, [request])
+    assert made is not None
+    clip = finish(generator, request, made, generator.settings({}))
+    rows = clip.manifest["timeline"]["rows"]
+    frames = [round((row["end"] - row["start"]) * generator.limits.fps) for row in rows]
+    assert frames == [asked[0], round(asked[1] / SPEEDS["slow"]), asked[2]]
+    assert rows[2]["start"] >= rows[1]["end"]
+    assert [row.get("speed") for row in rows] == [None, pytest.approx(SPEEDS["slow"], rel=0.02), None]
+    assert clip.frames == round(rows[2]["end"] * generator.limits.fps)
+
+
+def test_a_slow_movement_with_a_length_of_its_own_keeps_it(generator: Any) -> None:
+    text = prompt_of(generator)
+    parts = ("walks", "waves slowly for 3 seconds", "bows")
+    movements = tuple(text_of(part, generator.limits.text_width) for part in parts)
+    whole = replace(text, prompt="walks, waves slowly for 3 seconds, bows", movements=movements)
+    request = resolve_request(generator, Request(whole, 3))
+    (made,) = generate_any(generator, [request])
+    assert request.timeline is not None
+    assert made is not None
+    asked = alone(generator, request)
+    assert asked[1] == round(3 * generator.limits.fps)
+    assert len(made.features) == sum(asked)
 
 
 def test_rows_share_the_length_that_is_asked_for(generator: Any) -> None:

@@ -56,6 +56,11 @@ class AskedMotion:
     changes: Mapping[str, Any]
 
 
+def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
+    """Return what was changed in a motion, for the manifest."""
+    return motion.changes if isinstance(motion, AskedMotion) else {}
+
+
 @dataclass(frozen=True)
 class _Wish:
     """What the words of a prompt ask for beside its action.

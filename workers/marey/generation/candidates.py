@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.asked import changes_of
 from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
@@ -138,9 +139,8 @@ def _with_best(request: Request, draws: Sequence[_Draw]) -> Request:
     """Return the request of a timeline whose rows are the best that were drawn."""
     assert request.timeline is not None
     rows = zip(request.timeline, draws, strict=True)
-    return replace(
-        request, timeline=tuple(replace(row, seed=draw.chosen_seed, made=draw.features) for row, draw in rows)
-    )
+    chosen = (replace(row, seed=draw.chosen_seed, made=draw.features, changes=draw.changes) for row, draw in rows)
+    return replace(request, timeline=tuple(chosen))
 
 
 def _draw(
@@ -208,6 +208,7 @@ class _Draw:
         self.asked = asked
         self.best: MotionClip | None = None
         self.features: NDArray[np.float32] | None = None
+        self.changes: Mapping[str, Any] = {}
         self.good = False
         self._plan = plan
         self._frames = asked.frames
@@ -235,7 +236,8 @@ class _Draw:
         self.good = self.good or (shows and sound)
         rank = (shows, sound, 0.0 if match is None else match)
         if rank > self._rank:
-            self.best, self._rank, self._chosen, self.features = clip, rank, number, generated.features
+            self.best, self._rank, self._chosen = clip, rank, number
+            self.features, self.changes = generated.features, changes_of(generated)
 
     @property
     def chosen_seed(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from marey.generation.asked import AskedMotion
+from marey.generation.asked import changes_of
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.shots.timelines import TimelineMotion
@@ -73,8 +73,8 @@ def finish(
     body = body or standard_body(generator.layout.skeleton)
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
-    changes = generated.changes if isinstance(generated, AskedMotion) else {}
-    manifest = {**manifest_of(generator, request, settings), **changes, CLEANED: clean, "body": body.describe()}
+    provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
+    manifest = {**provenance, CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
     return judged(clip, request)
 
@@ -94,7 +94,7 @@ def judged(clip: MotionClip, request: Request) -> MotionClip:
 
 def _prompts(request: Request) -> list[str]:
     if request.timeline is not None:
-        whole = [request.text.prompt] if request.text.movements else []
+        whole = [request.text.prompt] if request.is_sequence else []
         return [*whole, *(row.text.prompt for row in request.timeline)]
     return [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
 

@@ -55,6 +55,11 @@ class Request:
     timeline: tuple[TimedText, ...] | None = None  # prompts at stated times; `text` is that of the first
     open: bool = False  # nobody asked for `frames`: what the prompt asks for may need more or fewer
 
+    @property
+    def is_sequence(self) -> bool:
+        """True if the rows of the timeline are the movements of one prompt."""
+        return self.timeline is not None and bool(self.text.movements)
+
 
 @dataclass(frozen=True)
 class Limits:

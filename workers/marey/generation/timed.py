@@ -25,6 +25,8 @@ class TimedText:
         scope: of the prompt; None = by its words.
         seed: of the row; None = derived from the seed of the whole.
         made: (t, D) features of the first window of the row, made before; None = they are generated.
+        open: nobody asked for its times, which may change with what is made.
+        changes: of the motion of the row, as of `AskedMotion`.
     """
 
     start: float
@@ -33,6 +35,8 @@ class TimedText:
     scope: Mapping[str, Any] | None = None
     seed: int | None = None
     made: NDArray[np.float32] | None = field(default=None, repr=False, compare=False)
+    open: bool = False
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 def part_seed(seed: int, part: str, number: int) -> int:

@@ -49,7 +49,6 @@ def resolve_request(generator: Generator[S], request: Request) -> Request:
     Raises:
         InvalidInput: as `Limits.check`; or a timeline, and the model cannot generate frames around others.
     """
-    generator.limits.check(request)
     request = as_timeline(generator, request)
     if request.timeline is None:
         return replace(generator.resolve_length(request), open=request.open or request.frames is None)

@@ -36,7 +36,7 @@ def describe_timeline(
     gaps = [{"start": start / limits.fps, "end": end / limits.fps} for start, end in gaps_of(plan)]
     prompt = text_of([TimelineRow(row.start, row.end, row.text.prompt) for row in timeline])
     return {
-        "prompt": request.text.prompt if request.text.movements else prompt,
+        "prompt": request.text.prompt if request.is_sequence else prompt,
         "rewritten": text_of([TimelineRow(row.start, row.end, row.text.rewritten) for row in timeline]),
         **({} if lists is None else {"scope": dict(request.scope or _scope(request, timeline, lists))}),
         KEY: {"rows": rows, "transitions": transitions, "gaps": gaps},
@@ -53,11 +53,12 @@ def _describe_row(row: TimedText, seed: int) -> dict[str, Any]:
         **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
         "graph": text.graph.to_json(),
         "seed": seed,
+        **row.changes,
     }
 
 
 def _scope(request: Request, timeline: Sequence[TimedText], lists: ActionLists) -> Mapping[str, Any]:
-    if request.text.movements:
+    if request.is_sequence:
         return match_scope(request.text.prompt, lists).as_json()
     return scope_of_rows([match_scope(row.text.prompt, lists) for row in timeline]).as_json()
 

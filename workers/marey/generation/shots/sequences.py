@@ -7,13 +7,15 @@ Made one by one, each as long as it takes alone, four of five and two of three s
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import Any
 
-from marey.generation.port import Generator, Request
+from marey.generation.port import Generator, Limits, Request
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
+from marey.text.features import TextFeatures
 from marey.vocabulary.lengths import stated_length
 
 SEED = "movement"
@@ -30,38 +32,45 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     Args:
         generator: of the motion; one that cannot generate frames around others makes the prompt in one pass.
         request: of one prompt.
+
+    Raises:
+        InvalidInput: as `Limits.check`.
     """
     movements = request.text.movements
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not (movements and alone and generator.limits.keeps):
         return request
+    generator.limits.check(request)
     fps = generator.limits.fps
-    lengths = [_frames(generator, request, number) for number in range(len(movements))]
+    stated = [_stated_frames(generator.limits, request, movement) for movement in movements]
+    lengths = [own or _drawn_frames(generator, request, number) for number, own in enumerate(stated)]
     if request.frames is not None:
         lengths = _shared(request.frames, lengths)
     if min(lengths) < MIN_ROW_SECONDS * fps:
         return request
-    ends = [sum(lengths[: number + 1]) for number in range(len(lengths))]
+    ends = list(accumulate(lengths))
     rows = tuple(
-        TimedText((end - length) / fps, end / fps, text)
-        for end, length, text in zip(ends, lengths, movements, strict=True)
+        TimedText((end - length) / fps, end / fps, text, open=own is None and request.frames is None)
+        for end, length, text, own in zip(ends, lengths, movements, stated, strict=True)
     )
     return replace(request, timeline=rows)
 
 
-def _frames(generator: Generator[Any], request: Request, number: int) -> int:
-    """Return the frames of a movement: those that its words state, or else those that the model gives it alone."""
-    limits, text = generator.limits, request.text.movements[number]
-    whole, own = stated_length(request.text.prompt), stated_length(text.prompt).seconds
+def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> int | None:
+    """Return the frames of a movement that its words state; None = they do not, or the prompt has a length out of the
+    range of the bundle."""
+    whole, own = stated_length(request.text.prompt), stated_length(movement.prompt).seconds
     used = whole.is_partial or whole.within(limits.min_frames / limits.fps, limits.max_frames / limits.fps)
-    if used and own is not None:
-        return limits.within(round(own * limits.fps))
-    return generator.resolve_length(Request(text, part_seed(request.seed, SEED, number))).frames or limits.min_frames
+    return limits.within(round(own * limits.fps)) if used and own is not None else None
 
 
-def _shared(frames: int, lengths: list[int]) -> list[int]:
+def _drawn_frames(generator: Generator[Any], request: Request, number: int) -> int:
+    """Return the frames that the model gives a movement alone."""
+    alone = Request(request.text.movements[number], part_seed(request.seed, SEED, number))
+    return generator.resolve_length(alone).frames or generator.limits.min_frames
+
+
+def _shared(frames: int, lengths: Sequence[int]) -> list[int]:
     """Return lengths in the same ratio that sum up to `frames`."""
-    total, ends = sum(lengths), [0]
-    for number in range(len(lengths)):
-        ends.append(round(frames * sum(lengths[: number + 1]) / total))
-    return [end - start for start, end in itertools.pairwise(ends)]
+    ends = [round(frames * end / sum(lengths)) for end in accumulate(lengths, initial=0)]
+    return [end - start for start, end in pairwise(ends)]

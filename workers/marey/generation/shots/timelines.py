@@ -9,7 +9,7 @@ all timelines of a batch are generated together, and each depends on its own row
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import generate_as_asked
+from marey.generation.asked import changes_of, generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
@@ -186,13 +186,15 @@ class _Strand:
 class _Row(_Strand):
     """A row: its first window is a motion of the prompt, those after it continue it."""
 
-    def __init__(self, timeline: _Timeline, part: TimelinePart, text: TextFeatures, limits: Limits) -> None:
-        super().__init__(timeline, part, text, (limits.max_frames, limits.max_frames - CONTEXT))
+    def __init__(self, timeline: _Timeline, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
+        super().__init__(timeline, part, timed.text, (limits.max_frames, limits.max_frames - CONTEXT))
+        self.open = timed.open
         self.features: Float32 | None = None
+        self.changes: Mapping[str, Any] = {}
 
     def request(self) -> Request:
         """Return the request of the first window."""
-        return Request(self.text, self.seed, self.lengths[0], open=self.timeline.open and len(self.lengths) == 1)
+        return Request(self.text, self.seed, self.lengths[0], open=self.open and len(self.lengths) == 1)
 
     def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
@@ -245,23 +247,22 @@ class _Timeline:
     """A timeline while it is generated.
 
     Attributes:
-        open: nobody asked for its times, which may change with what is made: those of the movements of a prompt.
+        open: nobody asked for its length, which may change with what is made: that of the movements of a prompt.
     """
 
     def __init__(self, request: Request, limits: Limits) -> None:
         assert request.timeline is not None
         self.limits = limits
         self.dropped = False
-        self.open = bool(request.text.movements) and request.frames is None
+        self.open = request.is_sequence and request.frames is None
         self.timeline = request.timeline
         self.seed = request.seed
         self.plan = plan_timeline(request.timeline, request.seed, limits)
-        self.rows = [
-            _Row(self, part, row.text, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)
-        ]
+        self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
         for strand, row in zip(self.rows, request.timeline, strict=True):
             if row.made is not None:
                 strand.add(Window(row.made, 0, len(row.made)))
+                strand.changes = row.changes
         self.transitions: list[_Transition] = []
 
     @property
@@ -314,7 +315,9 @@ class _Timeline:
             frames[row.part.start : row.part.end] = row.features
         for transition in self.transitions:
             frames = transition.write(frames)
-        return TimelineMotion(frames.astype(np.float32), self.timeline)
+        timeline = zip(self.timeline, self.rows, strict=True)
+        changed = tuple(replace(timed, changes=row.changes) for timed, row in timeline)
+        return TimelineMotion(frames.astype(np.float32), changed)
 
 
 class _Windows:
@@ -335,6 +338,8 @@ class _Windows:
 
         def first(rows: Sequence[_Row], watched: GenerationControl) -> list[Window | None]:
             made = generate_as_asked(generator, [row.request() for row in rows], settings, control=watched)
+            for row, motion in zip(rows, made, strict=True):
+                row.changes = {} if motion is None else changes_of(motion)
             return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
 
         def following(strands: Sequence[_Row | _Transition], watched: GenerationControl) -> list[Window | None]:
