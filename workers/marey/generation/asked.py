@@ -20,7 +20,7 @@ from marey.motion.features import FeatureLayout
 from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import SHOWN
-from marey.selector.limbs import Limb, limb_of
+from marey.selector.limbs import NamedLimb, limb_of
 from marey.selector.matching import Step, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
@@ -75,7 +75,7 @@ class _Wish:
 
     steps: tuple[Step, ...] | None = None
     action: str = ""
-    limb: Limb | None = None
+    limb: NamedLimb | None = None
     count: int | None = None
     speed: float = 1.0
 

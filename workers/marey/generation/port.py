@@ -53,7 +53,7 @@ class Request:
     kept: tuple[KeptFrames, ...] = ()  # in the order of time; needs `frames`
     free: bool = False  # the text is not read: kept frames alone decide
     timeline: tuple[TimedText, ...] | None = None  # prompts at stated times; `text` is that of the first
-    open: bool = False  # nobody asked for `frames`: what the prompt asks for may need more or fewer
+    open: bool = False  # `frames` were not asked for: what the prompt asks for may need more or fewer
 
     @property
     def is_sequence(self) -> bool:

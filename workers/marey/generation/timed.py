@@ -25,7 +25,7 @@ class TimedText:
         scope: of the prompt; None = by its words.
         seed: of the row; None = derived from the seed of the whole.
         made: (t, D) features of the first window of the row, made before; None = they are generated.
-        open: nobody asked for its times, which may change with what is made.
+        open: its times were not asked for, and may change with what is made.
         changes: of the motion of the row, as of `AskedMotion`.
     """
 

@@ -24,7 +24,7 @@ Trained = tuple[list[str], dict[str, Float32]]
 
 
 @dataclass(frozen=True)
-class Recipe:
+class NetworkRecipe:
     """Sizes and training of a network of two layers.
 
     Attributes:
@@ -44,7 +44,7 @@ class Recipe:
 
 
 def fit(
-    inputs: Float32, wanted: Sequence[int], weights: Float32, count: int, seed: int, recipe: Recipe
+    inputs: Float32, wanted: Sequence[int], weights: Float32, count: int, seed: int, recipe: NetworkRecipe
 ) -> nn.Sequential:
     """Train one network on inputs (N, I) with their classes, of `count`, and their weights."""
     torch.manual_seed(seed)

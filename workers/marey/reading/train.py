@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
-from marey.reading.networks import Recipe, Trained, fit, side_by_side, train_and_write
+from marey.reading.networks import NetworkRecipe, Trained, fit, side_by_side, train_and_write
 from marey.reading.texts import LabelledText, labelled_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import FILE, OUTSIDE, SEVERAL, ActionReader, inputs_of
@@ -20,7 +20,7 @@ from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.parsed import without_punctuation
 from marey.vocabulary.entries import load_vocabulary
 
-RECIPE = Recipe(units=200, epochs=45, batch=1024, rate=3e-3, decay=0.02, dropout=0.4, smoothing=0.05)
+RECIPE = NetworkRecipe(units=200, epochs=45, batch=1024, rate=3e-3, decay=0.02, dropout=0.4, smoothing=0.05)
 MEMBERS = 3
 """Number of networks whose scores are averaged; side by side they are one network."""
 BALANCE = 0.5

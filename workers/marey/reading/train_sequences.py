@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.data.captions import seeded
-from marey.reading.networks import Recipe, Trained, as_arrays, fit, side_by_side, train_and_write
+from marey.reading.networks import NetworkRecipe, Trained, as_arrays, fit, side_by_side, train_and_write
 from marey.reading.sequences import PartedText, parted_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
@@ -39,7 +39,7 @@ from marey.vocabulary.entries import load_vocabulary
 CUT_UNITS, CUT_EPOCHS, CUT_BATCH, CUT_DROPOUT = 160, 8, 128, 0.35
 RATE, DECAY, SMOOTHING, WARMUP = 2e-3, 0.02, 0.05, 100
 """Sizes and training of the network of beginnings; the others have its rate, decay and smoothing."""
-ACTIONS = Recipe(
+ACTIONS = NetworkRecipe(
     units=256, epochs=25, batch=1024, rate=RATE, decay=DECAY, dropout=0.4, smoothing=SMOOTHING, hidden_share=0.3
 )
 """Networks of actions, which read some clauses without the states around them."""

@@ -20,7 +20,7 @@ _ARM = re.compile(r"\b(?:left|right)(?:[ -]handed|[ -](?:hand|arm|fist|palm|elbo
 
 
 @dataclass(frozen=True)
-class Limb:
+class NamedLimb:
     """A hand or a foot.
 
     Attributes:
@@ -42,7 +42,7 @@ class Limb:
         return bool(other > MORE * own)
 
 
-def limb_of(prompt: str, action: str | None = None) -> Limb | None:
+def limb_of(prompt: str, action: str | None = None) -> NamedLimb | None:
     """Return the limb that a prompt asks to act; None if it names none, or both.
 
     Args:
@@ -53,6 +53,6 @@ def limb_of(prompt: str, action: str | None = None) -> Limb | None:
     if side not in ("left", "right"):
         return None
     if action in LIFTED:
-        return Limb("foot", side)
+        return NamedLimb("foot", side)
     by_hand = action is not None and load_vocabulary().need(action).sided == "hand"
-    return Limb("hand", side) if by_hand or _ARM.search(prompt.lower()) else None
+    return NamedLimb("hand", side) if by_hand or _ARM.search(prompt.lower()) else None

@@ -247,7 +247,7 @@ class _Timeline:
     """A timeline while it is generated.
 
     Attributes:
-        open: nobody asked for its length, which may change with what is made: that of the movements of a prompt.
+        open: its length was not asked for, and may change with what is made: that of the movements of a prompt.
     """
 
     def __init__(self, request: Request, limits: Limits) -> None:
