@@ -27,7 +27,7 @@ class Reader:
     file: ClassVar[Path]
     """The shipped one."""
     reads: ClassVar[str]
-    """What it reads, for messages."""
+    """Its object, for messages."""
     tensors: ClassVar[frozenset[str]]
 
     def __init__(

@@ -63,7 +63,7 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class _Wish:
-    """What the words of a prompt ask for beside its action.
+    """Everything that the words of a prompt ask for beside its action.
 
     Attributes:
         steps: the actions in their order; None = none that is known.

@@ -29,6 +29,7 @@ SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2}
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
+_LETTER = re.compile(r"\b([lr])[ -](?:hand|arm|fist|palm|elbow|leg|foot|knee)\b")
 _CIRCLE = re.compile(r"\bcircl(?:es?|ed|ing)\b")
 _PART_OF_CIRCLE = re.compile(r"\b(?:half|semi|quarter|part)\b")
 
@@ -123,7 +124,9 @@ def goes_round(sentence: str) -> bool:
 
 def side_of(sentence: str) -> str:
     """Return the side that a sentence names (`left`, `right`, `both`); empty if it names none, or several."""
-    sides = {_SIDES[word] for word in _WORDS.findall(sentence.lower()) if word in _SIDES}
+    text = sentence.lower()
+    sides = {_SIDES[word] for word in _WORDS.findall(text) if word in _SIDES}
+    sides |= {{"l": "left", "r": "right"}[match[1]] for match in _LETTER.finditer(text)}
     return sides.pop() if len(sides) == 1 else ""
 
 
