@@ -53,7 +53,7 @@ def test_it_knows_every_action_and_the_shipped_encoder() -> None:
         ("he claps after a deep bow", ["bow", "clap"]),
         ("jog -> jump -> cheer", ["run", "jump", "cheer"]),
         ("The knight kneels, then stands up and bows.", ["kneel", "get-up", "bow"]),
-        ("she sits on a chair for a bit, then gets up and leaves", ["sit", "stand-up", "walk"]),
+        ("she is sitting on a chair, then gets up and leaves", ["sit", "stand-up", "walk"]),
         ("A kid dances. Then he lies down on the floor.", ["dance", "lie-down"]),
     ],
 )
