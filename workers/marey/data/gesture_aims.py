@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, eased, envelope, stations
+from marey.data.gesture_poses import LEFT, OTHER_SIDE, StandingBody, eased, envelope, stations
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _ELBOW_OUT = (1.0, -0.7, -0.2)
 
 
@@ -26,7 +25,7 @@ def aim(rng: random.Random) -> Gesture:
         pace = GesturePace.draw(rng, (0.3, 0.9), (1.5, 4.5))
         seconds, kinds = pace.total(rng), ("aim", form, "aim-raise")
     hands, twist, head = GUNS[form](rng, side), TWISTS[form], rng.uniform(0, 7)
-    degrees, turned = rng.uniform(*twist), _OTHER[side] if form == "aim-rifle" else side
+    degrees, turned = rng.uniform(*twist), OTHER_SIDE[side] if form == "aim-rifle" else side
     stoop = rng.uniform(0, 7)
 
     def change(body: StandingBody) -> None:
@@ -54,14 +53,14 @@ def _rifle(rng: random.Random, side: str) -> Hands:
     trigger = np.array([rng.uniform(0.02, 0.08), up + bend, rng.uniform(0.16, 0.24)])
     barrel = np.array([-rng.uniform(0.0, 0.06), up, rng.uniform(0.45, 0.54)])
     down = (0.5, -1.0, -0.2)
-    return {side: (trigger, rng.choice((_ELBOW_OUT, (0.7, -1.0, -0.3)))), _OTHER[side]: (barrel, down)}
+    return {side: (trigger, rng.choice((_ELBOW_OUT, (0.7, -1.0, -0.3)))), OTHER_SIDE[side]: (barrel, down)}
 
 
 def _pistol(rng: random.Random, side: str) -> Hands:
     up, ahead, aside = rng.uniform(-0.12, 0.12), rng.uniform(0.41, 0.48), rng.uniform(-0.03, 0.04)
     grip, support = np.array([aside, up, ahead]), np.array([0.05 - aside, up - 0.015, ahead - 0.02])
     pole = (0.9, -1.0, -0.2)
-    return {side: (grip, pole), _OTHER[side]: (support, pole)}
+    return {side: (grip, pole), OTHER_SIDE[side]: (support, pole)}
 
 
 def _one_hand(rng: random.Random, side: str) -> Hands:

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture, respond
-from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, direction, envelope
+from marey.data.gesture_poses import ARMS, LEFT, OTHER_SIDE, StandingBody, direction, envelope
 from marey.data.gesture_stances import glide, settle, step, turn_hips
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _ARM = 0.52
 """Metres from shoulder to wrist."""
 _HEAD, _NECK = 15, (12,)
@@ -40,7 +39,7 @@ def draw_bow(rng: random.Random) -> Gesture:
         rng.uniform(-0.11, -0.02),
     )  # aside, up, toward the target
     bow_hand = _BowHand(side, low)
-    string_hand = _StringHand(_OTHER[side], cheek, rng.uniform(0.08, 0.4))
+    string_hand = _StringHand(OTHER_SIDE[side], cheek, rng.uniform(0.08, 0.4))
     twist, hips = rng.uniform(0.4, 0.6) * (90 - aside), rng.uniform(6, 22)
     stride, turn, steps = rng.uniform(0.08, 0.22), rng.uniform(0, 25), rng.random() < 0.6
     sink, stands = rng.uniform(0.0, 0.03), -1.0 if rng.random() < 0.5 else max(start - 0.2, 0.0)
@@ -155,7 +154,7 @@ class _StringHand:
         """
         aim = np.array([-bow[0], bow[1], bow[2]])  # outward is the other way for this hand
         aside, up, ahead = self.cheek
-        string = body.from_shoulder(self.side, body.joints[:, ARMS[_OTHER[self.side]][3]]) - 0.1 * aim
+        string = body.from_shoulder(self.side, body.joints[:, ARMS[OTHER_SIDE[self.side]][3]]) - 0.1 * aim
         beside = np.array([aim[2], 0.0, -aim[0]])
         string += 0.08 * beside
         face = body.from_shoulder(self.side, body.joints[:, _HEAD]) + aside * beside + [0.0, up, 0.0]

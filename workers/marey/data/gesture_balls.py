@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, eased, envelope
+from marey.data.gesture_poses import OTHER_SIDE, StandingBody, eased, envelope
 from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _NECK = (12,)
 _LEAST_STROKES = 5
 
@@ -96,7 +95,7 @@ class _Dribble:
             turn: see `_turns`.
         """
         hips = body.joints[:, 0]
-        for one, active in ((self.side, 1 - turn), (_OTHER[self.side], turn)):
+        for one, active in ((self.side, 1 - turn), (OTHER_SIDE[self.side], turn)):
             if one != self.side and not self.guards:
                 body.lift_arm(one, 8 * way)
                 continue
@@ -116,7 +115,7 @@ def _stand_apart(body: StandingBody, side: str, apart: tuple[float, float], star
         apart: metres of each foot outward, and of that foot back.
     """
     wide, back = apart
-    for one, ahead, waits in ((side, -back, 0.1), (_OTHER[side], 0.3 * back, 0.4)):
+    for one, ahead, waits in ((side, -back, 0.1), (OTHER_SIDE[side], 0.3 * back, 0.4)):
         step(body, one, (wide, ahead), start, 0.4)
         if end is not None:
             step(body, one, (-wide, -ahead), end + waits, 0.4)

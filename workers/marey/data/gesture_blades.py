@@ -7,10 +7,9 @@ import random
 from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near, on_guard
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody
+from marey.data.gesture_poses import OTHER_SIDE, StandingBody
 from marey.data.gesture_stances import step
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _STABS: dict[str, tuple[Point, Point, Point]] = {
     "stab-knife": ((0.16, -0.22, 0.22), (0.2, -0.24, -0.02), (0.04, -0.16, 0.52)),
     "stab-sword": ((0.14, -0.16, 0.3), (0.22, -0.14, 0.02), (0.04, -0.06, 0.54)),
@@ -22,7 +21,7 @@ _STABS: dict[str, tuple[Point, Point, Point]] = {
 
 def stab(rng: random.Random) -> Gesture:
     form, side = rng.choices(list(_STABS), (3, 3, 2, 3))[0], rng.choice(SIDES)
-    lead = rng.choice(SIDES) if form != "stab-spear" else _OTHER[side]
+    lead = rng.choice(SIDES) if form != "stab-spear" else OTHER_SIDE[side]
     ready, start, stance = begun(rng, lead)
     guard, back, end = (near(rng, place) for place in _STABS[form])
     number = rng.choices((1, 2, 3), (5, 2, 2))[0]
@@ -34,11 +33,11 @@ def stab(rng: random.Random) -> Gesture:
     for _ in range(number):
         hands: dict[str, tuple[Point, ...]] = {side: (back, near(rng, end, 0.04))}
         if form == "stab-spear":
-            hands[_OTHER[side]] = ((front[0], front[1], front[2] - 0.12), (front[0] + 0.02, front[1] + 0.06, 0.52))
+            hands[OTHER_SIDE[side]] = ((front[0], front[1], front[2] - 0.12), (front[0] + 0.02, front[1] + 0.06, 0.52))
         blows.append(_thrust(rng, begin, hands, side, stride if lunges else 0.0))
         begin = blows[-1].end + rng.uniform(0.1, 0.6)
     seconds = begin + rng.uniform(0.4, 0.9)
-    guards = {side: guard, _OTHER[side]: front if form == "stab-spear" else near(rng, (0.16, -0.2, 0.22))}
+    guards = {side: guard, OTHER_SIDE[side]: front if form == "stab-spear" else near(rng, (0.16, -0.2, 0.22))}
     lowers = stance is None and rng.random() < 0.8
 
     def change(body: StandingBody) -> None:
@@ -100,13 +99,13 @@ def slash(rng: random.Random) -> Gesture:
             places = tuple((x, 1.1 * y, max(z, 0.26 - 0.35 * max(y, 0.0))) for x, y, z in places)
         hands: dict[str, tuple[Point, ...]] = {side: places}
         if both:
-            hands[_OTHER[side]] = tuple((0.03 - x, y - 0.07, z - 0.02) for x, y, z in places)
+            hands[OTHER_SIDE[side]] = tuple((0.03 - x, y - 0.07, z - 0.02) for x, y, z in places)
         blows.append(_sweep(rng, kind, begin, hands, side, heavy=heavy))
         begin = blows[-1].end + rng.uniform(0.05, 0.5)
     seconds = begin + rng.uniform(0.4, 0.9)
     ahead = near(rng, (0.06, -0.2, 0.34))
     other = (0.03 - ahead[0], ahead[1] - 0.07, ahead[2] - 0.03) if both else near(rng, (0.18, -0.28, 0.16))
-    guards = {side: ahead, _OTHER[side]: other}
+    guards = {side: ahead, OTHER_SIDE[side]: other}
     lowers = stance is None and rng.random() < 0.8
 
     def change(body: StandingBody) -> None:

@@ -9,10 +9,9 @@ import numpy as np
 from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near, on_guard
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
+from marey.data.gesture_poses import LEFT, OTHER_SIDE, RIGHT, StandingBody, envelope
 from marey.data.gesture_stances import settle, step
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _OUTWARD = (1.0, 0.1, -0.2)
 
 _PUNCHES: dict[str, tuple[Point, Point, Point]] = {
@@ -41,7 +40,7 @@ def punch(rng: random.Random) -> Gesture:
         blows.append(blow)
         free[one] = blow.end + rng.uniform(0.03, 0.5)
         begin = blow.hit + rng.uniform(0.05, 0.3)
-        one = hand or _OTHER[one]
+        one = hand or OTHER_SIDE[one]
     seconds = max(free.values()) + rng.uniform(0.5, 1.1)
     guards = {one: near(rng, (0.08, -0.04, 0.3 if one == lead else 0.2)) for one in SIDES}
     lowers = stance is None and rng.random() < 0.8
@@ -99,7 +98,7 @@ def block(rng: random.Random) -> Gesture:
     lead = rng.choice(SIDES)
     ready, start, stance = (0.1, -2.0, None) if stands else begun(rng, lead)
     goes, pole = _BLOCKS[form]
-    places = {(side if who == "acts" else _OTHER[side]): near(rng, place) for who, place in goes.items()}
+    places = {(side if who == "acts" else OTHER_SIDE[side]): near(rng, place) for who, place in goes.items()}
     times, seconds = [], ready + rng.uniform(0.1, 0.7)
     for _ in range(number):
         rise, hold, fall = rng.uniform(0.28, 0.42), rng.uniform(0.35, 1.5) / number**0.5, rng.uniform(0.35, 0.7)

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
-from marey.data.gesture_stances import LEGS, settle, step, turn_hips
+from marey.data.gesture_poses import LEFT, LEGS, OTHER_SIDE, StandingBody, envelope
+from marey.data.gesture_stances import settle, step, turn_hips
 from marey.data.part import FPS
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _NECK = (12,)
 _LONGEST = 9.3
 _GUARDS = {
@@ -40,7 +39,7 @@ def drawn_stance(rng: random.Random, lead: str, start: float, end: float | None)
     length, width, share = rng.uniform(0.26, 0.5), rng.uniform(0.22, 0.4), rng.uniform(0.25, 0.75)
     turn, sink, lean = rng.uniform(12, 40), rng.uniform(0.03, 0.1), rng.uniform(4, 16)
     hips, twist = rng.uniform(6, 18), rng.uniform(6, 20)
-    first, follows = rng.choice((lead, _OTHER[lead])), _OTHER[lead]
+    first, follows = rng.choice((lead, OTHER_SIDE[lead])), OTHER_SIDE[lead]
 
     def stand(body: StandingBody, way: Array) -> None:
         feet = body.joints[:, LEGS[lead][2]] - body.joints[:, LEGS[follows][2]]
@@ -91,7 +90,7 @@ def fight_stance(rng: random.Random) -> Gesture:
     seconds = min(end + (1.3 if ends else 0.0), _LONGEST)
     stance = drawn_stance(rng, lead, start, end if ends else None)
     hands = {}
-    for one, limits in zip((lead, _OTHER[lead]), _GUARDS[form], strict=True):
+    for one, limits in zip((lead, OTHER_SIDE[lead]), _GUARDS[form], strict=True):
         hands[one] = np.array([rng.uniform(*limit) for limit in limits])
     mood = rng.choice(["still", "bounce", "bounce", "weave"])
     rate, high = rng.uniform(1.3, 2.4), rng.uniform(0.012, 0.03) if mood == "bounce" else 0.003
@@ -112,7 +111,7 @@ def fight_stance(rng: random.Random) -> Gesture:
         )
         body.lean(100 * sway * way * side_to_side, "forward")
         settle(body)
-        for k, one in enumerate((lead, _OTHER[lead])):
+        for k, one in enumerate((lead, OTHER_SIDE[lead])):
             path = np.stack(
                 [np.sin(2 * np.pi * f * t + phases[2 + k + n]) for n, f in enumerate((0.7, 1.1, 0.9))], axis=-1
             )

@@ -7,8 +7,8 @@ import random
 import numpy as np
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_poses import StandingBody, eased, envelope, tremble
-from marey.data.gesture_stances import LEGS, before, settle
+from marey.data.gesture_poses import LEGS, StandingBody, eased, envelope, tremble
+from marey.data.gesture_stances import before, settle
 from marey.data.part import FPS
 
 _HEAD, _NECK = 15, (12,)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_gaits import speed_of
 from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody
-from marey.data.gesture_ways import LEGS
+from marey.data.limbs import LEG_CHAINS
 from marey.data.part import FPS, GRAVITY, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
@@ -99,11 +99,11 @@ def _leapt(
 
 def _spread(body: StandingBody, middle: int, fly: Array, apart: float, straighten: float) -> None:
     """Spread the thighs to `apart` radians in frame `middle`, and stretch the knees, by `fly` (T,)."""
-    thighs = [body.local(body.joints[:, knee] - body.joints[:, hip], LEFT)[middle] for hip, knee, *_ in LEGS]
+    thighs = [body.local(body.joints[:, knee] - body.joints[:, hip], LEFT)[middle] for hip, knee, *_ in LEG_CHAINS]
     toward = [float(np.arctan2(thigh[2], -thigh[1])) for thigh in thighs]
     front, more = int(np.argmax(toward)), max(apart - abs(toward[0] - toward[1]), 0.0)
     left = body.world(np.tile([1.0, 0.0, 0.0], (len(fly), 1)), LEFT)
-    for side, (hip, knee, ankle, toe) in enumerate(LEGS):
+    for side, (hip, knee, ankle, toe) in enumerate(LEG_CHAINS):
         angle = -_FRONT * more if side == front else (1 - _FRONT) * more
         _turn(body.joints, hip, [knee, ankle, toe], left * (angle * fly)[:, None])
         thigh, shank = (body.joints[:, b] - body.joints[:, a] for a, b in ((hip, knee), (knee, ankle)))

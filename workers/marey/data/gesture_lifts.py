@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, respond
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, direction, eased, envelope, swings
+from marey.data.gesture_poses import OTHER_SIDE, RIGHT, StandingBody, direction, eased, envelope, swings
 from marey.data.part import FPS
 from marey.motion.rotations import normalize
 
@@ -17,7 +17,6 @@ Array = NDArray[np.floating]
 _HEAD, _NECK = 15, (12,)
 _ARM = 0.52
 """Metres from shoulder to wrist."""
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _DRINKS = {
     "drink-sip": {"stay": (0.6, 1.0), "tip": (-3, 8), "sips": (1, 1, 2, 3)},
     "drink-swig": {"stay": (0.8, 1.7), "tip": (5, 18), "sips": (1, 1, 2)},
@@ -104,7 +103,7 @@ def reach_up(rng: random.Random) -> Gesture:
         respond(body, top, side, twist, sway)
         body.lean(-0.12 * gaze * top, "left")
         if side != BOTH:
-            body.lift_arm(_OTHER[side], free * top)
+            body.lift_arm(OTHER_SIDE[side], free * top)
         for one in arms_of(side):
             target = np.tile(_ARM * far * direction(out, up), (frames, 1))
             turning = 2 * np.pi * rate * t

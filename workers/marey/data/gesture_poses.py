@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
+from marey.data.limbs import ARM_CHAINS, BONE_LENGTHS, CARRIED, LEG_CHAINS
 from marey.data.part import FPS
 from marey.data.splice import with_bones
 from marey.motion.filters import smootherstep
@@ -23,13 +24,14 @@ from marey.motion.skeleton import HUMANML3D
 Array = NDArray[np.floating]
 
 LEFT, RIGHT = "left", "right"
-ARMS = {LEFT: (13, 16, 18, 20), RIGHT: (14, 17, 19, 21)}
+OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT}
+SIGN = {LEFT: 1.0, RIGHT: -1.0}
+"""Of the body's left, on each side: outward is `SIGN` times left."""
+ARMS: dict[str, tuple[int, int, int, int]] = dict(zip((LEFT, RIGHT), ARM_CHAINS, strict=True))
 """Collar, shoulder, elbow and wrist."""
-_SIGN = {LEFT: 1.0, RIGHT: -1.0}
-_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
-_LEGS = (1, 2, 4, 5, 7, 8, 10, 11)
-_CARRIED = [j for j in range(22) if j not in _LEGS[2:]]
-"""Joints that move with the hips."""
+LEGS: dict[str, tuple[int, int, int, int]] = dict(zip((LEFT, RIGHT), LEG_CHAINS, strict=True))
+"""Hip, knee, ankle and toe."""
+_LEG_JOINTS = {joint for leg in LEG_CHAINS for joint in leg}
 _ANKLES, _TOES = [7, 8], [10, 11]
 _SPINE = (3, 6, 9)
 _NECK = 12
@@ -74,7 +76,7 @@ class StandingBody:
 
     def _axes(self, side: str) -> Array:
         """Axes of the body (T, 3, 3) in rows: outward, up, forward."""
-        return np.stack([_SIGN[side] * self._left, self._up, self._forward], axis=1)
+        return np.stack([SIGN[side] * self._left, self._up, self._forward], axis=1)
 
     def local(self, vectors: Array, side: str) -> Array:
         """Convert vectors (T, 3) from the world to the body's frame."""
@@ -132,8 +134,8 @@ class StandingBody:
             axis=-1,
         )
         self.joints[:, shoulder] = self.joints[:, collar] + self.world(clavicle, side)
-        self.joints[:, elbow] = self.joints[:, shoulder] + _LENGTH[elbow] * self.world(bones[0], side)
-        self.joints[:, wrist] = self.joints[:, elbow] + _LENGTH[wrist] * self.world(bones[1], side)
+        self.joints[:, elbow] = self.joints[:, shoulder] + BONE_LENGTHS[elbow] * self.world(bones[0], side)
+        self.joints[:, wrist] = self.joints[:, elbow] + BONE_LENGTHS[wrist] * self.world(bones[1], side)
 
     def reach(self, side: str, target: Array, pole: Sequence[float] | Array = _POLE) -> tuple[Array, Array]:
         """Directions (T, 3) of upper arm and forearm that put the wrist at a target.
@@ -144,7 +146,7 @@ class StandingBody:
             pole: (3,) or (T, 3) where the elbow points, in the body's frame; down and outward by default.
         """
         _, _, elbow, wrist = ARMS[side]
-        upper, lower = _LENGTH[elbow], _LENGTH[wrist]
+        upper, lower = BONE_LENGTHS[elbow], BONE_LENGTHS[wrist]
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
         axis = target / distance
         distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
@@ -175,12 +177,12 @@ class StandingBody:
 
     def lift_arm(self, side: str, degrees: Array) -> None:
         """Lift a hanging arm away from the body by turning its shoulder by `degrees` (T,)."""
-        self.turn(ARMS[side][1], "forward", _SIGN[side] * degrees)
+        self.turn(ARMS[side][1], "forward", SIGN[side] * degrees)
 
     def shrug(self, degrees: Array) -> None:
         """Lift both shoulders by turning the collars by `degrees` (T,)."""
         for side, (collar, *_) in ARMS.items():
-            self.turn(collar, "forward", _SIGN[side] * degrees)
+            self.turn(collar, "forward", SIGN[side] * degrees)
 
     def steady(self, share: float) -> None:
         """Take a share, 0 to 1, of the swing of the shoulders out of the spine."""
@@ -191,7 +193,7 @@ class StandingBody:
     def shift(self, up: Array, forward: Array | float = 0.0, left: Array | float = 0.0) -> None:
         """Move the hips and all above them, in metres (T,); the knees are solved."""
         moved = np.stack(np.broadcast_arrays(left, up, forward), axis=-1)
-        self.joints[:, _CARRIED] += self.world(moved, LEFT)[:, None]
+        self.joints[:, CARRIED] += self.world(moved, LEFT)[:, None]
 
     def rise_on_toes(self, degrees: Array) -> None:
         """Lift the heels by turning the feet about the toes by `degrees` (T,), the hips following."""
@@ -217,13 +219,13 @@ class StandingBody:
         """
         hips = self.joints[:, [1, 2]].copy()
         self.turn(0, "left", _PELVIS_SHARE * degrees, besides=(1, 2))
-        self.joints[:, _CARRIED] += (hips - self.joints[:, [1, 2]]).mean(1, keepdims=True)
+        self.joints[:, CARRIED] += (hips - self.joints[:, [1, 2]]).mean(1, keepdims=True)
         self.lean((1 - _PELVIS_SHARE) * degrees, "left")
         self.turn(_NECK, "left", head * degrees)
         for _, shoulder, _, _ in ARMS.values():
             self.turn(shoulder, "left", -arms_hang * degrees)
         sine = np.sin(np.radians(degrees))[:, None, None]
-        self.joints[:, _CARRIED] -= _BACK * sine * self._forward[:, None] + _DOWN * sine * self._up[:, None]
+        self.joints[:, CARRIED] -= _BACK * sine * self._forward[:, None] + _DOWN * sine * self._up[:, None]
 
     def solved(self) -> Array:
         """The poses (T, 22, 3) with bones of the skeleton's lengths and knees solved between hips and feet."""
@@ -238,7 +240,7 @@ def _beyond(joint: int) -> list[int]:
     """Descendants of a joint, without the legs, which are solved."""
     found = [joint]
     for j, parent in enumerate(HUMANML3D.parents):
-        if parent in found and j not in _LEGS:
+        if parent in found and j not in _LEG_JOINTS:
             found.append(j)
     return found[1:]
 

@@ -14,22 +14,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
-from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, eased
+from marey.data.gesture_poses import ARMS, LEFT, LEGS, SIGN, StandingBody, eased
 from marey.data.gesture_postures import HandPlace, Posture
+from marey.data.limbs import BONE_LENGTHS, CARRIED
 from marey.data.part import FPS
 from marey.data.retarget import two_bones
 from marey.motion.rotations import cross, normalize
-from marey.motion.skeleton import HUMANML3D
 
 Array = NDArray[np.floating]
 
-_SIGN = {LEFT: 1.0, RIGHT: -1.0}
-_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
-_LEGS = {LEFT: (1, 4, 7, 10), RIGHT: (2, 5, 8, 11)}
-"""Hip, knee, ankle and toe."""
 _ANKLES = [7, 8]
 _HIPS = (1, 2)
-_CARRIED = [j for j in range(22) if j not in (4, 5, 7, 8, 10, 11)]
 _SPINE, _NECK = (3, 6, 9), 12
 _ARM_REACH = 0.985  # share of the length of an arm
 _LEAST_REACH = 0.17  # metres from shoulder to wrist
@@ -65,12 +60,12 @@ class _Posing:
         left = normalize(across)
         self.axes = np.stack([left, [0.0, 1.0, 0.0], np.cross(left, [0.0, 1.0, 0.0])])
         """Rows: left, up, forward."""
-        self.bends = {side: self._bend(side) for side in _LEGS}
+        self.bends = {side: self._bend(side) for side in LEGS}
         """Where the knees of the idle point, by side: outward, up and forward."""
 
     def apply(self) -> None:
         self._trunk()
-        for side in _LEGS:
+        for side in LEGS:
             self._leg(side)
         for side in ARMS:
             self._arm(side)
@@ -93,7 +88,7 @@ class _Posing:
 
     def _outward(self, side: str) -> Array:
         """Factors (3,) that turn left, up, forward to outward, up, forward."""
-        return np.array([_SIGN[side], 1.0, 1.0])
+        return np.array([SIGN[side], 1.0, 1.0])
 
     def _trunk(self) -> None:
         body = self.body
@@ -110,7 +105,7 @@ class _Posing:
         lean = self._track([np.add(posture.tilt, posture.spine)[:1] for posture in self.postures])[:, 0]
         for _, shoulder, _, _ in ARMS.values():
             body.turn(shoulder, "left", -hang * lean)
-        body.joints[:, _CARRIED] += self._world(moved)[:, None]
+        body.joints[:, CARRIED] += self._world(moved)[:, None]
 
     def _hips(self, posture: Posture, rest: Array) -> Array:
         """Where a posture has the pelvis (3,)."""
@@ -118,9 +113,9 @@ class _Posing:
             return rest
         if not posture.over:
             return self._tall(np.array(posture.pelvis), rest)
-        foot = self._floor(self.body.joints[:, _LEGS[posture.over][2]]).mean(0)
+        foot = self._floor(self.body.joints[:, LEGS[posture.over][2]]).mean(0)
         if posture.over in posture.feet:
-            foot = np.array(posture.feet[posture.over].at) * np.array([_SIGN[posture.over], 1.0, 1.0])
+            foot = np.array(posture.feet[posture.over].at) * np.array([SIGN[posture.over], 1.0, 1.0])
         return self._tall(np.array(posture.pelvis), rest) + foot * np.array([1.0, 0.0, 1.0])
 
     def _tall(self, pelvis: Array, rest: Array) -> Array:
@@ -136,7 +131,7 @@ class _Posing:
                 self.body.turn(joint, axis, degrees, besides=besides)
 
     def _leg(self, side: str) -> None:
-        hip, knee, ankle, toe = _LEGS[side]
+        hip, knee, ankle, toe = LEGS[side]
         joints = self.body.joints
         sign = self._outward(side)
         own, pointed = self._floor(joints[:, ankle]) * sign, ((joints[:, toe] - joints[:, ankle]) @ self.axes.T) * sign
@@ -144,7 +139,7 @@ class _Posing:
         feet = [posture.feet.get(side) for posture in self.postures]
         if any(feet):
             flat = np.array([0.0, rest[1] - _ANKLE, 0.0])
-            raised = np.array([0.0, rest[1] + _LENGTH[toe] * normalize(towards)[1] - _TOE, 0.0])
+            raised = np.array([0.0, rest[1] + BONE_LENGTHS[toe] * normalize(towards)[1] - _TOE, 0.0])
             places = np.array([foot.at + (raised if foot.toes else flat) if foot else rest for foot in feet])
             free = self._track([[0.0 if foot else 1.0] for foot in feet])
             put = self._track(places, _SMOOTH_FEET) + free * (own - rest)
@@ -152,17 +147,17 @@ class _Posing:
             toes = self._track([normalize(np.array(foot.toes if foot and foot.toes else towards)) for foot in feet])
             toes = normalize(toes + free * (normalize(pointed) - normalize(towards)))
             joints[:, ankle] = self.origin + self._world(put, side)
-            joints[:, toe] = joints[:, ankle] + _LENGTH[toe] * self._world(toes, side)
+            joints[:, toe] = joints[:, ankle] + BONE_LENGTHS[toe] * self._world(toes, side)
         pole = self._track(
             [normalize(np.array(posture.knees.get(side, self.bends[side]))) for posture in self.postures]
         )
         joints[:, knee], _ = two_bones(
-            joints[:, hip], joints[:, ankle], self._world(pole, side), (_LENGTH[knee], _LENGTH[ankle])
+            joints[:, hip], joints[:, ankle], self._world(pole, side), (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
         )
 
     def _bend(self, side: str) -> Array:
         """Where a knee of the idle points (3,); a straight one, where the foot does."""
-        hip, knee, ankle, toe = (self.body.joints[:, joint] for joint in _LEGS[side])
+        hip, knee, ankle, toe = (self.body.joints[:, joint] for joint in LEGS[side])
         axis = normalize(ankle - hip)
         aside = knee - hip - axis * np.einsum("ti,ti->t", knee - hip, axis)[:, None]
         pointed = (toe - ankle) * np.array([1.0, 0.0, 1.0])
@@ -195,8 +190,8 @@ class _Posing:
         target += 4 * free * (1 - free) * (np.array(_VIA) @ self._trunk_axes(side))
         target, pole = (gaussian_filter1d(one, _SMOOTH, axis=0, mode="nearest") for one in (target, pole))
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
-        target *= np.clip(distance, _LEAST_REACH, _ARM_REACH * (_LENGTH[elbow] + _LENGTH[wrist])) / distance
-        lengths = (_LENGTH[elbow], _LENGTH[wrist])
+        target *= np.clip(distance, _LEAST_REACH, _ARM_REACH * (BONE_LENGTHS[elbow] + BONE_LENGTHS[wrist])) / distance
+        lengths = (BONE_LENGTHS[elbow], BONE_LENGTHS[wrist])
         wrists = self._clear(joints[:, shoulder] + target, side)
         wrists[:, 1] = np.maximum(wrists[:, 1], _LOWEST)
         for _ in range(2):  # elbows that would be in the floor are lifted
@@ -208,7 +203,7 @@ class _Posing:
     def _clear(self, wrists: Array, side: str) -> Array:
         """Move wrists (T, 3) that would go through the trunk or the thigh away from it."""
         joints, out = self.body.joints, self._world(np.array([_OUT, 0.0, 0.0]), side)
-        for (a, b), room in ((_TRUNK, _TRUNK_ROOM), (_LEGS[side][:2], _THIGH_ROOM)):
+        for (a, b), room in ((_TRUNK, _TRUNK_ROOM), (LEGS[side][:2], _THIGH_ROOM)):
             bone = joints[:, b] - joints[:, a]
             along = np.einsum("ti,ti->t", wrists - joints[:, a], bone) / np.einsum("ti,ti->t", bone, bone)
             nearest = joints[:, a] + np.clip(along, 0.0, 1.0)[:, None] * bone
@@ -242,7 +237,7 @@ class _Posing:
         up = normalize(middle - self.body.joints[:, 0])
         across = self.body.joints[:, ARMS[side][1]] - middle
         out = normalize(across - up * np.einsum("ti,ti->t", across, up)[:, None])
-        return np.stack([out, up, _SIGN[side] * cross(out, up)], axis=1)
+        return np.stack([out, up, SIGN[side] * cross(out, up)], axis=1)
 
     def _anchored(self, hand: HandPlace, side: str) -> tuple[Array, Array]:
         """The point (T, 3) of a hand, and where the elbow points."""
@@ -254,7 +249,7 @@ class _Posing:
         anchors = {
             "floor": self.origin,
             "shoulder": joints[:, ARMS[side][1]],
-            "knee": joints[:, _LEGS[side][1]],
+            "knee": joints[:, LEGS[side][1]],
         }
         towards = np.broadcast_to(self._world(elbow, side), (len(self.t), 3))
         return anchors[hand.anchor] + np.broadcast_to(self._world(at, side), (len(self.t), 3)), towards

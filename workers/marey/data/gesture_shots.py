@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_aims import GUNS, TWISTS
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, stations
+from marey.data.gesture_poses import LEFT, OTHER_SIDE, StandingBody, stations
 from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _KICK = 0.05
 """Seconds in which a shot drives the hands back."""
 _FIRES = {
@@ -51,17 +50,17 @@ def shoot(rng: random.Random) -> Gesture:
     firing = _Firing(rng, fall, burst=burst, pumps=pumps)
     times = firing.times
     hands, degrees = GUNS[fire["gun"]](rng, side), rng.uniform(*TWISTS[fire["gun"]])
-    turned = _OTHER[side] if fire["gun"] == "aim-rifle" else side
+    turned = OTHER_SIDE[side] if fire["gun"] == "aim-rifle" else side
     stoop, head, rock = rng.uniform(2, 10), rng.uniform(0, 7), 60 * back * rng.uniform(0.7, 1.3)
     stance = rng.uniform(0.12, 0.26) if rng.random() < 0.55 else 0.0
-    lead = _OTHER[side] if fire["gun"] == "aim-rifle" else side
+    lead = OTHER_SIDE[side] if fire["gun"] == "aim-rifle" else side
 
     def change(body: StandingBody) -> None:
         frames = len(body.joints)
         way = firing.pace.way(body)
         if stance:
             start = firing.pace.start
-            for one, sign in ((lead, 1.0), (_OTHER[lead], -1.0)):
+            for one, sign in ((lead, 1.0), (OTHER_SIDE[lead], -1.0)):
                 began = -2.0 if firing.aimed else start + (0.0 if sign > 0 else 0.3)
                 step(body, one, (0.03, sign * stance / 2), began, 0.35, turn=4.0 if sign > 0 else 14.0)
             body.shift(-0.02 * way)

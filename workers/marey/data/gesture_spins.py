@@ -11,7 +11,8 @@ from marey.checks.kinematics import heading
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import LEFT, StandingBody, eased
 from marey.data.gesture_steps import small_step_spin
-from marey.data.gesture_ways import LEGS, about_vertical, posed, spine_yaw
+from marey.data.gesture_ways import about_vertical, posed, spine_yaw
+from marey.data.limbs import LEG_CHAINS, LEVEL
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.splice import with_bones
@@ -20,7 +21,6 @@ from marey.motion.rotations import from_rotvec, rotate
 Array = NDArray[np.floating]
 
 _TOES = [10, 11]
-_FLAT = np.array([1.0, 0.0, 1.0])
 _ARMS_IN = {
     "in": ((-0.04, 0.06), (-0.2, -0.08), (0.2, 0.27)),
     "round": ((0.06, 0.14), (-0.22, -0.06), (0.32, 0.4)),
@@ -83,16 +83,16 @@ def _about_foot(joints: Array, foot: int, yaw: Array, shoulders: Array, on_foot:
         drawn: degrees by which its heel rises, and metres by which the other foot is lifted.
     """
     local = about_vertical(joints, np.full(joints.shape[:2], -np.radians(heading(joints, FPS)[0])))
-    pivot = (local[0, _TOES[foot]] * _FLAT)[None]
+    pivot = (local[0, _TOES[foot]] * LEVEL)[None]
     local = local - pivot
     toes = local[:, _TOES].copy()
-    over = on_foot[:, None] * (-0.8 * local[:, 0] * _FLAT)
+    over = on_foot[:, None] * (-0.8 * local[:, 0] * LEVEL)
     root = local[:, 0] + over
-    toes[:, 1 - foot] += on_foot[:, None] * (0.6 * (root * _FLAT - toes[:, 1 - foot] * _FLAT) + [0, drawn[1], 0])
+    toes[:, 1 - foot] += on_foot[:, None] * (0.6 * (root * LEVEL - toes[:, 1 - foot] * LEVEL) + [0, drawn[1], 0])
     away = 1 if foot == 0 else -1
     toes[:, 1 - foot, 0] -= on_foot * away * 0.09
     toes[:, 1 - foot, 2] += on_foot * 0.05
-    for side, (_, _, ankle, toe) in enumerate(LEGS):
+    for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
         pitch = np.zeros((len(local), 3))
         pitch[:, 0] = np.radians(drawn[0] if side == foot else 35.0) * on_foot
         local[:, toe] = local[:, ankle] + rotate(from_rotvec(pitch), local[:, toe] - local[:, ankle])
@@ -154,7 +154,7 @@ def _in_the_air(joints: Array, flight: tuple[int, int], turn: float, wound: floa
     hips = _through(t, first - more, last + more) * turn
     winds = eased((t - first + 14) / 9) * (1 - eased((t - first + 5) / 8)) * wound * np.sign(turn)
     shoulders = _through(t, first - 1.5 * more, last + 0.5 * more) * turn - winds
-    pivot = joints[np.minimum(np.arange(len(joints)), last), :1] * _FLAT
+    pivot = joints[np.minimum(np.arange(len(joints)), last), :1] * LEVEL
     moved = pivot + about_vertical(joints - pivot, np.repeat(feet[:, None], 22, axis=1))
     turned = np.repeat(feet[:, None], 2, axis=1)
     return posed(joints, moved[:, 0], spine_yaw(hips, shoulders), moved[:, _TOES], turned)

@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, eased
+from marey.data.gesture_poses import LEFT, LEGS, StandingBody, eased
 from marey.data.part import FPS
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 
 Array = NDArray[np.floating]
 
-LEGS = {LEFT: (1, 4, 7, 10), RIGHT: (2, 5, 8, 11)}
-"""Hip, knee, ankle and toe."""
 _LEG = float(np.linalg.norm(HUMANML3D.offsets[[4, 7]], axis=1).sum())
 _STRETCHED = 0.985  # share of its length that a leg may stretch to
 _SMOOTH = 1.5  # frames

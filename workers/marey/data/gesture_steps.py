@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import heading, smooth
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_poses import ARMS, LEFT, StandingBody, eased
-from marey.data.gesture_ways import LEGS, about_vertical, posed, spine_yaw
+from marey.data.gesture_ways import about_vertical, posed, spine_yaw
+from marey.data.limbs import LEG_CHAINS, LEVEL
 from marey.data.part import FPS
 from marey.motion.filters import smooth_above
 from marey.motion.rotations import from_rotvec, rotate
@@ -24,7 +25,6 @@ from marey.motion.rotations import from_rotvec, rotate
 Array = NDArray[np.floating]
 
 _TOES = [10, 11]
-_FLAT = np.array([1.0, 0.0, 1.0])
 _SMOOTH = 0.13  # seconds over which the body follows its feet
 _TURN_PACES = {"quick": (0.26, 0.34), "": (0.36, 0.52), "slow": (0.6, 0.85)}  # seconds from one step to the next
 _UNTRUE = {
@@ -81,7 +81,7 @@ class Manner:
 def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner) -> Array:
     """Let an idle (T, 22, 3) step; return joints that begin at the origin and face +Z."""
     angle = np.radians(heading(joints, FPS)[0])
-    local = about_vertical(joints - joints[0, 0] * _FLAT, np.full(joints.shape[:2], -angle))
+    local = about_vertical(joints - joints[0, 0] * LEVEL, np.full(joints.shape[:2], -angle))
     frames = np.arange(len(local))
     places, lifted, swings = np.zeros((len(local), 2, 4)), np.zeros((len(local), 2)), np.zeros((len(local), 2))
     for step in steps:
@@ -92,11 +92,11 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner) -> Array:
         lifted[:, step.foot] += np.sin(np.pi * np.clip((share - 0.08) / 0.92, 0, 1)) ** 2
         swings[:, step.foot] += np.sin(np.pi * share**0.6) ** 2
     body = smooth(places.mean(1), _SMOOTH, FPS)
-    for side, (_, _, ankle, toe) in enumerate(LEGS):
+    for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
         pitch = np.zeros((len(local), 3))
         pitch[:, 0] = np.radians(manner.heel) * swings[:, side]
         local[:, toe] = local[:, ankle] + rotate(from_rotvec(pitch), local[:, toe] - local[:, ankle])
-    feet = about_vertical(joints[:, _TOES] - joints[0, 0] * _FLAT, np.full((len(local), 2), -angle))
+    feet = about_vertical(joints[:, _TOES] - joints[0, 0] * LEVEL, np.full((len(local), 2), -angle))
     toes = about_vertical(feet, places[..., 3]) + places[..., :3]
     toes[..., 1] += manner.lift * lifted
     weight = smooth((lifted[:, 1] - lifted[:, 0]) * manner.sway, 0.1, FPS)
@@ -119,11 +119,11 @@ def _went(share: Array, rise: float) -> Array:
 def _too_high(local: Array, root: Array, yaw: Array, toes: Array, toe_yaw: Array) -> Array:
     """Metres (T,) by which hips at `root` are too high for the legs to reach the feet; see `posed`."""
     over = np.zeros((len(root), 2))
-    for side, (hip, knee, ankle, toe) in enumerate(LEGS):
+    for side, (hip, knee, ankle, toe) in enumerate(LEG_CHAINS):
         bones = np.linalg.norm(local[0, [knee, ankle]] - local[0, [hip, knee]], axis=-1).sum()
         at = root + about_vertical(local[:, hip] - local[:, 0], yaw)
         down = toes[:, side] - about_vertical(local[:, toe] - local[:, ankle], toe_yaw[:, side]) - at
-        level = np.minimum(np.linalg.norm(down * _FLAT, axis=-1), 0.9 * bones)
+        level = np.minimum(np.linalg.norm(down * LEVEL, axis=-1), 0.9 * bones)
         over[:, side] = -down[:, 1] - np.sqrt((_REACH * bones) ** 2 - level**2)
     return smooth_above(np.maximum(over.max(1), 0.0), 2.0)
 

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, envelope
+from marey.data.gesture_poses import LEFT, OTHER_SIDE, StandingBody, envelope
 from marey.data.gesture_stances import glide, settle, step, turn_hips
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _NECK = (12,)
 _THROWS = {
     "throw-over": ((0.36, 0.1, -0.16), (0.24, 0.38, 0.08), (0.1, 0.2, 0.48), (-0.12, -0.3, 0.34)),
@@ -35,7 +34,7 @@ _TRUNK = {
 def throw(rng: random.Random) -> Gesture:
     form = rng.choices(list(_THROWS), (5, 3, 2, 2))[0]
     side = BOTH if form == "throw-both" else rng.choices(SIDES, (1, 1))[0]
-    lead = rng.choice(SIDES) if side == BOTH else _OTHER[side]
+    lead = rng.choice(SIDES) if side == BOTH else OTHER_SIDE[side]
     twist, back, stoop, sway = (rng.uniform(*_TRUNK[form][name]) for name in ("twist", "back", "stoop", "sway"))
     hard = rng.choice(["hard", "", "", "easy"])
     snap = {"hard": rng.uniform(0.8, 0.95), "": rng.uniform(0.95, 1.15), "easy": rng.uniform(1.1, 1.3)}[hard]

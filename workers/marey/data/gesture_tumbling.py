@@ -17,25 +17,19 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody
+from marey.data.gesture_poses import ARMS, LEFT, LEGS, RIGHT, SIGN, StandingBody
 from marey.data.gesture_postures import Point
+from marey.data.limbs import BONE_LENGTHS, CARRIED, LEVEL
 from marey.data.part import FPS, GRAVITY
 from marey.data.retarget import two_bones
 from marey.motion.rotations import cross, from_rotvec, normalize, rotate
-from marey.motion.skeleton import HUMANML3D
 
 Array = NDArray[np.floating]
 
 OWN, FLOOR, BODY = "own", "floor", "body"
-_SIGN = {LEFT: 1.0, RIGHT: -1.0}
-_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
-_LEGS = {LEFT: (1, 4, 7, 10), RIGHT: (2, 5, 8, 11)}
-"""Hip, knee, ankle and toe."""
-_CARRIED = [j for j in range(22) if j not in (4, 5, 7, 8, 10, 11)]
 _SPINE, _NECK = (3, 6, 9), 12
 _ROOM = {0: 0.1, 1: 0.09, 2: 0.09, 3: 0.1, 6: 0.1, 9: 0.11, 12: 0.07, 15: 0.1, 16: 0.08, 17: 0.08}
 """Metres of joints of the trunk over the floor on which it lies."""
-_FLAT = np.array([1.0, 0.0, 1.0])
 _WRIST, _ANKLE, _TOE, _BEND = 0.035, 0.045, 0.012, 0.06  # lowest metres of joints; of elbows and knees
 _REACH, _LEAST = 0.985, 0.17  # share of the length of an arm; metres from shoulder to wrist
 _PARTS = 6  # parts of the way to a pose that is fallen into
@@ -105,7 +99,7 @@ def pair(limb: Limb) -> dict[str, Limb]:
 
 def stood(left: float, forward: float) -> dict[str, Limb]:
     """Both feet as in the idle, moved over the floor."""
-    return {side: Limb((_SIGN[side] * left, 0.0, forward), OWN) for side in SIDES}
+    return {side: Limb((SIGN[side] * left, 0.0, forward), OWN) for side in SIDES}
 
 
 @dataclass
@@ -219,25 +213,25 @@ def tumble(body: StandingBody, motion: WholeMotion) -> None:
     """Move an idle through a motion of the whole body."""
     joints = body.joints
     rest = joints[:, 0].mean(0)
-    left = normalize(((joints[:, 1] - joints[:, 2]) * _FLAT).mean(0))
+    left = normalize(((joints[:, 1] - joints[:, 2]) * LEVEL).mean(0))
     axes = np.stack([left, [0.0, 1.0, 0.0], np.cross(left, [0.0, 1.0, 0.0])])
     idle = joints.copy()
     _turn_trunk(body, motion)
-    put = rest * _FLAT + motion.place * _FLAT @ axes
+    put = rest * LEVEL + motion.place * LEVEL @ axes
     put[:, 1] = motion.place[:, 1] * rest[1]
-    joints[:, _CARRIED] += (put - joints[:, 0])[:, None]
+    joints[:, CARRIED] += (put - joints[:, 0])[:, None]
     clear = np.min([joints[:, j, 1] - room for j, room in _ROOM.items()], axis=0)
     lift = np.maximum(-clear, 0.0) - motion.rest * np.maximum(clear, 0.0)
-    joints[:, _CARRIED, 1] += gaussian_filter1d(lift, _SMOOTH, mode="nearest")[:, None]
+    joints[:, CARRIED, 1] += gaussian_filter1d(lift, _SMOOTH, mode="nearest")[:, None]
     pelvis = _pelvis_axes(axes, motion.tilt)
     for _ in range(3):  # a body whose knees would be in the floor is lifted
         for side in SIDES:
-            _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * _FLAT))
+            _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * LEVEL))
         sunk = np.maximum(_BEND - joints[:, [4, 5], 1].min(-1), 0.0)
-        joints[:, _CARRIED, 1] += gaussian_filter1d(sunk, _SMOOTH, mode="nearest")[:, None]
+        joints[:, CARRIED, 1] += gaussian_filter1d(sunk, _SMOOTH, mode="nearest")[:, None]
     for side in SIDES:
-        _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * _FLAT))
-        _solve_arm(joints, side, motion, (axes, rest * _FLAT))
+        _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * LEVEL))
+        _solve_arm(joints, side, motion, (axes, rest * LEVEL))
 
 
 def _turn_trunk(body: StandingBody, motion: WholeMotion) -> None:
@@ -257,9 +251,9 @@ def _pelvis_axes(axes: Array, tilt: Array) -> Array:
 
 
 def _solve_leg(joints: Array, idle: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array, Array]) -> None:
-    hip, knee, ankle, toe = _LEGS[side]
+    hip, knee, ankle, toe = LEGS[side]
     axes, pelvis, origin = frames
-    sign = np.array([_SIGN[side], 1.0, 1.0])
+    sign = np.array([SIGN[side], 1.0, 1.0])
     target, toes = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
     for anchor, (share, at, towards) in motion.feet[side].items():
         if anchor == BODY:
@@ -272,27 +266,27 @@ def _solve_leg(joints: Array, idle: Array, side: str, motion: WholeMotion, frame
         target += share * point
         toes += share * normalize(pointed)
     target[:, 1] = np.maximum(target[:, 1], _ANKLE)
-    lengths = (_LENGTH[knee], _LENGTH[ankle])
+    lengths = (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
     across = normalize(pelvis[:, 0])
     pole = normalize(cross(normalize(target - joints[:, hip]), across)) + motion.splay[:, None] * across * sign[0]
     joints[:, knee], joints[:, ankle] = two_bones(joints[:, hip], target, pole, lengths)
     toes = normalize(toes)
-    least = np.clip((_TOE - joints[:, ankle, 1]) / _LENGTH[toe], -1.0, 0.9)
+    least = np.clip((_TOE - joints[:, ankle, 1]) / BONE_LENGTHS[toe], -1.0, 0.9)
     toes[:, 1] = np.maximum(toes[:, 1], least)
     level = np.linalg.norm(toes[:, [0, 2]], axis=-1)
     toes[:, [0, 2]] *= (np.sqrt(1 - np.minimum(toes[:, 1] ** 2, 1.0)) / np.maximum(level, 1e-6))[:, None]
-    joints[:, toe] = joints[:, ankle] + _LENGTH[toe] * normalize(toes)
+    joints[:, toe] = joints[:, ankle] + BONE_LENGTHS[toe] * normalize(toes)
 
 
 def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array]) -> None:
     _, shoulder, elbow, wrist = ARMS[side]
     axes, origin = frames
-    sign = np.array([_SIGN[side], 1.0, 1.0])
+    sign = np.array([SIGN[side], 1.0, 1.0])
     middle = joints[:, [16, 17]].mean(1)
     up = normalize(middle - joints[:, 0])
     across = joints[:, shoulder] - middle
     out = normalize(across - up * np.einsum("ti,ti->t", across, up)[:, None])
-    trunk = np.stack([out, up, _SIGN[side] * cross(out, up)], axis=1)
+    trunk = np.stack([out, up, SIGN[side] * cross(out, up)], axis=1)
     target, pole = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
     for anchor, (share, at, towards) in motion.hands[side].items():
         if anchor == BODY:
@@ -306,10 +300,10 @@ def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Arra
         pole += share * normalize(pointed)
     reach = target - joints[:, shoulder]
     distance = np.linalg.norm(reach, axis=-1, keepdims=True)
-    longest = _REACH * (_LENGTH[elbow] + _LENGTH[wrist])
+    longest = _REACH * (BONE_LENGTHS[elbow] + BONE_LENGTHS[wrist])
     wrists = joints[:, shoulder] + reach * np.clip(distance, _LEAST, longest) / distance
     wrists[:, 1] = np.maximum(wrists[:, 1], _WRIST)
-    lengths = (_LENGTH[elbow], _LENGTH[wrist])
+    lengths = (BONE_LENGTHS[elbow], BONE_LENGTHS[wrist])
     for _ in range(2):  # elbows that would be in the floor are lifted
         joints[:, elbow], joints[:, wrist] = two_bones(joints[:, shoulder], wrists, pole, lengths)
         sunk = np.clip((_BEND - joints[:, elbow, 1]) / _BEND, 0.0, 2.0)

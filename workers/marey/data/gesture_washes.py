@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, stations, swings
+from marey.data.gesture_poses import OTHER_SIDE, StandingBody, stations, swings
 from marey.data.part import FPS
 
 Array = NDArray[np.floating]
 
-_OTHER = {LEFT: RIGHT, RIGHT: LEFT}
 _RUBS = {
     "wash-window": {"at": ((0.02, 0.16), (-0.02, 0.22), (0.38, 0.45)), "size": (0.13, 0.24), "rate": (0.8, 1.5)},
     "wash-table": {"at": ((-0.02, 0.16), (-0.44, -0.34), (0.3, 0.4)), "size": (0.1, 0.18), "rate": (0.9, 1.7)},
@@ -74,12 +73,12 @@ def wash(rng: random.Random) -> Gesture:
         body.hold(side, way, rubbing, lag=0.02, pole=_POLE)
         other = rest if braced else _other_hand(form, at, along, rubbing)
         if other is not None:
-            body.hold(_OTHER[side], way, other, lag=0.02, pole=_POLE)
+            body.hold(OTHER_SIDE[side], way, other, lag=0.02, pole=_POLE)
 
     told = BOTH if both or form == "wash-dishes" else side
     wide = f"{form}-circles" if kind == "circles" else ""
     kinds = [form, "wash" if form in ("wash-hands", "wash-face", "wash-body") else "wipe", wide]
-    untrue = "|".join({*_THINGS} - {*_TOLD[form]})
+    untrue = "|".join(thing for thing in _THINGS if thing not in _TOLD[form])
     return Gesture(pace.total(rng) if not whole else hold, tuple(filter(None, kinds)), change, told, untrue=untrue)
 
 

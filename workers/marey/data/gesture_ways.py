@@ -13,17 +13,14 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.data.gesture_poses import eased
+from marey.data.limbs import CARRIED, LEG_CHAINS, PARENTS
 from marey.data.part import FPS, GRAVITY
 from marey.data.splice import knee_poles, with_bones
 from marey.motion.rotations import from_rotvec, rotate
-from marey.motion.skeleton import HUMANML3D
 
 Array = NDArray[np.floating]
 
-LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 _TOES = [10, 11]
-_PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
-_ORDER = tuple(j for j in range(1, 22) if j not in {k for leg in LEGS for k in leg[1:]})  # parents first
 _AHEAD = {3: 0.2, 6: 0.4, 9: 0.7}  # share by which the spine is turned like the shoulders
 _GRID = 0.01  # metres
 _BANK = 0.6  # share of the lean of a body that leans against all of the pull outward
@@ -64,13 +61,13 @@ def posed(joints: Array, root: Array, yaw: Array, toes: Array, toe_yaw: Array) -
         toes: (T, 2, 3) new places of the toes.
         toe_yaw: (T, 2) radians by which the feet are turned.
     """
-    bones = joints - joints[:, _PARENTS]
+    bones = joints - joints[:, PARENTS]
     poles = knee_poles(joints)
     out = np.empty_like(joints)
     out[:, 0] = root
-    for j in _ORDER:
-        out[:, j] = out[:, _PARENTS[j]] + about_vertical(bones[:, j], yaw[:, j])
-    for side, (hip, knee, ankle, toe) in enumerate(LEGS):
+    for j in CARRIED[1:]:
+        out[:, j] = out[:, PARENTS[j]] + about_vertical(bones[:, j], yaw[:, j])
+    for side, (hip, knee, ankle, toe) in enumerate(LEG_CHAINS):
         out[:, toe] = toes[:, side]
         out[:, ankle] = toes[:, side] - about_vertical(bones[:, toe], toe_yaw[:, side])
         pole = about_vertical(poles[:, side], (yaw[:, hip] + toe_yaw[:, side]) / 2)
@@ -139,7 +136,7 @@ def _bank(root: Array, turn: Array) -> Array:
 def _tilted(local: Array, bank: Array) -> Array:
     """Lean the upper body of one that goes along Z by radians (T,) to its left."""
     turned = from_rotvec(np.stack([0 * bank, 0 * bank, -bank], axis=-1))
-    upper = [j for j in _ORDER if j not in (1, 2)]
+    upper = [j for j in CARRIED[1:] if j not in (1, 2)]
     out = local.copy()
     out[:, upper] = local[:, :1] + rotate(turned[:, None], local[:, upper] - local[:, :1])
     return out

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.captions import seeded
+from marey.data.limbs import LEVEL
 from marey.data.part import FPS
 from marey.data.splice import join_clips, seam_costs, seam_features
 from marey.motion.support import RADII
@@ -27,7 +28,6 @@ _STANDS = 0.03  # metres above the floor
 _CARRIERS = (10, 11, 7, 8, 4, 5, 20, 21)  # toes, ankles, knees, wrists
 _IDLE_FRAMES = (10, 24)
 _HELD_FRAMES = 8  # frames of the first pose for the transition from the idle, so that the action stays as captured
-_LEVEL = np.array([1.0, 0.0, 1.0])
 _WORST_SEAM = 0.25  # see `splice.seam_costs`
 
 
@@ -52,7 +52,7 @@ def travelling(joints: Array) -> Array | None:
 def closes(joints: Array) -> bool:
     """Return True if the clip is a closed cycle: apart from travel, its last and first poses are equal or differ by no
     more than adjacent frames."""
-    local = joints - joints[:, :1] * _LEVEL
+    local = joints - joints[:, :1] * LEVEL
     step = np.median(np.linalg.norm(np.diff(local, axis=0), axis=-1).mean(-1))
     return _gap(joints) < max(_CLOSES, float(step))
 
@@ -61,9 +61,9 @@ def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
     """Repeat a closed cycle until it has at least `frames` frames; each repetition continues where the last one
     ended."""
     if _gap(joints) >= _CLOSES:  # the last pose precedes the first by a frame
-        step = (joints[-1, 0] - joints[0, 0]) * _LEVEL / (len(joints) - 1)
+        step = (joints[-1, 0] - joints[0, 0]) * LEVEL / (len(joints) - 1)
         joints = np.concatenate([joints, joints[:1] + step * len(joints)])
-    advance = (joints[-1, 0] - joints[0, 0]) * _LEVEL
+    advance = (joints[-1, 0] - joints[0, 0]) * LEVEL
     rounds = max(1, -(-(frames - 1) // (len(joints) - 1)))
     pieces = [joints[:-1] + k * advance for k in range(rounds)]
     return np.concatenate([*pieces, joints[-1:] + (rounds - 1) * advance])
@@ -71,7 +71,7 @@ def repeated(joints: Array, frames: int = CYCLE_FRAMES) -> Array:
 
 def _gap(joints: Array) -> float:
     """Distance between the first and last poses apart from travel, mean over joints, metres."""
-    local = joints - joints[:, :1] * _LEVEL
+    local = joints - joints[:, :1] * LEVEL
     return float(np.linalg.norm(local[-1] - local[0], axis=-1).mean())
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
+from marey.data.limbs import ARM_CHAINS, BONE_LENGTHS, LEG_CHAINS
 from marey.data.rigs import CapturedRig
 from marey.motion.filters import smooth
 from marey.motion.io.bvh import BvhClip
@@ -26,9 +27,6 @@ Array = NDArray[np.floating]
 FPS = 20.0
 _UP = np.array([0.0, 1.0, 0.0])
 _REST: Array = HUMANML3D.offsets.astype(np.float64)
-_LENGTH: Array = np.linalg.norm(_REST, axis=1)
-_LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
-_ARMS = ((13, 16, 18, 20), (14, 17, 19, 21))
 _KNEE_PRIOR = 0.03  # metres of "forward" added to the source's knee direction; matters only for a stretched leg
 _SAME_WIDTH = 0.03  # metres; smaller differences in half the hip width are ignored
 _SWAY = 0.25  # seconds
@@ -145,13 +143,13 @@ def retarget(source: SourceMotion, rig: CapturedRig, *, unit: Unit = "cm") -> Ar
     mid_hip = mid_hip + ankle_shift[1] * up + ankle_shift[0] * back
     out[:, 0] = mid_hip - _turn(hips, (_REST[1] + _REST[2]) / 2)
     inwards = _narrower(legs, hips, scale)
-    for target, leg, lateral in zip(_LEGS, legs, (0, 1), strict=True):
+    for target, leg, lateral in zip(LEG_CHAINS, legs, (0, 1), strict=True):
         hip, knee, ankle, toe = target
         out[:, hip] = out[:, 0] + _turn(hips, _REST[hip])
         out[:, toe] = scale * leg[:, 3] + inwards * (2 * lateral - 1)
         out[:, ankle] = out[:, toe] - _turn(_sole(leg, source.lateral[:, lateral], source.sole_pitch), _REST[toe])
         out[:, knee], reached = two_bones(
-            out[:, hip], out[:, ankle], _knee_pole(leg, forward), (_LENGTH[knee], _LENGTH[ankle])
+            out[:, hip], out[:, ankle], _knee_pole(leg, forward), (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
         )
         out[:, toe] += reached - out[:, ankle]
         out[:, ankle] = reached
@@ -160,10 +158,10 @@ def retarget(source: SourceMotion, rig: CapturedRig, *, unit: Unit = "cm") -> Ar
         _turn_trunk(out, source.trunk)
     else:
         _point_trunk(out, s)
-    for target, arm in zip(_ARMS, arms, strict=True):
+    for target, arm in zip(ARM_CHAINS, arms, strict=True):
         for k in range(1, 3) if turned else range(3):
             bone = normalize(arm[:, k + 1] - arm[:, k])
-            out[:, target[k + 1]] = out[:, target[k]] + _LENGTH[target[k + 1]] * bone
+            out[:, target[k + 1]] = out[:, target[k]] + BONE_LENGTHS[target[k + 1]] * bone
     return canonical(out)
 
 
@@ -172,9 +170,9 @@ def leg_scale(legs: tuple[Array, Array], sole_pitch: float, *, whole: bool) -> f
     because the feet of some bodies are a third of the leg."""
     lengths = np.mean([_bone(leg, 0, 1) + _bone(leg, 1, 2) for leg in legs])
     if not whole:
-        return float((_LENGTH[4] + _LENGTH[7]) / lengths)
+        return float((BONE_LENGTHS[4] + BONE_LENGTHS[7]) / lengths)
     drop = np.mean([_bone(leg, 2, 3) for leg in legs]) * np.sin(np.radians(sole_pitch))
-    return float((_LENGTH[4] + _LENGTH[7] - _REST[10, 1]) / (lengths + drop))
+    return float((BONE_LENGTHS[4] + BONE_LENGTHS[7] - _REST[10, 1]) / (lengths + drop))
 
 
 def _standing_axes(hips: Array, legs: tuple[Array, Array], *, turned: bool) -> tuple[Array, Array, Array]:
@@ -212,8 +210,8 @@ def _point_trunk(out: Array, s: Array) -> None:
     ribs = _frame(neck - chest, shoulders)
     out[:, 3] = out[:, 0] + _turn(hips, _REST[3])
     low = normalize(normalize(spine - pelvis) + normalize(chest - middle))
-    out[:, 6] = out[:, 3] + _LENGTH[6] * low
-    out[:, 9] = out[:, 6] + _LENGTH[9] * normalize(normalize(chest - middle) + normalize(neck - chest))
+    out[:, 6] = out[:, 3] + BONE_LENGTHS[6] * low
+    out[:, 9] = out[:, 6] + BONE_LENGTHS[9] * normalize(normalize(chest - middle) + normalize(neck - chest))
     out[:, 12] = out[:, 9] + _turn(ribs, _REST[12])
     out[:, 15] = out[:, 12] + _turn(_frame(head - neck, shoulders), _REST[15])
     for collar in (13, 14):

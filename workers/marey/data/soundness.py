@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.data.limbs import LEG_CHAINS
 from marey.motion.rotations import cross, normalize
 
 Array = NDArray[np.floating]
@@ -16,7 +17,6 @@ LARGEST_FOOT_FOLD = 150.0
 LEAST_KNEE = -15.0
 FOLDED_KNEE = -160.0
 """Below this angle a knee is bent slightly beyond 180 degrees, as in squats on some rigs, not backward."""
-_LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 
 
 def is_broken(joints: Array, fps: float) -> bool:
@@ -27,7 +27,7 @@ def is_broken(joints: Array, fps: float) -> bool:
     if jerk.max(initial=0.0) > LARGEST_JERK:
         return True
     left = normalize(joints[:, 1] - joints[:, 2])
-    for hip, knee, ankle, toe in _LEGS:
+    for hip, knee, ankle, toe in LEG_CHAINS:
         thigh, shank = normalize(joints[:, knee] - joints[:, hip]), normalize(joints[:, ankle] - joints[:, knee])
         foot = normalize(joints[:, toe] - joints[:, ankle])
         bend = np.arctan2(np.einsum("ti,ti->t", cross(thigh, shank), left), np.einsum("ti,ti->t", thigh, shank))

@@ -12,18 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
+from marey.data.limbs import BONE_LENGTHS, CARRIED, LEG_CHAINS, PARENTS
 from marey.data.retarget import two_bones
 from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
-from marey.motion.skeleton import HUMANML3D
 
 Array = NDArray[np.floating]
 
 BLEND_SECONDS = 0.5
-_PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
-_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
-_LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
-_LEG_JOINTS = {4, 5, 7, 8, 10, 11}
-_DIRECTED = tuple(j for j in range(1, 22) if j not in _LEG_JOINTS)  # in order, parents first
 _STAND_SPEED = 0.35  # metres a second; a low toe that is slower stands
 _STAND_HEIGHT = 0.05
 _STEP_FROM = 0.015  # metres; a standing foot displaced by less is not lifted
@@ -60,7 +55,7 @@ def _stands(points: Array, fps: float) -> bool:
 def _shared_foot(first: Array, second: Array, fps: float) -> int | None:
     """Toe joint that stands on both sides of the seam (the slower one of two), or None."""
     best, least = None, np.inf
-    for _, _, _, toe in _LEGS:
+    for _, _, _, toe in LEG_CHAINS:
         if _stands(first[-2:, toe], fps) and _stands(second[:2, toe], fps):
             speed = np.linalg.norm(first[-1, toe] - first[-2, toe]) + np.linalg.norm(second[1, toe] - second[0, toe])
             if speed < least:
@@ -130,7 +125,7 @@ def _lift(before: Array, after: Array, frames: int, fps: float) -> Array:
 
 def _directions(joints: Array) -> Array:
     """(n, 22, 3) unit vectors from each joint's parent."""
-    return normalize(joints - joints[:, _PARENTS]).astype(np.float64)
+    return normalize(joints - joints[:, PARENTS]).astype(np.float64)
 
 
 def knee_poles(joints: Array) -> Array:
@@ -138,7 +133,7 @@ def knee_poles(joints: Array) -> Array:
     left = joints[:, 1] - joints[:, 2]
     forward = normalize(cross(left, np.broadcast_to([0.0, 1.0, 0.0], left.shape)))
     out = []
-    for hip, knee, ankle, _ in _LEGS:
+    for hip, knee, ankle, _ in LEG_CHAINS:
         axis = normalize(joints[:, ankle] - joints[:, hip])
         bend = joints[:, knee] - joints[:, hip]
         bend = bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None]
@@ -150,13 +145,13 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
     """Joints (n, 22, 3) with bones of the skeleton's lengths."""
     joints = np.empty((len(root), 22, 3))
     joints[:, 0] = root
-    for j in _DIRECTED:
-        joints[:, j] = joints[:, _PARENTS[j]] + _LENGTH[j] * directions[:, j]
-    for side, (hip, knee, ankle, toe) in enumerate(_LEGS):
-        foot = _LENGTH[toe] * directions[:, toe]
+    for j in CARRIED[1:]:
+        joints[:, j] = joints[:, PARENTS[j]] + BONE_LENGTHS[j] * directions[:, j]
+    for side, (hip, knee, ankle, toe) in enumerate(LEG_CHAINS):
+        foot = BONE_LENGTHS[toe] * directions[:, toe]
         wanted = toes[:, side] - foot
         joints[:, knee], joints[:, ankle] = two_bones(
-            joints[:, hip], wanted, poles[:, side], (_LENGTH[knee], _LENGTH[ankle])
+            joints[:, hip], wanted, poles[:, side], (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
         )
         joints[:, toe] = joints[:, ankle] + foot
     return joints
