@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.motion.legs import follow_feet, foot_chain
 from marey.motion.rotations import Array, normalize
-from marey.motion.skeleton import Skeleton
+from marey.motion.skeleton import OTHER_FOOT, Skeleton
 
 Bool = NDArray[np.bool_]
 
@@ -104,7 +104,7 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     places = joints[:, list(skeleton.feet)]
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps if len(joints) > 1 else np.zeros((1, 4))
     ground = np.quantile(places[..., 1], 0.1, axis=0)
-    ground = np.minimum(ground, ground[[2, 3, 0, 1]])
+    ground = np.minimum(ground, ground[OTHER_FOOT])
     low = places[..., 1] - ground < np.array([rule.ankle_height, rule.toe_height] * 2)
     stands = np.zeros(speed.shape, bool)
     for foot in range(4):

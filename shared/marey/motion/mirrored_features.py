@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.skeleton import Skeleton
+from marey.motion.skeleton import OTHER_FOOT, Skeleton
 
 Float32 = NDArray[np.float32]
 
@@ -15,8 +15,6 @@ _ACROSS = np.array([-1, 1, 1], np.float32)
 """A point or velocity mirrored at the plane between left and right."""
 _ACROSS_6D = np.array([1, -1, -1, -1, 1, 1], np.float32)
 """M R M for M = diag(-1, 1, 1), of the first two columns of a rotation matrix R."""
-_OTHER_FEET = [2, 3, 0, 1]
-"""Left ankle and toe, right ankle and toe, exchanged."""
 
 
 def mirror_features(features: Float32, slices: Mapping[str, slice], skeleton: Skeleton) -> Float32:
@@ -31,7 +29,7 @@ def mirror_features(features: Float32, slices: Mapping[str, slice], skeleton: Sk
     mirrored = np.array(features, np.float32)
     mirrored[..., slices["yaw"]] *= -1
     mirrored[..., slices["velocity"]] *= _ACROSS[[0, 2]]
-    mirrored[..., slices["contacts"]] = features[..., slices["contacts"]][..., _OTHER_FEET]
+    mirrored[..., slices["contacts"]] = features[..., slices["contacts"]][..., OTHER_FOOT]
     for name, signs in (("positions", _ACROSS), ("rotations", _ACROSS_6D), ("velocities", _ACROSS)):
         block = features[..., slices[name]]
         rows = block.reshape(*block.shape[:-1], -1, len(signs))

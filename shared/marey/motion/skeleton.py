@@ -18,6 +18,9 @@ from marey.core.errors import InvalidInput
 
 Float32 = NDArray[np.float32]
 
+OTHER_FOOT = [2, 3, 0, 1]
+"""Columns of contacts (T, 4) and indices of `Skeleton.feet` with left and right exchanged."""
+
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:

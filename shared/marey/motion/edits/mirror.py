@@ -11,6 +11,7 @@ from marey.core.errors import InvalidInput
 from marey.core.sides import swap_sides_in
 from marey.motion.clip import MotionClip
 from marey.motion.edits.place import PLACEMENT
+from marey.motion.skeleton import OTHER_FOOT
 
 TEXTS = ("prompt", "prompts", "rewritten", "not_rewritten", "graph", "scope", "timeline")
 """Keys of a manifest that say in words what is to be seen."""
@@ -37,7 +38,7 @@ def mirror(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     if "loop" in manifest:
         cycle = cast("dict[str, Any]", manifest["loop"])
         manifest["loop"] = {**cycle, "cycle": _mirrored_place(cycle["cycle"])}
-    contacts = clip.contacts[:, [2, 3, 0, 1]]
+    contacts = clip.contacts[:, OTHER_FOOT]
     return MotionClip.of(skeleton, rotations, clip.root * across, contacts, clip.fps, manifest=manifest)
 
 
