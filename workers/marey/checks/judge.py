@@ -19,8 +19,8 @@ from marey.checks.kinematics import (
     PELVIS,
     WRISTS,
     Array,
-    body_frame,
     smooth,
+    variety,
 )
 from marey.checks.stretch import Arm, Stretch
 from marey.checks.strikes import is_lively, kicks, punches, slashes
@@ -170,17 +170,9 @@ def _dance(m: Stretch, want: Expectation) -> str:
     direct = float(np.linalg.norm((m.joints[-1, PELVIS] - m.joints[0, PELVIS])[[0, 2]])) / m.seconds
     if direct > 0.7:
         return f"travels ahead at {direct:.1f} m/s"
-    if _variety(m, ANKLES) < 0.12:
+    if variety(m.joints, m.heading, ANKLES) < 0.12:
         return "the legs hardly move"
-    return "" if _variety(m, WRISTS) > 0.2 else "the arms hardly move"
-
-
-def _variety(m: Stretch, joints: tuple[int, int]) -> float:
-    """Root mean square of how far two joints get from their mean place in the body, metres."""
-    limbs = m.joints[:, list(joints)] - m.joints[:, [PELVIS]]
-    forward, left = body_frame(limbs, m.heading[:, None])
-    local = np.stack([forward, limbs[..., 1], left], axis=-1)
-    return float(np.sqrt(np.sum((local - local.mean(axis=0)) ** 2, axis=-1).mean()))
+    return "" if variety(m.joints, m.heading, WRISTS) > 0.2 else "the arms hardly move"
 
 
 _CHECKS: dict[str, Callable[[Stretch, Expectation], str]] = {

@@ -59,6 +59,20 @@ def body_frame(vectors: Array, heading_degrees: Array) -> tuple[Array, Array]:
     return forward, left
 
 
+def variety(joints: Array, heading_degrees: Array, pair: tuple[int, int]) -> float:
+    """Root mean square of how far the two joints of a pair get from their mean place in the body, metres.
+
+    Args:
+        joints: (T, 22, 3) metres.
+        heading_degrees: (T,) of the body.
+        pair: `ANKLES` or `WRISTS`.
+    """
+    limbs = joints[:, list(pair)] - joints[:, [PELVIS]]
+    forward, left = body_frame(limbs, heading_degrees[:, None])
+    local = np.stack([forward, limbs[..., 1], left], axis=-1)
+    return float(np.sqrt(np.sum((local - local.mean(axis=0)) ** 2, axis=-1).mean()))
+
+
 @dataclass(frozen=True)
 class GaitMeasures:
     """Travel of the body.

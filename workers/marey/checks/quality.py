@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from marey.checks.kinematics import TOES, Array
+from marey.motion.kinematics import bone_lengths
 from marey.motion.skeleton import HUMANML3D
 
-_PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
 SKATE_HEIGHT = 0.05
 SKATE_SPEED = 0.5
 
@@ -37,7 +37,7 @@ def quality(joints: Array, fps: float) -> Quality:
     toes = joints[:, list(TOES)]
     speed = np.linalg.norm(np.diff(toes, axis=0), axis=-1) * fps
     low = np.minimum(toes[1:, :, 1], toes[:-1, :, 1]) < SKATE_HEIGHT
-    bones = np.linalg.norm(joints - joints[:, _PARENTS], axis=-1)[:, 1:]
+    bones = bone_lengths(joints, HUMANML3D)[:, 1:]
     return Quality(
         skate=float(((speed > SKATE_SPEED) & low).any(axis=1).mean()),
         jerk=float(np.linalg.norm(np.diff(joints, 3, axis=0), axis=-1).mean() * fps**3),

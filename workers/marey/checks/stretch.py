@@ -96,7 +96,7 @@ class Stretch:
     @cached_property
     def arms(self) -> tuple[Arm, Arm]:
         """Left and right."""
-        return arm(self.joints, self.heading, self.fps, 0), arm(self.joints, self.heading, self.fps, 1)
+        return both_arms(self.joints, self.heading, self.fps)
 
     @cached_property
     def running(self) -> bool:
@@ -126,7 +126,14 @@ def wrist_height(joints: Array, fps: float, side: int) -> Array:
 
 
 def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
-    """Measure a hand; side 0 is the left one."""
+    """Measure a hand.
+
+    Args:
+        joints: (T, 22, 3) metres.
+        angle: (T,) heading of the body, degrees.
+        fps: frames a second.
+        side: 0 is the left one, 1 the right one.
+    """
     wrist = joints[:, WRISTS[side]]
     over = wrist_height(joints, fps, side)
     lifted = over > -0.16
@@ -141,6 +148,11 @@ def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
         swings = max(swings, _swings(moved[a:b], 0.3, 0.03, fps))
         flutter = max(flutter, _swings(moved[a:b], 0.4, 0.01, fps))
     return Arm(float(over.max()), float(np.ptp(over)), float(lifted.sum() / fps), swings, flutter)
+
+
+def both_arms(joints: Array, angle: Array, fps: float) -> tuple[Arm, Arm]:
+    """Measure the left and the right hand."""
+    return arm(joints, angle, fps, 0), arm(joints, angle, fps, 1)
 
 
 def _swings(moved: Array, margin: float, least: float, fps: float) -> int:

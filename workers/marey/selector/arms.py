@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, swings, velocity
-from marey.checks.stretch import Arm, arm
+from marey.checks.kinematics import (
+    ANKLES,
+    HEAD,
+    PELVIS,
+    SHOULDERS,
+    WRISTS,
+    body_frame,
+    smooth,
+    swings,
+    variety,
+    velocity,
+)
+from marey.checks.stretch import Arm, both_arms
 from marey.motion.feet import runs
 from marey.selector.gaits import stays
 from marey.selector.grades import SIDES, best, least, most, of_side, share, some
 from marey.selector.motion import SHORTEST, Array, Motion
-
-
-def _arms(m: Motion) -> tuple[Arm, Arm]:
-    return arm(m.joints, m.heading, m.fps, 0), arm(m.joints, m.heading, m.fps, 1)
 
 
 def _up(hand: Arm) -> float:
@@ -40,7 +47,7 @@ def _of_side(grades: tuple[float, float], others: tuple[float, float], side: str
 def wave(m: Motion, side: str) -> float:
     """Swing a lifted hand to and fro."""
     grades = _half_swings(m, 0), _half_swings(m, 1)
-    hands = _arms(m)
+    hands = both_arms(m.joints, m.heading, m.fps)
     ups = _up(hands[0]), _up(hands[1])
     return min(_of_side((least(grades[0], 2.6, 1), least(grades[1], 2.6, 1)), ups, side), stays(m))
 
@@ -60,7 +67,7 @@ def _half_swings(m: Motion, k: int) -> int:
 
 def raise_arm(m: Motion, side: str) -> float:
     """Lift a hand and hold it."""
-    hands = _arms(m)
+    hands = both_arms(m.joints, m.heading, m.fps)
     ups = _up(hands[0]), _up(hands[1])
     before = round(1.5 * m.fps)
 
@@ -220,16 +227,8 @@ def dance(m: Motion, side: str) -> float:
     """Move arms and legs all the time."""
     lively = least(share(m.lively > 0.17), 0.6, 0.2)
     direct = float(np.linalg.norm(m.place[-1] - m.place[0])) / m.seconds
-    legs, arms = _variety(m, ANKLES), _variety(m, WRISTS)
+    legs, arms = (variety(m.joints, m.heading, pair) for pair in (ANKLES, WRISTS))
     return min(lively, most(direct, 0.7, 0.2), least(legs, 0.07, 0.03), least(arms, 0.15, 0.05))
-
-
-def _variety(m: Motion, joints: tuple[int, int]) -> float:
-    """Root mean square of how far two joints get from their mean place in the body, metres."""
-    limbs = m.joints[:, list(joints)] - m.joints[:, [PELVIS]]
-    forward, left = body_frame(limbs, m.heading[:, None])
-    local = np.stack([forward, limbs[..., 1], left], axis=-1)
-    return float(np.sqrt(np.sum((local - local.mean(axis=0)) ** 2, axis=-1).mean()))
 
 
 def knee_to_elbow(m: Motion, side: str) -> float:
