@@ -101,14 +101,14 @@ def tokenizer_loss(
     valid = torch.ones_like(features[..., 0]) if lengths is None else frame_mask(lengths, features.shape[1]).float()
     joint_weights = swing_weights(config.layout, features.device, t.swing_weight)  # (J,), their mean is 1
     weights = feature_weights(config, joint_weights)  # (D,)
-    l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
+    l1 = valid_mean(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
     restored, body = model.restore(output), (config.joints, unit_of(config.layout))
     local = heading_joints(restored, *body) - heading_joints(features, *body)  # (B, T, J, 3)
-    position = _average((local.abs().sum(-1) * joint_weights).mean(-1), valid)
-    velocity = _average((local.diff(dim=1).abs().sum(-1) * joint_weights).mean(-1) * config.fps, valid[:, 1:])
+    position = valid_mean((local.abs().sum(-1) * joint_weights).mean(-1), valid)
+    velocity = valid_mean((local.diff(dim=1).abs().sum(-1) * joint_weights).mean(-1) * config.fps, valid[:, 1:])
     drift = world_joints(restored, *body) - world_joints(features, *body)
-    in_space = _average(drift.abs().sum(-1).mean(-1), valid)
+    in_space = valid_mean(drift.abs().sum(-1).mean(-1), valid)
     total = (
         l1
         + t.commitment * quantized.commitment
@@ -158,7 +158,8 @@ def feature_weights(config: TokenizerTraining, joint_weights: Tensor) -> Tensor:
     return weights
 
 
-def _average(values: Tensor, valid: Tensor) -> Tensor:
+def valid_mean(values: Tensor, valid: Tensor) -> Tensor:
+    """Return the mean of `values` (B, T) over valid frames; 0 without any. `valid`: (B, T), 1 for valid frames."""
     return (values * valid).sum() / valid.sum().clamp(min=1)
 
 

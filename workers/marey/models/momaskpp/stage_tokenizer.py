@@ -21,6 +21,7 @@ from marey.training.tokenizing import (
     feature_weights,
     reconstruction_errors,
     swing_weights,
+    valid_mean,
 )
 
 
@@ -60,12 +61,12 @@ def tokenizer_loss(
 
     joint_weights = swing_weights(config.layout, features.device, t.swing_weight)  # (J,)
     weights = feature_weights(config, joint_weights)  # (D,)
-    whole = _average((error * weights).sum(-1) / weights.sum(), valid)
-    essential = _average(error[..., slice(*t.essential)].mean(-1), valid)
+    whole = valid_mean((error * weights).sum(-1) / weights.sum(), valid)
+    essential = valid_mean(error[..., slice(*t.essential)].mean(-1), valid)
     joints = _joint_losses(model.restore(output), features, valid, joint_weights, config, world)
     total = whole + t.commitment * quantized.commitment + t.essential_weight * essential + joints
     if t.root_weight:
-        total = total + t.root_weight * _average(error[..., ROOT].mean(-1), valid)
+        total = total + t.root_weight * valid_mean(error[..., ROOT].mean(-1), valid)
     return Losses(
         total=total,
         features=whole.detach(),
@@ -91,17 +92,13 @@ def _joint_losses(
     body = config.joints, unit_of(config.layout)
     if t.position_weight or t.velocity_weight:
         local = heading_joints(restored, *body) - heading_joints(features, *body)
-        total = total + t.position_weight * _average((local.abs().sum(-1) * joint_weights).mean(-1), valid)
+        total = total + t.position_weight * valid_mean((local.abs().sum(-1) * joint_weights).mean(-1), valid)
         speed = (local.diff(dim=1).abs().sum(-1) * joint_weights).mean(-1) * config.fps
-        total = total + t.velocity_weight * _average(speed, valid[:, 1:])
+        total = total + t.velocity_weight * valid_mean(speed, valid[:, 1:])
     if t.world_weight:
         drift = world_joints(restored, *body) - world_joints(features, *body)
-        total = total + t.world_weight * world * _average(drift.abs().sum(-1).mean(-1), valid)
+        total = total + t.world_weight * world * valid_mean(drift.abs().sum(-1).mean(-1), valid)
     return total
-
-
-def _average(values: Tensor, valid: Tensor) -> Tensor:
-    return (values * valid).sum() / valid.sum().clamp(min=1)
 
 
 class ScaleTokenizerStage(WindowStage[MoMaskPPConfig, Tokenizer]):
