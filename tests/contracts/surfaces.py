@@ -240,11 +240,11 @@ def files() -> Any:
     """Keys of the files that the product writes."""
     from marey.bundles.manifest import BundleManifest, TextSpec
     from marey.client.manifest import COLUMNS
+    from marey.core.frame_layout import HEADER, MAGIC, VERSION
     from marey.data import manifest as prepared
     from marey.evaluator.report import Report
     from marey.items.item import COLUMNS as ITEM_COLUMNS
     from marey.motion.clip import KEYS
-    from marey.streams.frames import HEADER, MAGIC, VERSION
     from marey.training.checkpoint import TrainingState
     from marey.training.parts import TrainedPart
 

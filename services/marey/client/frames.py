@@ -1,4 +1,4 @@
-"""Frames of a live stream, read with the standard library alone; `docs/reference/streams.md` describes their bytes."""
+"""Frames of a live stream, read with the standard library alone; `marey.core.frame_layout` describes their bytes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,7 @@ import struct
 from dataclasses import dataclass, field
 
 from marey.core.errors import InvalidInput
-
-HEADER = struct.Struct("<2sBBIHH3f")
-MAGIC, VERSION = b"MF", 1
-JOINT_BYTES = 8
-MOST_JOINTS = 512
-LAST = 1 << 4
-SCALE = 32767.0
-OFF_UNIT = 1e-3
-"""Tolerance of a quaternion's length: rounding changes it by 3e-5, foreign bytes by far more."""
-RELEASES = "client and server are of different releases: update the older one"
+from marey.core.frame_layout import HEADER, OFF_UNIT, SCALE, read_header
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -54,27 +45,13 @@ def read_frame(data: bytes, *, joints: int | None = None) -> Frame:
     Raises:
         InvalidInput: truncated, foreign, of another version or of another skeleton.
     """
-    if len(data) < HEADER.size:
-        raise InvalidInput(f"{len(data)} bytes; a frame has at least {HEADER.size}", where="frame")
-    magic, version, flags, number, count, prompt, *root = HEADER.unpack_from(data)
-    if magic != MAGIC:
-        raise InvalidInput(f"begins with {magic!r}, not {MAGIC!r}: not a frame of a Marey stream", where="frame")
-    if version != VERSION:
-        raise InvalidInput(f"version {version}; this program reads {VERSION}", where="frame", hint=RELEASES)
-    where, size = f"frame {number}", HEADER.size + JOINT_BYTES * count
-    if flags >= LAST << 1:
-        raise InvalidInput(f"flags {flags:#04x} hold bits that version {VERSION} does not have", where=where)
-    if not 1 <= count <= MOST_JOINTS or count != (joints or count):
-        raise InvalidInput(f"{count} joints, not {joints or f'1 to {MOST_JOINTS}'}", where=where)
-    if len(data) != size:
-        raise InvalidInput(f"{len(data)} bytes, not the {size} of {count} joints", where=where)
-    if not all(map(math.isfinite, root)):
+    header = read_header(data, joints=joints)
+    where = f"frame {header.number}"
+    if not all(map(math.isfinite, header.root)):
         raise InvalidInput("the root holds NaN or infinite numbers", where=where)
-    numbers = struct.unpack_from(f"<{4 * count}h", data, HEADER.size)
-    turns = tuple(_unit(numbers[4 * joint : 4 * joint + 4], joint, where) for joint in range(count))
-    left, left_toe, right, right_toe = (bool(flags >> bit & 1) for bit in range(4))
-    x, y, z = root
-    return Frame(number, prompt, (x, y, z), turns, (left, left_toe, right, right_toe), bool(flags & LAST), data)
+    numbers = struct.unpack_from(f"<{4 * header.joints}h", data, HEADER.size)
+    turns = tuple(_unit(numbers[4 * joint : 4 * joint + 4], joint, where) for joint in range(header.joints))
+    return Frame(header.number, header.prompt, header.root, turns, header.contacts, header.last, data)
 
 
 def _unit(turn: tuple[int, ...], joint: int, where: str) -> Quaternion:

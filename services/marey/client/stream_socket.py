@@ -15,8 +15,8 @@ from websockets.typing import Subprotocol
 
 from marey.client.foreign_answers import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
 from marey.client.server_address import Server, ca_file
-from marey.client.transport import PATIENCE, TYPE_PREFIX
-from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.client.transport import PATIENCE
+from marey.core.errors import TYPE_PREFIX, InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 from marey.core.tls import trusting_context
 
 if TYPE_CHECKING:

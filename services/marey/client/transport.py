@@ -18,6 +18,7 @@ from marey.client.lines import Lines
 from marey.client.server_address import Server, ca_file
 from marey.core import tracing
 from marey.core.errors import (
+    TYPE_PREFIX,
     Busy,
     Conflict,
     InvalidBundle,
@@ -51,7 +52,6 @@ QUIET_SECONDS = 12.0
 PATIENCE = 180.0
 """Seconds without a reachable server after which following a job or a stream gives up."""
 RETRIED = frozenset({429, 502, 503, 504})
-TYPE_PREFIX = "urn:marey:problem:"
 QUOTA = QuotaUsedUp.problem_type
 NOT_OURS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 """Errors of reading an answer that is not the API's; the last one is raised by JSON that is nested too deeply."""

@@ -18,6 +18,7 @@ from starlette.routing import Match
 
 from marey.core.documents import json_problem
 from marey.core.errors import (
+    TYPE_PREFIX,
     Busy,
     InvalidInput,
     MareyError,
@@ -31,7 +32,6 @@ from marey.core.validation import problem_of
 from marey.items.problems import InvalidItems
 from marey.tenants import QuotaHeadroom
 
-TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER = "2"
 """Seconds: typical restart of a database or store."""

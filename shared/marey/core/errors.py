@@ -7,6 +7,9 @@ expected error verbatim and exits with `exit_code`; the API answers an RFC 9457 
 
 from __future__ import annotations
 
+TYPE_PREFIX = "urn:marey:problem:"
+"""Before the `problem_type` of an error in the `type` of a problem."""
+
 
 class MareyError(Exception):
     """Base class of expected failures, with a message for users.

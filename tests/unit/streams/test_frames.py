@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
+from marey.core.frame_layout import HEADER, frame_bytes
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import angle_between, from_rotvec
 from marey.motion.skeleton import HUMANML3D
-from marey.streams.frames import HEADER, Frame, decode_frame, encode_frame, frame_bytes
+from marey.streams.frames import Frame, decode_frame, encode_frame
 
 FORMATS = Path(__file__).resolve().parents[3] / "docs" / "reference" / "formats.md"
 

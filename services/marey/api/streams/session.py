@@ -23,10 +23,10 @@ from marey.api.streams.schemas import BundleFacts, EndMessage, GapMessage, Strea
 from marey.api.streams.service import is_over
 from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import MareyError, Unreachable
+from marey.core.frame_layout import HEADER, LAST
 from marey.db import transaction
 from marey.streams import StreamPrompt, StreamRow, StreamState, get_stream, prompts_with_rewrites
 from marey.streams.control import ControlQueue
-from marey.streams.frames import HEADER, LAST
 from marey.streams.presence import REFRESH_SECONDS, ViewerPresence
 from marey.streams.redis import FrameStream, Gap, StoredFrame
 from marey.tenants import ApiKey, check_key
