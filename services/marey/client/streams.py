@@ -11,11 +11,12 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from marey.client.frames import Frame, read_frame
+from marey.client.problems import NOT_OURS, error_of_problem
 from marey.client.recording import Recording
 from marey.client.resources import Resource, identifier
 from marey.client.results import HINT
 from marey.client.stream_socket import Link, Message
-from marey.client.transport import NOT_OURS, Transport, error_of_problem
+from marey.client.transport import Transport
 from marey.client.types.streams import Stream, StreamDetail
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, Unreachable
 from marey.items.constraints import read_pose

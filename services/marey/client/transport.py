@@ -1,9 +1,8 @@
-"""The HTTP client: retries with back-off, and problems as errors."""
+"""The HTTP client: requests that are retried, answers as JSON, errors as those of the server."""
 
 from __future__ import annotations
 
 import json
-import random
 import time
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -13,56 +12,23 @@ from uuid import uuid4
 
 import httpx2
 
-from marey.client.foreign_answers import NoAnswer, connection_failure, foreign_answer
+from marey.client.foreign_answers import NoAnswer, connection_failure
 from marey.client.lines import Lines
+from marey.client.problems import NOT_OURS, error_of, foreign_error
+from marey.client.retries import RequestRetries
 from marey.client.server_address import Server, ca_file
 from marey.core import tracing
-from marey.core.errors import (
-    TYPE_PREFIX,
-    Busy,
-    Conflict,
-    InvalidBundle,
-    InvalidFile,
-    InvalidInput,
-    MareyError,
-    NotFound,
-    Overloaded,
-    QuotaUsedUp,
-    Refused,
-    TimedOut,
-    TooLarge,
-    TooSlow,
-    Unauthenticated,
-    Unreachable,
-)
+from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.core.tls import trusting_context
-from marey.items.problems import InvalidItems, OutOfScope, Problem
 
-ATTEMPTS = 5
-FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
-"""Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
-BUSY_SECONDS = 180.0
-"""Seconds to wait in all for a server that is busy; at least `ATTEMPTS` are made."""
 SUBMIT_BUSY_SECONDS = 900.0
-"""The same for a submit: the server reads large ones one after the other."""
+"""Seconds to wait in all for a server that is busy with submits: it reads large ones one after the other."""
 SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
 QUIET_SECONDS = 12.0
 """A server pings an event stream every 15 s."""
 PATIENCE = 180.0
 """Seconds without a reachable server after which following a job or a stream gives up."""
-RETRIED = frozenset({429, 502, 503, 504})
-QUOTA = QuotaUsedUp.problem_type
-NOT_OURS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
-"""Errors of reading an answer that is not the API's; the last one is raised by JSON that is nested too deeply."""
-
-_ERRORS: dict[str, type[MareyError]] = {
-    kind.problem_type: kind
-    for kind in (
-        InvalidInput, TooLarge, InvalidFile, InvalidBundle, Conflict, NotFound, Unreachable, Refused, Unauthenticated,
-        TimedOut, TooSlow,
-    )
-}  # fmt: skip
 
 
 class Transport:
@@ -72,8 +38,18 @@ class Transport:
     """
 
     def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int | None = None) -> None:
+        """Connect at the first request.
+
+        Args:
+            server: its address and key.
+            timeout: seconds of silence after which a request has failed.
+            attempts: failures after which a request is given up; None = the default of `RequestRetries`.
+
+        Raises:
+            InvalidInput: the address, or a proxy that the environment names, cannot be used.
+        """
         self.server = server
-        self._attempts = ATTEMPTS if attempts is None else attempts
+        self._attempts = attempts
         try:
             self._http = httpx2.Client(
                 base_url=server.url,
@@ -201,44 +177,31 @@ class Transport:
     def _send(
         self, method: str, path: str, *, repeatable: bool = True, patience: float | None = None, **request: Any
     ) -> httpx2.Response:
-        """Send until there is an answer.
+        """Send until there is an answer, and return it if it is no error.
 
         Args:
-            repeatable: the request may be carried out twice.
-            patience: seconds to wait in all while the server is busy; None = `BUSY_SECONDS`.
+            method, path: of the request.
+            repeatable, patience: see `RequestRetries`.
+            request: parameters, body, headers and timeout, as httpx takes them.
+
+        Raises:
+            MareyError: the error of the answer; `Unreachable` without one.
         """
-        pause, failures, refusals, waited = FIRST_PAUSE, 0, 0, 0.0
-        if patience is None or self._attempts < ATTEMPTS:
-            patience = BUSY_SECONDS if self._attempts >= ATTEMPTS else 0.0
+        retries = RequestRetries(self._attempts, repeatable=repeatable, patience=patience)
         while True:
             try:
                 response = self._request(method, path, request)
             except httpx2.TransportError as error:
-                if (final := _final(self.server, error)) is not None:
-                    raise final from error
-                failures += 1
-                never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
-                if (
-                    failures == self._attempts
-                    or isinstance(error, httpx2.UnsupportedProtocol)
-                    or not (repeatable or never_sent)
-                ):
+                wait = None if _final(self.server, error) else retries.after_failure(error)
+                if wait is None:
                     raise _unreachable(self.server, error) from error
-                wait = pause
             else:
                 if response.status_code < 400:
                     return _expected(response)
-                wait = max(pause, _retry_after(response))
-                if _is_busy(response):  # an answer is not a failure
-                    refusals, waited = refusals + 1, waited + wait
-                    again = refusals < self._attempts or waited < patience
-                else:
-                    failures += 1
-                    again = failures < self._attempts
-                if response.status_code not in RETRIED or not again or not repeatable or _is_quota(response):
+                wait = retries.after_refusal(response)
+                if wait is None:
                     raise error_of(response)
-            time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
-            pause = min(pause * 2, LONGEST_PAUSE)
+            time.sleep(wait)
 
     def _request(self, method: str, path: str, request: Mapping[str, Any]) -> httpx2.Response:
         """Send one attempt, as a span of a trace that the server continues."""
@@ -282,49 +245,6 @@ class _UntilQuiet:
             yield chunk
 
 
-def error_of(response: httpx2.Response) -> MareyError:
-    """Return the error of an RFC 9457 problem, as it was raised on the server."""
-    try:
-        return error_of_problem(response.json(), response.status_code, _retry_after(response))
-    except NOT_OURS:
-        return _foreign(response)
-
-
-def error_of_problem(problem: Mapping[str, Any], status: int, retry_after: float = 0.0) -> MareyError:
-    """Return the error of a problem of the API.
-
-    Args:
-        retry_after: seconds.
-
-    Raises:
-        ValueError, KeyError, TypeError, AttributeError: it is not a problem of the API.
-    """
-    kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
-    message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
-    if kind == InvalidItems.problem_type:
-        found = [_problem(each) for each in problem.get("problems", [])]
-        return InvalidItems(found, total=problem.get("total"))
-    if kind == OutOfScope.problem_type:
-        found = [_problem(each) for each in problem.get("problems", [])]
-        return OutOfScope(found, total=problem.get("total"), hint=hint or "")
-    if kind == Overloaded.problem_type:
-        return Overloaded(message, where=where, hint=hint, seconds=round(retry_after))
-    if kind == QUOTA and (quota := problem.get("quota")) is not None:
-        sizes = {name: int(quota[name]) for name in ("limit", "used", "asked")}
-        seconds = round(retry_after)
-        return QuotaUsedUp(message, where=where, hint=hint, seconds=seconds, quota=str(quota["name"]), **sizes)
-    if kind in (Busy.problem_type, QUOTA):
-        return Busy(message, where=where, hint=hint, seconds=round(retry_after))
-    error = _ERRORS.get(kind) or (InvalidInput if status < 500 else MareyError)
-    return error(message, where=where, hint=hint)
-
-
-def _problem(found: Mapping[str, Any]) -> Problem:
-    """Read one of the problems of items."""
-    line = found.get("line")
-    return Problem(None if line is None else int(line), found.get("field"), str(found["message"]))
-
-
 def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
     """Return the error of an object store, without the signature of its URL, which grants access."""
     return Unreachable(
@@ -332,18 +252,6 @@ def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
         where=str(response.request.url.copy_with(query=None)),
         hint="Signed URLs work for minutes: is the clock of the server, or of the store, wrong?",
     )
-
-
-def _is_busy(response: httpx2.Response) -> bool:
-    """Return True if the server is busy: a rate limit, or too many large requests at once."""
-    return response.status_code == Busy.status or (
-        response.status_code == Overloaded.status and f"{TYPE_PREFIX}{Overloaded.problem_type}" in response.text
-    )
-
-
-def _is_quota(response: httpx2.Response) -> bool:
-    """Return True for a quota: unlike a rate it takes minutes, or an operator, so the error is raised at once."""
-    return response.status_code == Busy.status and f"{TYPE_PREFIX}{QUOTA}" in response.text
 
 
 def _json(response: httpx2.Response) -> Any:
@@ -357,7 +265,7 @@ def _json(response: httpx2.Response) -> Any:
     except NOT_OURS:
         found = None
     if not isinstance(found, dict | list):
-        raise _foreign(response)
+        raise foreign_error(response)
     return cast("Any", found)
 
 
@@ -368,13 +276,8 @@ def _expected(response: httpx2.Response) -> httpx2.Response:
         InvalidInput: a redirect or a page, such as the login page of a proxy; the request had no effect.
     """
     if response.is_redirect or response.headers.get("content-type", "").startswith("text/html"):
-        raise _foreign(response)
+        raise foreign_error(response)
     return response
-
-
-def _foreign(response: httpx2.Response) -> MareyError:
-    where = str(response.request.url.copy_with(query=None))
-    return foreign_answer(response.status_code, response.headers.get, response.text[:2000], where)
 
 
 @contextmanager
@@ -401,13 +304,6 @@ def _unreachable(server: Server, error: httpx2.TransportError) -> MareyError:
         where=server.url,
         hint="Is it running? `marey serve` starts one here; MAREY_SERVER names another.",
     )
-
-
-def _retry_after(response: httpx2.Response) -> float:
-    try:
-        return min(float(response.headers.get("Retry-After", 0)), 60.0)
-    except ValueError:
-        return 0.0
 
 
 def _no_client(error: Exception, server: Server) -> InvalidInput:

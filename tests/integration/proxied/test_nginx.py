@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import httpx2
 import pytest
 
-from marey.client import transport
+from marey.client import retries
 from marey.client.server_address import Server
 from marey.client.stream_socket import Link
 from marey.client.transport import Transport
@@ -128,7 +128,7 @@ def test_without_the_upgrade_a_stream_is_told_with_what_to_set(
 def test_an_api_that_is_away_is_unreachable(
     swift: Swift, authority: Authority, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(retries, "FIRST_PAUSE", 0.01)
     nobody = f"127.0.0.1:{free_ports(1)[0]}"
     with Nginx(tmp_path / "nginx", authority, api=nobody, store=swift.endpoint) as nginx:
         with Transport(Server(nginx.url, "key")) as client, pytest.raises(Unreachable, match="answered 502"):

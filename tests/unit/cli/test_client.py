@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from marey.client import transport
+from marey.client import retries
 from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
@@ -16,7 +16,7 @@ from tests.support.scripted import Scripted, problem, scripted_servers
 
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
-    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
+    monkeypatch.setattr(retries, "FIRST_PAUSE", 0.001)
     with scripted_servers() as start:
         yield start
 
@@ -41,7 +41,7 @@ def test_a_server_that_stays_away_is_unreachable_after_five_attempts(
     client, script = scripted(*[(503, problem("unreachable"))] * 9)
     with client, pytest.raises(Unreachable):
         client.get("/v1/jobs")
-    assert len(script.asked) == transport.ATTEMPTS
+    assert len(script.asked) == retries.ATTEMPTS
 
 
 @pytest.mark.parametrize(
@@ -86,8 +86,8 @@ def test_what_must_not_be_done_twice_is_sent_once(scripted: Scripted) -> None:
 
 
 def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(transport, "ATTEMPTS", 1)
-    monkeypatch.setattr(transport, "BUSY_SECONDS", 0.0)
+    monkeypatch.setattr(retries, "ATTEMPTS", 1)
+    monkeypatch.setattr(retries, "BUSY_SECONDS", 0.0)
     client, _ = scripted((429, problem("busy", hint="Stop one.")))
     with client, pytest.raises(Busy, match=r"no\n  Stop one\.") as caught:
         client.get("/v1/jobs")
@@ -97,7 +97,7 @@ def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.Mo
 def test_a_server_that_is_busy_is_waited_for_longer_than_one_that_is_broken(
     scripted: Scripted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(transport, "LONGEST_PAUSE", 0.001)
+    monkeypatch.setattr(retries, "LONGEST_PAUSE", 0.001)
     busy = (503, problem("overloaded"))
     client, script = scripted(*[busy] * 12, (200, {"id": "job"}))
     with client:
@@ -107,16 +107,16 @@ def test_a_server_that_is_busy_is_waited_for_longer_than_one_that_is_broken(
     client, script = scripted(*[(503, problem("unreachable"))] * 12)
     with client, pytest.raises(Unreachable):
         client.submit([{"prompt": "walk"}])
-    assert len(script.asked) == transport.ATTEMPTS
+    assert len(script.asked) == retries.ATTEMPTS
 
 
 def test_a_server_that_stays_busy_is_given_up(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(transport, "BUSY_SECONDS", 0.001)
+    monkeypatch.setattr(retries, "BUSY_SECONDS", 0.001)
     client, script = scripted(*[(503, problem("overloaded"))] * 12)
     with client, pytest.raises(Overloaded) as refused:
         client.get("/v1/jobs")
     assert refused.value.exit_code == 4
-    assert len(script.asked) == transport.ATTEMPTS
+    assert len(script.asked) == retries.ATTEMPTS
 
 
 def test_text_that_no_request_can_hold_is_refused_with_what_to_do(scripted: Scripted) -> None:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from marey.client import stream_socket, transport
+from marey.client import retries, stream_socket
+from marey.client.retries import ATTEMPTS
 from marey.client.server_address import Server
 from marey.client.stream_socket import Link
-from marey.client.transport import ATTEMPTS, Transport
+from marey.client.transport import Transport
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
 from tests.servers.receiver import Authority
 from tests.support.proxied import receive_until_refused
@@ -58,7 +59,7 @@ Start = Callable[..., Proxy]
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
+    monkeypatch.setattr(retries, "FIRST_PAUSE", 0.001)
     started: list[Proxy] = []
 
     def begin(status: int, body: bytes = NGINX, **headers: str) -> Proxy:

@@ -18,7 +18,7 @@ from marey.client import (
     QuotaUsedUp,
     TimedOut,
     Unauthenticated,
-    transport,
+    retries,
 )
 from tests.support.scripted import Script, Scripted, problem, scripted_servers
 
@@ -27,7 +27,7 @@ NONE = {"ready": 0, "leased": 0, "succeeded": 0, "failed": 0, "dead": 0, "cancel
 
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
-    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
+    monkeypatch.setattr(retries, "FIRST_PAUSE", 0.001)
     with scripted_servers() as start:
         yield start
 
