@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -117,40 +116,16 @@ def fetch_job(
         prune: remove files that earlier manifests named for the job and this one does not.
         export: options of the files.
     """
-    from marey.client import FetchObserver
+    from marey.cli.fetch_progress import FetchProgress
 
-    shown = console.home_relative(folder)
-    with ExitStack() as stack:
-
-        class Observer(FetchObserver):
-            def waiting(self, folder: Path) -> None:
-                console.say(f"{shown}: another fetch writes into this folder; waiting for its end.")
-
-            def planned(self, total: int) -> None:
-                self.bar = stack.enter_context(console.bar())
-                self.task = self.bar.add_task("fetching", total=total)
-
-            def fetched(self, path: Path) -> None:
-                self.bar.advance(self.task)
-
-            def interrupted(self, done: int, total: int) -> None:
-                self.bar.stop()
-                console.say(
-                    f"{shown}: {done} of {total} files are there, and in manifest.csv; the same command goes on."
-                )
-
-            def left_over(self, paths: Sequence[Path], *, removed: bool) -> None:
-                state = "were removed." if removed else "are no longer part of the selection: --prune removes them."
-                left.append(f"{shown}: {len(paths)} files of earlier fetches of job {job} {state}")
-
-        left: list[str] = []
+    with FetchProgress(job, folder) as progress:
         fetched = client.jobs.fetch(
             job, folder,
             formats=formats or None, name_template=template,
             review=[review.value for review in reviews], prune=prune, overwrite=overwrite,
-            on_progress=Observer(), **export.values,
+            on_progress=progress, **export.values,
         )  # fmt: skip
-    for message in left:
+    for message in progress.left:
         console.say(message)
     return [output_line(each) for each in fetched]
 

@@ -81,17 +81,9 @@ def submit(
     check_template(name_template)
     if fetch is None:
         _refuse_of_files(formats, body, name_template)
-    if timeout is not None and fetch is None and not watch:
-        raise InvalidInput(
-            "limits the time of waiting, and nothing is waited for",
-            where="--timeout",
-            hint="Add --watch or --fetch FOLDER, or leave it to `marey jobs wait JOB --timeout SECONDS`.",
-        )
+        if not watch:
+            _refuse_timeout(timeout)
     export = _export_of(fetch, formats, body)
-    if fetch is not None:
-        from marey.client.fetching import check_folder
-
-        check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = row_defaults(
         sampling,
         model=model,
@@ -121,9 +113,7 @@ def submit(
             if dry_run:
                 with reader.in_source():
                     checked = client.jobs.check_lines(lines, **wanted)
-                _show_check(checked)
-                if as_json:
-                    console.result_json(checked.raw)
+                _show_check(checked, as_json=as_json)
                 return
             with reader.in_source():
                 job = client.jobs.submit_lines(lines, **wanted)
@@ -156,14 +146,30 @@ def _refuse_of_files(formats: list[str] | None, body: str | None, template: str)
             )
 
 
-def _export_of(folder: Path | None, formats: list[str] | None, body: str | None) -> ExportOptions:
-    """Return the options of the files that `--fetch` writes; the file of a body is read, and formats that are made here
-    are checked, before anything is enqueued.
+def _refuse_timeout(timeout: float | None) -> None:
+    """Refuse `--timeout` where nothing is waited for.
 
     Raises:
-        InvalidInput: a file that is none, or a format that is not known or cannot be made here.
+        InvalidInput: it is given.
+    """
+    if timeout is not None:
+        raise InvalidInput(
+            "limits the time of waiting, and nothing is waited for",
+            where="--timeout",
+            hint="Add --watch or --fetch FOLDER, or leave it to `marey jobs wait JOB --timeout SECONDS`.",
+        )
+
+
+def _export_of(folder: Path | None, formats: list[str] | None, body: str | None) -> ExportOptions:
+    """Return the options of the files that `--fetch` writes. Before anything is enqueued, the file of a body is read,
+    and the folder and the formats that are made here are checked.
+
+    Raises:
+        InvalidInput: a file that is none, a format that is not known or cannot be made here, or a folder that cannot be
+            written.
         NotFound, InvalidFile: of the file.
     """
+    from marey.client.fetching import check_folder
     from marey.client.making import check_body, check_formats
     from marey.exporters import check_known
 
@@ -173,6 +179,7 @@ def _export_of(folder: Path | None, formats: list[str] | None, body: str | None)
         hint = "One that only the server has: submit without --fetch, then `marey fetch JOB --format FORMAT`."
         check_known(formats or (), hint=hint)
         check_formats(formats, export)
+        check_folder(folder, hint="Choose another folder for --fetch.")
     return export
 
 
@@ -192,9 +199,12 @@ def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
     return reader.error()
 
 
-def _show_check(checked: CheckedJob) -> None:
+def _show_check(checked: CheckedJob, *, as_json: bool) -> None:
+    """Say what a check found; as JSON, write the server's answer too."""
     show_capacity(checked)
     _show_scope(checked)
+    if as_json:
+        console.result_json(checked.raw)
 
 
 def show_capacity(checked: CheckedJob | CheckedEdit) -> None:
