@@ -142,7 +142,7 @@ def text_router(config: Settings) -> APIRouter:
             hint="Set it for both, or use `marey serve`, which creates one.",
         )
     secret = config.text_key.get_secret_value().encode()
-    limit, threads = WordLimit(), CapacityLimiter(THREADS)
+    runner = _TaskRunner(config.text_seconds)
 
     async def check(request: Request) -> None:
         scheme, _, shown = request.headers.get("authorization", "").partition(" ")
@@ -154,24 +154,38 @@ def text_router(config: Settings) -> APIRouter:
     @router.post("/parse")
     async def parse_texts(body: ParseBody) -> GraphsView:
         """Parse each prompt into its semantic graph."""
-        return await run(parse_prompts, body)
+        return await runner.run(parse_prompts, body)
 
     @router.post("/scope")
     async def judge_scopes(body: ParseBody) -> ScopesView:
         """Judge which prompts name actions that a bundle knows."""
-        return await run(judge_prompts, body)
-
-    async def run(function: Callable[[ParseBody], View], body: ParseBody) -> View:
-        work = _Task(function, body, limit.take(body.prompts))
-        try:
-            with anyio.fail_after(config.text_seconds):
-                return await to_thread.run_sync(work, limiter=threads, abandon_on_cancel=True)
-        except TimeoutError:
-            raise too_late(config.text_seconds) from None
-        finally:
-            work.forget()
+        return await runner.run(judge_prompts, body)
 
     return router
+
+
+class _TaskRunner:
+    """Runs requests in `THREADS` threads, each within `seconds`; those in flight share a limit of words."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._limit, self._threads = WordLimit(), CapacityLimiter(THREADS)
+
+    async def run(self, function: Callable[[ParseBody], View], body: ParseBody) -> View:
+        """Return what `function` makes of a body.
+
+        Raises:
+            Busy: with those in flight, it has too many words.
+            Unreachable: it took too long.
+        """
+        work = _Task(function, body, self._limit.take(body.prompts))
+        try:
+            with anyio.fail_after(self._seconds):
+                return await to_thread.run_sync(work, limiter=self._threads, abandon_on_cancel=True)
+        except TimeoutError:
+            raise too_late(self._seconds) from None
+        finally:
+            work.forget()
 
 
 class _Task(Generic[View]):

@@ -63,13 +63,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
         QuotaUsedUp: the tenant's quotas do not allow it; nothing is written.
         IdempotencyMismatch: the key was used with another body.
     """
-    if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
-        raise InvalidInput(f"{job.priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
-    check_share(job.fail_early)
-    if job.keep_days is not None and not 1 <= job.keep_days <= MAX_KEEP_DAYS:
-        raise InvalidInput(f"{job.keep_days} is not between 1 and {MAX_KEEP_DAYS} days", where="keep_days")
-    for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
-        check_text(text, where)
+    _check_values(job)
     identifier = new_id()
     earlier = _earlier(conn, job, identifier)
     if earlier is not None:
@@ -99,6 +93,21 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     _begin(conn, identifier, total)
     change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
     return SubmittedJob(identifier, replayed=False, items=total)
+
+
+def _check_values(job: NewJob) -> None:
+    """Check what a job says of itself, apart from its items.
+
+    Raises:
+        InvalidInput: a number out of its range, or text that the database cannot hold.
+    """
+    if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
+        raise InvalidInput(f"{job.priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
+    check_share(job.fail_early)
+    if job.keep_days is not None and not 1 <= job.keep_days <= MAX_KEEP_DAYS:
+        raise InvalidInput(f"{job.keep_days} is not between 1 and {MAX_KEEP_DAYS} days", where="keep_days")
+    for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
+        check_text(text, where)
 
 
 def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:

@@ -62,17 +62,28 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
     os.environ[ROLE_VARIABLE] = json.dumps(asdict(role))
     os.environ[NAME_VARIABLE] = name
     os.environ["MAREY_DATABASE_URL"] = chosen.database_url.get_secret_value()  # the child is a fresh interpreter
+    worker = _celery_worker(role, chosen.queue_url.get_secret_value(), name, chosen)
+    threading.Thread(target=_watch, args=(chosen.home, name), name="watch", daemon=True).start()
+    worker.start()
+    status = read_status(chosen.home, name)
+    if status is not None and status.error is not None:
+        status_file(chosen.home, name).unlink(missing_ok=True)
+        return 1
+    return int(worker.exitcode or 0)
+
+
+def _celery_worker(role: Role, queue_url: str, name: str, chosen: Settings) -> Any:
+    """Return Celery's worker of the queues of a role, not started; its shutdown stops the child."""
     # Celery warns about pickle as root, which this app does not accept.
     warnings.filterwarnings("ignore", category=SecurityWarning)
-    app = create_app(chosen.queue_url.get_secret_value())
+    app = create_app(queue_url)
     signals.setup_logging.connect(_keep_logging, weak=False)
-    home, own_name = chosen.home, name
 
     def stop_child(**_: Any) -> None:
-        _stop_child(home, own_name)
+        _stop_child(chosen.home, name)
 
     signals.worker_shutting_down.connect(stop_child, weak=False)
-    worker = app.Worker(
+    return app.Worker(
         hostname=f"{role.name}@{name}",
         queues=list(role.handlers),
         loglevel=chosen.log_level,
@@ -81,13 +92,6 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
         without_heartbeat=True,  # Celery's own, over the broker; Marey's is in the database
         quiet=True,
     )
-    threading.Thread(target=_watch, args=(home, own_name), name="watch", daemon=True).start()
-    worker.start()
-    status = read_status(chosen.home, name)
-    if status is not None and status.error is not None:
-        status_file(chosen.home, name).unlink(missing_ok=True)
-        return 1
-    return int(worker.exitcode or 0)
 
 
 def _keep_logging(**_: Any) -> None:

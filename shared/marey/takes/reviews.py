@@ -102,14 +102,9 @@ def reroll(
     for job in locked:
         made |= _roll_again(conn, job, [row for row in rows if row.job == job.id], make, by, comment)
     item = job_tables.item.c
-    takes = {
-        row.replaces: row
-        for row in conn.execute(
-            sa.select(item.id, item.job_id, item.seed, item.state, item.replaces).where(
-                among(item.replaces, [row.id for row in rows])
-            )
-        )
-    }
+    columns = (item.id, item.job_id, item.seed, item.state, item.replaces)
+    found = conn.execute(sa.select(*columns).where(among(item.replaces, [row.id for row in rows])))
+    takes = {row.replaces: row for row in found}
     return [
         Reroll(row.id, take.id, take.job_id, take.seed, ItemState(take.state), made=row.id in made)
         for row in rows

@@ -100,15 +100,12 @@ def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> D
     gone = attempt.status == GONE
     if gone:  # before its deliveries, in the same order as a deletion
         conn.execute(sa.select(webhook.c.id).where(webhook.c.id == due.webhook).with_for_update(key_share=True))
-    values: dict[str, Any] = {"claim": None, "tries": tries, "attempts": webhook_delivery.c.attempts + 1}
-    if attempt.error is None:
-        state = DeliveryState.DELIVERED
-    elif gone or due.kind == TEST_KIND or tries > len(DELAYS):
-        state = DeliveryState.FAILED
-    else:
-        state = DeliveryState.PENDING
+    state = _state_after(due, attempt)
     ended = state is not DeliveryState.PENDING
-    values |= {
+    values: dict[str, Any] = {
+        "claim": None,
+        "tries": tries,
+        "attempts": webhook_delivery.c.attempts + 1,
         "state": state,
         "next_at": None if ended else CLOCK + interval(max(delay_after(tries), min(attempt.wait, MAX_WAIT))),
         "ended_at": CLOCK if ended else None,
@@ -134,6 +131,15 @@ def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> D
     if gone:
         _pause_gone(conn, due)
     return state
+
+
+def _state_after(due: DueDelivery, attempt: Attempt) -> DeliveryState:
+    """Return the state of a delivery after an attempt: one that failed is tried again, but not a test, nor at a
+    receiver that is gone, nor after the last of `DELAYS`."""
+    if attempt.error is None:
+        return DeliveryState.DELIVERED
+    is_last = due.tries + 1 > len(DELAYS)
+    return DeliveryState.FAILED if attempt.status == GONE or due.kind == TEST_KIND or is_last else DeliveryState.PENDING
 
 
 def delay_after(tries: int) -> float:
