@@ -162,35 +162,20 @@ def load_npz(path: Path | str) -> MotionClip:
 
 def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
     """Read the bytes of a clip's npz file; see `load_npz`."""
-    arrays = parse_arrays(data, where, KEYS, limit=MAX_UNPACKED, hint=FOREIGN)
-
-    def need(key: str, kinds: str, *shape: int | None) -> NDArray[Any]:
-        return check_array(arrays[key], key, where, kinds=kinds, shape=shape)
-
-    def floats(key: str, *shape: int | None) -> Float32:
-        with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite and is refused
-            array = need(key, "f", *shape).astype(np.float32, copy=False)
-        return check_array(array, key, where, kinds="f", shape=shape)
-
-    def places(key: str, *shape: int | None) -> Float32:
-        array = floats(key, *shape, 3)
-        if np.abs(array).max(initial=0) > FARTHEST:
-            raise InvalidFile(f"`{key}` holds numbers over {FARTHEST:,.0f}", where=where)
-        return array
-
-    joints = places("joints", None, None)
+    found = _ClipArrays(data, where)
+    joints = found.places("joints", None, None)
     frames, count = joints.shape[:2]
-    rotations = floats("rotations", frames, count, 4)
-    parents = tuple(int(p) for p in need("parents", "iu", count).tolist())
-    fps, features_fps = float(need("fps", "f")), float(need("features_fps", "f"))
+    rotations = found.floats("rotations", frames, count, 4)
+    parents = tuple(int(p) for p in found.array("parents", "iu", count).tolist())
+    fps, features_fps = float(found.array("fps", "f")), float(found.array("features_fps", "f"))
     if not frames or not 0 < fps <= 1000:
         raise InvalidFile(f"{frames} frames at {fps:g} fps", where=where)
     if np.abs(np.linalg.norm(np.clip(rotations, -2, 2), axis=-1) - 1).max(initial=0) > 1e-3:
         raise InvalidFile("`rotations` holds quaternions that are not of unit length", where=where)
     try:
-        names = tuple(str(n) for n in need("names", "U", count).tolist())
-        manifest = parse_json(text_of(arrays["manifest"], "manifest", where), f"{where}: manifest", allow_nan=True)
-        skeleton = skeleton_of(names, parents, places("offsets", count))
+        names = tuple(str(n) for n in found.array("names", "U", count).tolist())
+        manifest = found.manifest()
+        skeleton = skeleton_of(names, parents, found.places("offsets", count))
     except InvalidFile:  # it names the file already
         raise
     except (ValueError, InvalidInput) as error:
@@ -198,11 +183,41 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
     return MotionClip(
         skeleton=skeleton,
         rotations=rotations,
-        root=places("root", frames),
+        root=found.places("root", frames),
         joints=joints,
-        contacts=need("contacts", "b", frames, 4),
+        contacts=found.array("contacts", "b", frames, 4),
         fps=fps,
-        features=floats("features", None, None),
+        features=found.floats("features", None, None),
         features_fps=features_fps,
         manifest=check_manifest(manifest, where),
     )
+
+
+class _ClipArrays:
+    """The arrays of a clip's npz file, checked when they are taken; lengths of axes are given, None = any length."""
+
+    def __init__(self, data: bytes, where: str) -> None:
+        self._arrays = parse_arrays(data, where, KEYS, limit=MAX_UNPACKED, hint=FOREIGN)
+        self._where = where
+
+    def array(self, key: str, kinds: str, *shape: int | None) -> NDArray[Any]:
+        """Return an array whose type is one of `kinds` (see `check_array`)."""
+        return check_array(self._arrays[key], key, self._where, kinds=kinds, shape=shape)
+
+    def floats(self, key: str, *shape: int | None) -> Float32:
+        """Return an array of finite numbers, as float32."""
+        with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite and is refused
+            array = self.array(key, "f", *shape).astype(np.float32, copy=False)
+        return check_array(array, key, self._where, kinds="f", shape=shape)
+
+    def places(self, key: str, *shape: int | None) -> Float32:
+        """Return points (*shape, 3) in metres, none farther away than `FARTHEST`."""
+        array = self.floats(key, *shape, 3)
+        if np.abs(array).max(initial=0) > FARTHEST:
+            raise InvalidFile(f"`{key}` holds numbers over {FARTHEST:,.0f}", where=self._where)
+        return array
+
+    def manifest(self) -> Any:
+        """Return the JSON value of the manifest, not yet checked."""
+        text = text_of(self._arrays["manifest"], "manifest", self._where)
+        return parse_json(text, f"{self._where}: manifest", allow_nan=True)
