@@ -99,6 +99,30 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
 
 @contextlib.asynccontextmanager
 async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
+    """Start what the routes share, and close it after the last request."""
+    shared = app.state.context = _context(config, app.state.catalogue)
+    shared.broadcaster.start()
+    shared.readiness.start()
+    try:
+        async with notified():
+            yield
+    finally:
+        shared.readiness.stop()
+        shared.broadcaster.stop()
+        await shared.maker.close()
+        await shared.texts.close()
+        shared.rates.close()
+        if shared.streams is not None:
+            shared.streams.close()
+        shared.engine.dispose()
+
+
+def _context(config: Settings, catalogue: Catalogue) -> Context:
+    """Return what the routes share, not started.
+
+    Raises:
+        InvalidInput: a setting is missing or invalid.
+    """
     if config.database_url is None:
         raise InvalidInput(
             "the API needs a database",
@@ -118,24 +142,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     texts = TextService(config)
     store = open_store(config)
     readiness = Readiness(readiness_checks(config, engine, store))
-    shared = Context(
-        config, engine, store, app.state.catalogue, broadcaster, RateLimiter(config), texts, readiness, hub
-    )
-    app.state.context = shared
-    broadcaster.start()
-    readiness.start()
-    try:
-        async with notified():
-            yield
-    finally:
-        readiness.stop()
-        broadcaster.stop()
-        await shared.maker.close()
-        await texts.close()
-        app.state.context.rates.close()
-        if hub is not None:
-            hub.close()
-        engine.dispose()
+    return Context(config, engine, store, catalogue, broadcaster, RateLimiter(config), texts, readiness, hub)
 
 
 def _operation_id(route: APIRoute) -> str:

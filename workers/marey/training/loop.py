@@ -95,20 +95,29 @@ class _Run:
         self.checkpoint = options.folder / "checkpoint"
         self.main = distributed.rank() == 0
         if options.resume:
-            state = load_checkpoint(self.checkpoint, stage.module, self.average, self.optimizer)
-            if (state.stage, state.seed, state.config) != (stage.name, options.seed, self.config):
-                raise InvalidInput(
-                    "the checkpoint was made with another stage, seed or configuration",
-                    where=str(self.checkpoint),
-                    hint="Resume with the options of the first start, or start in another folder.",
-                )
-            self.step, self.seconds, self.metrics = state.step, state.seconds, state.metrics
+            self._restore()
         else:
             for tensor in stage.module.state_dict().values():
                 distributed.broadcast(tensor)
         self.recorded: RecordedSteps | None = None
         if recordable is not None:
             self.recorded = RecordedSteps(recordable, self.optimizer, self.average, self._autocast)
+
+    def _restore(self) -> None:
+        """Load the checkpoint.
+
+        Raises:
+            InvalidInput: it is of another run.
+        """
+        stage, seed = self.stage, self.options.seed
+        state = load_checkpoint(self.checkpoint, stage.module, self.average, self.optimizer)
+        if (state.stage, state.seed, state.config) != (stage.name, seed, self.config):
+            raise InvalidInput(
+                "the checkpoint was made with another stage, seed or configuration",
+                where=str(self.checkpoint),
+                hint="Resume with the options of the first start, or start in another folder.",
+            )
+        self.step, self.seconds, self.metrics = state.step, state.seconds, state.metrics
 
     @property
     def fraction(self) -> float:

@@ -376,21 +376,15 @@ def _plan(
 def _write(
     plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, export: ExportOptions, *, overwrite: bool
 ) -> dict[str, Any]:
-    from marey.exporters import Coordinates, exporters
-    from marey.motion.files import write_atomically
+    """Write the files of a motion, and return its output line.
 
-    paths = plan.paths
-    contents = {kind: exporters()[kind].write(clip, Coordinates.of(export)) for kind in paths}
-    changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
-    for kind in changed:
-        if paths[kind].exists() and not overwrite:
-            raise Conflict(
-                "already exists and holds something else",
-                where=str(paths[kind]),
-                hint="Choose another folder, or --overwrite.",
-            )
-    for kind in changed:
-        write_atomically(paths[kind], contents[kind])
+    Raises:
+        Conflict: one of the files exists with other content; none is written then.
+    """
+    from marey.exporters import Coordinates, exporters
+
+    contents = {kind: exporters()[kind].write(clip, Coordinates.of(export)) for kind in plan.paths}
+    _write_changed({path: contents[kind] for kind, path in plan.paths.items()}, overwrite=overwrite)
     return {
         "job": None,
         "item": None,
@@ -410,5 +404,21 @@ def _write(
         "quality": clip.manifest.get("quality"),
         "selection": clip.manifest.get("selection"),
         "scope": clip.manifest.get("scope"),
-        "files": {kind: str(path.absolute()) for kind, path in paths.items()},
+        "files": {kind: str(path.absolute()) for kind, path in plan.paths.items()},
     }
+
+
+def _write_changed(files: Mapping[Path, bytes], *, overwrite: bool) -> None:
+    """Write the files that are missing or hold something else, once it is known that all may be written."""
+    from marey.motion.files import write_atomically
+
+    changed = [path for path, content in files.items() if not path.exists() or path.read_bytes() != content]
+    for path in changed:
+        if path.exists() and not overwrite:
+            raise Conflict(
+                "already exists and holds something else",
+                where=str(path),
+                hint="Choose another folder, or --overwrite.",
+            )
+    for path in changed:
+        write_atomically(path, files[path])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import typer
@@ -66,7 +67,6 @@ def worker(
     from marey.core.extras import extra
 
     with extra("worker"):
-        from marey.cli.children import SupervisedProcess, keep_all, marey, metrics_port
         from marey.core.settings import settings
         from marey.runtime.worker import worker_main
     where = "MODEL" if model else "MAREY_ROLE"
@@ -90,11 +90,21 @@ def worker(
     role = role_of(queues, settings())
     if only == "queue" or not shown or not settings().live_slots:
         raise typer.Exit(worker_main(role, settings()))
+    _keep_queue_and_streams(model, shown)
+
+
+def _keep_queue_and_streams(model: str, streaming: Iterable[str]) -> None:
+    """Run one process for the queues of `model`, and one for the live streams of each streaming model."""
+    from marey.cli.children import SupervisedProcess, keep_all, marey, metrics_port
+    from marey.core.settings import settings
+
     parts = [(f"{model} queue", [model, "--only", "queue"])]
-    parts += [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
-    places = [{**os.environ, **metrics_port(settings(), place)} for place in range(len(parts))]
+    parts += [(f"{name} live", [name, "--only", "live"]) for name in streaming]
     keep_all(
-        [SupervisedProcess(n, marey("worker", *rest), place) for (n, rest), place in zip(parts, places, strict=True)]
+        [
+            SupervisedProcess(title, marey("worker", *words), {**os.environ, **metrics_port(settings(), place)})
+            for place, (title, words) in enumerate(parts)
+        ]
     )
 
 
