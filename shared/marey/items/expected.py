@@ -51,12 +51,6 @@ def read_expected(text: str) -> tuple[ExpectedAction, ...]:
     return tuple(_action(words) for words in parts)
 
 
-def format_expected(actions: tuple[ExpectedAction, ...]) -> str:
-    """Format actions as text that `read_expected` reads."""
-    words = [" ".join(filter(None, (a.action, a.side, STRAIGHT if a.straight else ""))) for a in actions]
-    return f" {JOIN} ".join(words)
-
-
 def _action(words: list[str]) -> ExpectedAction:
     if not words:
         raise InvalidInput(f'an action is missing: write "walk", or "walk {JOIN} wave left"')
