@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -39,6 +39,7 @@ from marey.scheduler.main import scheduler_main
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
 from marey.tenants.types import DEFAULT_TENANT
+from tests.support.evaluations import wait
 from tests.support.toy import QUEUE
 from tests.support.toy_jobs import job_row, submit_toys
 
@@ -67,13 +68,6 @@ def live(engine: sa.Engine, *names: str, queue: str = QUEUE) -> None:
     with transaction(engine) as conn:
         for name in names:
             beat(conn, WorkerHeartbeat(id=f"{name}/{queue}", queue=queue, host="here", pid=1, device="cpu"))
-
-
-def wait(condition: Callable[[], bool], seconds: float = 20.0) -> None:
-    until = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < until, "not in time"
-        time.sleep(0.02)
 
 
 def test_there_are_no_more_hints_than_workers(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:

@@ -15,6 +15,7 @@ from structlog.testing import capture_logs
 
 from marey.core.addresses import Allowed
 from marey.db import transaction
+from marey.jobs import cancel
 from marey.scheduler.sending import Sender
 from marey.scheduler.webhooks import Deliverer
 from marey.tenants import DEFAULT_TENANT
@@ -27,6 +28,7 @@ from marey.webhooks import (
     list_deliveries,
 )
 from marey.webhooks.vault import Vault, new_signing_secret
+from tests.servers.jobs import submit_items
 from tests.servers.receiver import LOOPBACK
 
 KEY = Fernet.generate_key().decode()
@@ -64,6 +66,14 @@ def events_written(engine: sa.Engine) -> int:
     """Rows of the outbox."""
     with transaction(engine) as conn:
         return conn.execute(sa.text("SELECT count(*) FROM webhook_event")).scalar_one()
+
+
+def happen(engine: sa.Engine, times: int = 1) -> None:
+    """Cancel new jobs, so that webhooks have events."""
+    for _ in range(times):
+        job = submit_items(engine, 1)
+        with transaction(engine) as conn:
+            cancel(conn, DEFAULT_TENANT, job)
 
 
 def time_passes(engine: sa.Engine) -> None:

@@ -7,7 +7,6 @@ one.
 from __future__ import annotations
 
 import io
-import subprocess
 import tokenize
 from collections.abc import Sequence
 from pathlib import PurePath
@@ -17,6 +16,7 @@ import pytest
 from marey.registry import model_names
 from tests.support.marey import REPOSITORY
 from tests.support.models import OTHERS, is_of
+from tests.support.without_model import tracked
 
 REGISTERED = "pyproject.toml"
 NAMING = {
@@ -32,12 +32,6 @@ NAMING = {
 """Files that name a model, with the reason."""
 SKIPPED = (".md", ".lock", ".png", ".jpg", ".svg", ".safetensors", ".npz", ".gz", ".bvh", ".csv", ".tsv", ".woff2")
 """Prose, locks, and what holds no code."""
-
-
-def tracked() -> list[str]:
-    """Every file under version control."""
-    done = subprocess.run(["git", "ls-files", "-z"], cwd=REPOSITORY, capture_output=True, text=True, check=True)
-    return [name for name in done.stdout.split("\0") if name and (REPOSITORY / name).is_file()]
 
 
 def code(name: str, text: str) -> str:

@@ -27,7 +27,7 @@ from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.evaluations import wait
 from tests.support.scheduler_processes import Start, scheduler_processes
 from tests.support.toy_jobs import job_row
-from tests.support.webhooks import KEY, SECRET, VAULT, deliveries, errors, new_webhook, time_passes
+from tests.support.webhooks import KEY, SECRET, VAULT, deliveries, errors, happen, new_webhook, time_passes
 
 API = "http://127.0.0.1:8400"
 DONE = [DeliveryState.DELIVERED]
@@ -52,13 +52,6 @@ def delivering(engine: sa.Engine, *, vault: Vault = VAULT, sender: Sender | None
         stopping.set()
         thread.join(30)
         assert not thread.is_alive()
-
-
-def happen(engine: sa.Engine, times: int = 1) -> None:
-    for _ in range(times):
-        job = submit_items(engine, 1)
-        with transaction(engine) as conn:
-            cancel(conn, DEFAULT_TENANT, job)
 
 
 def all_delivered(engine: sa.Engine, webhook: object) -> bool:

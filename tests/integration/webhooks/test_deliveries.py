@@ -9,7 +9,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.db import transaction
-from marey.jobs import cancel, sweep
+from marey.jobs import sweep
 from marey.tenants import DEFAULT_TENANT, list_audit
 from marey.webhooks import (
     Attempt,
@@ -33,18 +33,10 @@ from marey.webhooks import (
 )
 from marey.webhooks.deliveries import DELAYS, JITTER, MAX_WAIT
 from marey.webhooks.repository import MAX_WEBHOOKS
-from tests.servers.jobs import submit_items
-from tests.support.webhooks import deliveries, errors, events_written, messages_of, new_webhook, time_passes
+from tests.support.webhooks import deliveries, errors, events_written, happen, messages_of, new_webhook, time_passes
 
 REFUSED = Attempt(500, 0.1, "answered 500")
 ARRIVED = Attempt(204, 0.1, None)
-
-
-def happen(engine: sa.Engine, times: int = 1) -> None:
-    for _ in range(times):
-        job = submit_items(engine, 1)
-        with transaction(engine) as conn:
-            cancel(conn, DEFAULT_TENANT, job)
 
 
 def claim(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import hashlib
 import json
 import re
 from dataclasses import dataclass, field
@@ -29,6 +28,7 @@ from marey.evaluator.report import (
 )
 from marey.evaluator.report.templates import PACKAGE
 from marey.viz.pages import asset
+from tests.support.policies import policy_hashes
 from tests.support.reports import UNMEASURED, sample_report
 from tests.support.walker import walker
 
@@ -142,14 +142,11 @@ def test_no_attribute_runs_code_and_nothing_is_fetched(report: Report) -> None:
 def test_the_policy_names_each_script_and_style_of_the_page_and_nothing_else(page: Page) -> None:
     policy = dict(part.split(" ", 1) for part in page.policy.split("; "))
 
-    def hashes(texts: list[str]) -> list[str]:
-        return [f"'sha256-{base64.b64encode(hashlib.sha256(t.encode()).digest()).decode()}'" for t in texts]
-
     scripts = [code for code in page.code["script"] if not code.startswith('{"bodies"')]
     assert len(scripts) == 6
     assert policy["default-src"] == "'none'"
-    assert policy["script-src"].split() == hashes(scripts)
-    assert policy["style-src"].split() == hashes(page.code["style"])
+    assert policy["script-src"].split() == policy_hashes(scripts)
+    assert policy["style-src"].split() == policy_hashes(page.code["style"])
     assert policy["img-src"] == "data:"
     assert "unsafe" not in page.policy
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 import re
 from html.parser import HTMLParser
@@ -16,6 +14,7 @@ from marey.viz import live_page as module
 from marey.viz.body import dress
 from marey.viz.live_page import live_page
 from marey.viz.pages import fill
+from tests.support.policies import policy_hashes
 
 ASSETS = Path(module.__file__).parent / "assets"
 
@@ -66,13 +65,10 @@ def test_the_page_loads_nothing(elements: Elements):
 def test_its_policy_names_each_script_and_its_style_and_nothing_else(elements: Elements):
     policy = dict(part.split(" ", 1) for part in live_page().policy().split("; "))
 
-    def hashes(texts: list[str]) -> list[str]:
-        return [f"'sha256-{base64.b64encode(hashlib.sha256(t.encode()).digest()).decode()}'" for t in texts]
-
     scripts = elements.texts("script")
     assert len(scripts) == 7
-    assert policy["script-src"].split() == hashes(scripts)
-    assert policy["style-src"].split() == hashes(elements.texts("style"))
+    assert policy["script-src"].split() == policy_hashes(scripts)
+    assert policy["style-src"].split() == policy_hashes(elements.texts("style"))
     assert policy["default-src"] == "'none'"
     assert policy["connect-src"] == "'self'"
     assert policy["frame-ancestors"] == "'none'"
