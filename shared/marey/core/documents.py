@@ -99,7 +99,6 @@ def parse_json(
     error: type[InvalidFile] = InvalidFile,
     hint: str | None = None,
     allow_nan: bool = False,
-    max_depth: int = MAX_DEPTH,
     unique: bool = False,
 ) -> Any:
     """Parse JSON in UTF-8.
@@ -108,7 +107,6 @@ def parse_json(
         data: the document.
         where, error, hint: for the error.
         allow_nan: accept NaN and infinite numbers, which Python writes and JSON does not have.
-        max_depth: levels of nesting.
         unique: refuse objects that give a key twice.
 
     Raises:
@@ -117,9 +115,9 @@ def parse_json(
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
         value = json.loads(text, object_pairs_hook=unique_object if unique else None)
-        problem = _problem(value, allow_nan, max_depth)
+        problem = _problem(value, allow_nan)
     except RecursionError:
-        problem = f"is nested more than {max_depth} levels deep"
+        problem = f"is nested more than {MAX_DEPTH} levels deep"
     except ValueError as failure:
         problem = json_problem(failure)
     else:
@@ -132,7 +130,6 @@ def read_json(
     path: Path,
     *,
     limit: int = MAX_JSON_BYTES,
-    error: type[InvalidFile] = InvalidFile,
     hint: str | None = None,
     allow_nan: bool = False,
     unique: bool = False,
@@ -142,14 +139,14 @@ def read_json(
     Raises:
         NotFound, InvalidFile: as `read_bytes` and `parse_json`.
     """
-    data = read_bytes(path, limit=limit, error=error, hint=hint)
-    return parse_json(data, str(path), error=error, hint=hint, allow_nan=allow_nan, unique=unique)
+    data = read_bytes(path, limit=limit, hint=hint)
+    return parse_json(data, str(path), hint=hint, allow_nan=allow_nan, unique=unique)
 
 
-def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:
+def _problem(value: Any, allow_nan: bool) -> str | None:
     """Return why a parsed document cannot be used, or None; works without recursion."""
     level = [value]
-    for _ in range(max_depth):
+    for _ in range(MAX_DEPTH):
         inner: list[Any] = []
         for each in level:
             if isinstance(each, dict):
@@ -166,7 +163,7 @@ def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:
         if not inner:
             return None
         level = inner
-    return f"is nested more than {max_depth} levels deep"
+    return f"is nested more than {MAX_DEPTH} levels deep"
 
 
 def _is_unicode(text: str) -> bool:

@@ -92,10 +92,10 @@ def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
     return [SchedulerRow(**row) for row in rows.mappings()]
 
 
-def has_loaded(bundle: sa.ColumnElement[str], queue: str, *, rules: Policy | None = None) -> sa.ColumnElement[bool]:
+def has_loaded(bundle: sa.ColumnElement[str], queue: str) -> sa.ColumnElement[bool]:
     """Return the condition that a live worker of a queue has loaded a bundle, for a query on rows that name one."""
     table = tables.worker.c
-    return sa.exists().where(table.queue == queue, table.bundle == bundle, _live(rules or policy()))
+    return sa.exists().where(table.queue == queue, table.bundle == bundle, _live(policy()))
 
 
 def _live(rules: Policy) -> sa.ColumnElement[bool]:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.data.part import FPS
 from marey.motion.filters import smooth
 from marey.motion.support import RADII, clearance
 
@@ -26,13 +27,13 @@ _FOLLOW = 0.05  # seconds, smoothing of a floor that follows the body
 _NEAR = (-0.3, 0.08)  # metres: `RADII` ignore flesh under lying bodies; higher bodies are in the air
 
 
-def levelled(joints: Array, fps: float = 20.0) -> Array:
+def levelled(joints: Array) -> Array:
     """Level the floor of a clip (T, 22, 3) if its supports clearly show a tilt.
 
     A plane is fitted robustly to the heights of standing supports. The clip is sheared, which keeps vertical directions
     vertical.
     """
-    places = _supports(joints, fps)
+    places = _supports(joints)
     if len(places) < LEAST_SUPPORTS:
         return joints
     slope, level, off = _plane(places)
@@ -44,13 +45,13 @@ def levelled(joints: Array, fps: float = 20.0) -> Array:
     return out
 
 
-def _supports(joints: Array, fps: float) -> Array:
+def _supports(joints: Array) -> Array:
     """Contact points (N, 3) of standing feet: the lowest foot joint of each frame while it does not move."""
     height = joints[:, _FEET, 1] - RADII[_FEET]
     lowest = np.array(_FEET)[height.argmin(axis=1)]
     frames = np.arange(len(joints) - 1)
     places, later = joints[frames, lowest[:-1]], joints[frames + 1, lowest[:-1]]
-    still = np.linalg.norm((later - places)[:, [0, 2]], axis=1) * fps < _STANDS
+    still = np.linalg.norm((later - places)[:, [0, 2]], axis=1) * FPS < _STANDS
     places[:, 1] -= RADII[lowest[:-1]]
     return places[still]
 
@@ -71,13 +72,13 @@ def _plane(places: Array) -> tuple[Array, float, float]:
     return solved[:-1] @ axes, float(np.median(level)), float(np.median(off))
 
 
-def follow_floor(joints: Array, fps: float = 20.0) -> Array:
+def follow_floor(joints: Array) -> Array:
     """Move each frame of a clip (T, 22, 3) so that the body is on the floor.
 
     For files whose hips stay at one height, though the body crouches, lies or sits: what rises in them are the feet.
     """
     out = np.array(joints, np.float64)
-    out[..., 1] -= smooth(clearance(out)[:, None], _FOLLOW * fps)
+    out[..., 1] -= smooth(clearance(out)[:, None], _FOLLOW * FPS)
     return out
 
 

@@ -38,11 +38,11 @@ def _on_back(rng: random.Random, at: tuple[float, float], yaw: float = 0.0) -> W
     return Whole(at, 0.14, (-87, 0, yaw), (rng.uniform(-2, 4), 0, 0), neck, _arms_out(rng, True), feet, 1.0, 0.3)
 
 
-def _on_front(rng: random.Random, at: tuple[float, float], yaw: float = 0.0) -> Whole:
+def _on_front(rng: random.Random, at: tuple[float, float]) -> Whole:
     """A body on its front, the head turned aside."""
     feet = {side: Limb((rng.uniform(0.1, 0.2), -0.88, 0.0), towards=(0.25, -0.95, -0.2)) for side in SIDES}
     neck = (rng.uniform(-14, -4), 0, rng.uniform(30, 60) * rng.choice((1, -1)))
-    return Whole(at, 0.14, (88, 0, yaw), (rng.uniform(-3, 1), 0, 0), neck, _arms_out(rng, False), feet, 1.0, 0.25)
+    return Whole(at, 0.14, (88, 0, 0), (rng.uniform(-3, 1), 0, 0), neck, _arms_out(rng, False), feet, 1.0, 0.25)
 
 
 def _on_right(rng: random.Random, at: tuple[float, float]) -> Whole:

@@ -14,8 +14,8 @@ _OUT: Point = (0.8, -0.8, -0.3)
 _Hands = dict[str, HandPlace]
 
 
-def _put(left: Point, right: Point, anchor: str = "trunk", elbow: Point = _OUT) -> _Hands:
-    return {LEFT: HandPlace(left, anchor, elbow), RIGHT: HandPlace(right, anchor, elbow)}
+def _put(left: Point, right: Point, elbow: Point = _OUT) -> _Hands:
+    return {LEFT: HandPlace(left, "trunk", elbow), RIGHT: HandPlace(right, "trunk", elbow)}
 
 
 def _near_hands(rng: random.Random, hands: _Hands, far: float) -> _Hands:

@@ -47,13 +47,13 @@ def load_torch(file: Path, *, limit: int = MAX_BYTES) -> Mapping[str, Any]:
     return loaded
 
 
-def load_array(file: Path, *, limit: int = MAX_BYTES) -> NDArray[Any]:
+def load_array(file: Path) -> NDArray[Any]:
     """Load a file that `torch.save` wrote of one tensor; floating numbers become float64.
 
     Raises:
         NotFound, InvalidFile: as `load_torch`, or it holds something else.
     """
-    loaded = _load(file, limit)
+    loaded = _load(file, MAX_BYTES)
     plain = isinstance(loaded, Tensor) and loaded.layout is torch.strided and loaded.device.type == "cpu"
     if not plain or loaded.is_quantized:
         raise InvalidFile(f"holds {type(loaded).__name__}, not one array of numbers", where=str(file), hint=AGAIN)

@@ -13,6 +13,7 @@ from marey.labeller.sentences import Example
 from marey.text.light import WordStates
 from marey.text.roles import Frame
 
+VARIANTS = 3  # augmented copies of each annotated sentence in the first training
 CHUNKS = 16  # batches that are drawn together, so that sentences of like length share one: little padding
 
 
@@ -57,12 +58,11 @@ def propbank_batches(
     tags: Sequence[str],
     size: int,
     seed: int,
-    variants: int = 3,
 ) -> Iterator[list[Encoded]]:
     """PropBank and variants of annotated sentences again and again, `size` sentences at a time, without end."""
     rng = random.Random(seed)  # noqa: S311
     augmenter = Augmenter(annotated, rng)
-    more = [augmenter.variant(example) for _ in range(variants) for example in annotated]
+    more = [augmenter.variant(example) for _ in range(VARIANTS) for example in annotated]
     pool = [encode(example, words, tags) for example in [*examples, *more]]
     while True:
         rng.shuffle(pool)

@@ -95,14 +95,13 @@ def body_of(skeleton: Skeleton) -> RigBody:
     return _body_of(skeleton.name, skeleton.joint_names, skeleton.parents, skeleton.offsets.tobytes())
 
 
-def source_on(body: RigBody, clip: BvhClip, contacts: NDArray[np.bool_] | None = None) -> Source:
+def source_on(body: RigBody, clip: BvhClip) -> Source:
     """Return a BVH clip as a motion of a rig whose rest pose is known from another file, such as one that begins with a
-    T-pose.
+    T-pose; no foot of it stands.
 
     Args:
         body: the rig, with the joints of the clip in any order.
         clip: the motion.
-        contacts: (T, 4) bool, which feet stand; None = none does.
 
     Raises:
         InvalidInput: a joint of the rig is not in the clip.
@@ -114,5 +113,5 @@ def source_on(body: RigBody, clip: BvhClip, contacts: NDArray[np.bool_] | None =
     order = [names.index(name) for name in body.rig.joint_names]
     world = global_rotations(clip.skeleton, clip.rotations)[:, order]
     turned = multiply(world, conjugate(multiply(body.upright, body.rig.orientations)))
-    stands = np.zeros((len(world), 4), bool) if contacts is None else contacts
+    stands = np.zeros((len(world), 4), bool)
     return Source(body, turned, clip.joints()[:, order], stands, clip.fps)

@@ -10,6 +10,7 @@ import numpy as np
 
 from marey.data.manifest import Clip
 from marey.data.prepared import PreparedData
+from marey.evaluations import TEST_SPLIT
 from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH, Constraint, read_constraints
 from marey.motion.body import standard_body, travel_scale
 from marey.motion.filters import smooth
@@ -79,9 +80,11 @@ def shape_cases(each: int = 3) -> Iterator[Case]:
                 yield Case(name, group, prompt, 100 + number, seconds, read_constraints(_of_shape(places)))
 
 
-def captured_cases(data: PreparedData, count: int, split: str = "test") -> Iterator[Case]:
-    """Yield cases of clips that travel: path and headings of the clip, its last pose, and its right hand halfway."""
-    travelling = [clip for clip in data.split(split) if clip.measured.path >= LEAST_TRAVEL and 24 <= clip.length <= 190]
+def captured_cases(data: PreparedData, count: int) -> Iterator[Case]:
+    """Yield cases of at most `count` test clips that travel: path and headings of the clip, its last pose, and its
+    right hand halfway."""
+    clips = data.split(TEST_SPLIT)
+    travelling = [clip for clip in clips if clip.measured.path >= LEAST_TRAVEL and 24 <= clip.length <= 190]
     chosen = np.linspace(0, len(travelling) - 1, min(count, len(travelling))).round().astype(int)
     for number in chosen:
         yield _captured(data, travelling[number], int(number))
