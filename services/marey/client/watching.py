@@ -40,7 +40,8 @@ def follow_job(
     """
     deadline = None if timeout is None else time.monotonic() + timeout
 
-    def patience() -> float:
+    def allowed_silence() -> float:
+        """Return the seconds that the connection may stay silent; raise `TimedOut` when no time is left."""
         if deadline is None:
             return SILENCE
         left = deadline - time.monotonic()
@@ -53,15 +54,15 @@ def follow_job(
     yield state, None
     while state["state"] not in ENDED_JOB:
         try:
-            for event in transport.events(job, after=seen, patience=patience()):
+            for event in transport.events(job, after=seen, patience=allowed_silence()):
                 seen = event["seq"]
                 reachable = time.monotonic()
                 yield state, event
-                patience()
+                allowed_silence()
             state = transport.get(f"/v1/jobs/{job}")
             reachable = time.monotonic()
         except Busy as error:  # the key has no event stream left: poll instead
-            time.sleep(min(error.seconds, patience()))
+            time.sleep(min(error.seconds, allowed_silence()))
             state = transport.get(f"/v1/jobs/{job}")
             reachable = time.monotonic()
         except Unreachable:

@@ -31,7 +31,7 @@ BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1, EDIT_QUEUE
 DEFAULT_BATCH_SIZE = 32
 """Items per claim, for counting waiting batches; a wrong value costs a hint, never an item."""
 
-REFUSED_SECONDS = 30.0
+REFUSED_SECONDS = 30.0  # pause after the database refused to listen, which an operator has to change
 LEAST_PAUSE = 0.05  # minimum seconds between two rounds: a submit in many transactions notifies as often
 TICK_SECONDS = 30.0  # seconds between hints to idle workers: their claims show that hints still arrive
 

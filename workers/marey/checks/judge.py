@@ -37,7 +37,7 @@ class Expectation:
     """One action that a prompt asks for.
 
     Attributes:
-        action: name of the action.
+        act: name of the action.
         side: for turns left or right; for hands left, right or both.
         straight: the way must be straight (for walking, running and walking backward).
     """
@@ -188,6 +188,7 @@ _CHECKS: dict[str, Callable[[Stretch, Expectation], str]] = {
     "slash": _slash,
     "dance": _dance,
 }
+"""Check of each action: returns why a stretch does not show it; an empty text = it does."""
 
 
 # -- motions -------------------------------------------------------------------------------------------------------

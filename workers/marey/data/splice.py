@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.limbs import BONE_LENGTHS, CARRIED, LEG_CHAINS, PARENTS
+from marey.data.limbs import BONE_LENGTHS, CARRIED, LEG_CHAINS, LEVEL, PARENTS
 from marey.data.retarget import two_bones
 from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
 
@@ -20,7 +20,7 @@ Array = NDArray[np.floating]
 
 BLEND_SECONDS = 0.5
 _STAND_SPEED = 0.35  # metres a second; a low toe that is slower stands
-_STAND_HEIGHT = 0.05
+_STAND_HEIGHT = 0.05  # metres of a toe that stands, at most
 _STEP_FROM = 0.015  # metres; a standing foot displaced by less is not lifted
 
 
@@ -36,14 +36,20 @@ def quintic(offset: Array, velocity: Array, frames: int) -> Array:
 
 
 def place_after(first: Array, second: Array, fps: float) -> Array:
-    """Rotate and move the second clip (T, 22, 3) over the floor so that it continues the first."""
+    """Rotate and move the second clip (T, 22, 3) over the floor so that it continues the first: with its heading, and
+    with the toe in place that stands on both sides of the seam, or the pelvis if none does.
+
+    Args:
+        first, second: joints in metres, Y up, at least two frames each.
+        fps: frames a second of both.
+    """
     turn = np.radians(heading(first[-8:], fps)[-1] - heading(second[:8], fps)[0])
     c, s = np.cos(turn), np.sin(turn)
     turned = second @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
     foot = _shared_foot(first, turned, fps)
     anchor = 0 if foot is None else foot
     shift = first[-1, anchor] - turned[0, anchor]
-    return turned + shift * np.array([1.0, 0.0, 1.0])
+    return turned + shift * LEVEL
 
 
 def _stands(points: Array, fps: float) -> bool:
@@ -142,7 +148,7 @@ def knee_poles(joints: Array) -> Array:
 
 
 def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array:
-    """Joints (n, 22, 3) with bones of the skeleton's lengths."""
+    """Joints (n, 22, 3) with bones of the skeleton's lengths, from what `_blend` returns."""
     joints = np.empty((len(root), 22, 3))
     joints[:, 0] = root
     for j in CARRIED[1:]:
@@ -158,7 +164,8 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
 
 
 def with_bones(joints: Array) -> Array:
-    """Restore the skeleton's bone lengths in poses (T, 22, 3); the toes stay in place."""
+    """Restore the skeleton's bone lengths in poses (T, 22, 3), metres: bones keep their directions, the pelvis and the
+    toes their places, as far as a leg reaches; the knees are solved."""
     return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], knee_poles(joints))
 
 

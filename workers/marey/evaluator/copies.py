@@ -64,7 +64,11 @@ def aligned_distance(one: Array, other: Array) -> float:
 
 
 def _warped(distances: Array) -> Array:
-    """Return the mean cost of the best path from each start (L - T + 1,), in the unit of the distances (T, L)."""
+    """Return the mean cost of the best path from each start (L - T + 1,), in the unit of the distances (T, L).
+
+    A step along both motions counts twice, one along either of them once, so that every path has the same weight in
+    all, 2 T.
+    """
     size, length = distances.shape
     starts = np.arange(length - size + 1)
     shifts = np.arange(-BAND, BAND + 1)
@@ -95,7 +99,11 @@ class TrainingPoses:
     """Poses of training clips."""
 
     def __init__(self, clips: Iterable[tuple[str, Array]]) -> None:
-        """Keep clips by id; those shorter than a second are left out."""
+        """Keep clips by id, with the `poses` of each; those shorter than `LEAST` frames are left out.
+
+        Raises:
+            ValueError: no clip is left.
+        """
         kept = [(name, found) for name, found in clips if len(found) >= LEAST]
         self._names = [name for name, _ in kept]
         self._poses = [found for _, found in kept]
@@ -116,8 +124,8 @@ class TrainingPoses:
     def nearest(self, motion: Array) -> Nearest:
         """Return the nearest training clip of poses (T, J, 3).
 
-        Raises:
-            ValueError: there are no clips.
+        Aligning all clips takes too long: only the `CLOSEST` ones are aligned, those whose poses are nearest to the
+        motion's whatever their time.
         """
         flat = motion[::SPARSE].reshape(-1, self._flat.shape[1]).astype(np.float32)
         squared = self._squares - 2 * flat @ self._flat.T + np.square(flat).sum(axis=1)[:, None]  # (T / 3, all)

@@ -19,6 +19,7 @@ from marey.text.light import WordStates, surface_features
 from marey.text.light_network import LightConfig, LightNetwork
 
 SMOOTHING_SENTENCES = 150
+"""Sentences, at least, by which the divisors for int8 are found after the training (`AdaptedMiniLM.updates`)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ PROPBANK_FIT = FitConfig(steps=2500, batch=32, learning_rate=1.5e-3, adapter_rat
 
 @dataclass(frozen=True)
 class Encoded:
-    """One sentence, ready for the network."""
+    """One sentence of T words, ready for the network."""
 
     tokens: tuple[list[int], Tensor]  # as `WordStates.tokens` gives them
     surface: Tensor  # (T, 3)
@@ -101,6 +102,9 @@ def fit(
     Args:
         batches: at least `config.steps`, and those that int8 is prepared with.
         minilm: the bundle of MiniLM.
+        network_config: sizes of the head, and its tags.
+        config: hyperparameters.
+        seed: of the initial weights.
         start: initial weights; None = MiniLM unchanged, and a random head.
         progress: called with the step and its loss.
     """
@@ -213,7 +217,8 @@ def crf_loss(emissions: Tensor, tags: Tensor, mask: Tensor, transitions: Tensor,
     """
     rows = torch.arange(len(tags))
     steps = transitions + allowed
-    start = torch.where(allowed.amin(dim=0) < -1, allowed.amin(), 0.0)  # tags some step is barred to are I- tags
+    # A sentence cannot begin with an I- tag: those are the tags that some other tag must not be followed by.
+    start = torch.where(allowed.amin(dim=0) < -1, allowed.amin(), 0.0)
     total = emissions[:, 0] + start
     path = emissions[rows, 0, tags[:, 0]]
     for t in range(1, tags.shape[1]):
