@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,6 +40,9 @@ def test_a_worker_loads_works_and_gives_back_on_sigterm(cluster: Cluster) -> Non
         (row,) = list_workers(conn)
         assert (row.id, row.bundle, row.live) == (f"one/{QUEUE}", BUNDLE, True)
     assert psutil.Process(cluster.child("one")).ppid() == cluster.processes["one"].pid
+
+    log = (cluster.home / "one.log").read_text().splitlines()
+    assert {json.loads(line)["service"] for line in log} == {"worker-toy"}
 
     quick = submit_toys(cluster.engine, ["walk"] * 40)
     cluster.wait(lambda: ended(cluster.engine, quick), "the quick job ends")

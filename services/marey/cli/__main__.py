@@ -1,6 +1,6 @@
 """`python -m marey.cli` is `marey`."""
 
-from marey.cli.main import run
+from marey.cli.start import run
 
 if __name__ == "__main__":
     run()

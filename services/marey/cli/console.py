@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
+from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
@@ -172,10 +173,18 @@ def page_size(limit: int | None) -> int:
 
 
 def bar() -> Progress:
-    """Return a progress bar on stderr; without a terminal it prints nothing by itself."""
+    """Return a progress bar on stderr; without a terminal it prints nothing by itself. An error before any progress
+    takes the bar away."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    return Progress(
+    class Bar(Progress):
+        def __exit__(
+            self, kind: type[BaseException] | None, error: BaseException | None, place: TracebackType | None
+        ) -> None:
+            self.live.transient = error is not None and not any(task.completed for task in self.tasks)
+            super().__exit__(kind, error, place)
+
+    return Bar(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 
 from marey.core.errors import MareyError, TimedOut
@@ -48,14 +49,17 @@ _FIELD = re.compile(r"([a-z][a-z_]*)(\.[0-9]+)?")
 _OPERATION = re.compile(r"^ops\.([0-9]{1,3})\b")
 
 
-def name_options(error: MareyError, given: Mapping[str, str] = NO_OPTIONS) -> MareyError:
+def name_options(error: MareyError, given: Mapping[str, str] = NO_OPTIONS, words: Iterable[str] = ()) -> MareyError:
     """Let an error name the option of the command line in place of the argument of the Python API or of the field of a
     request.
 
     Args:
         given: options and arguments of the command, by the names of fields and arguments.
+        words: the command line. An error about a file of it, such as `-o loop`, is about no field.
     """
     argument = error.argument
+    if argument is None and error.where in set(_paths(words)):
+        return error
     if argument is None or argument not in (OPTIONS.keys() | given.keys()):
         return _name_fields(error, given)
     option = given.get(argument) or OPTIONS[argument]
@@ -64,6 +68,13 @@ def name_options(error: MareyError, given: Mapping[str, str] = NO_OPTIONS) -> Ma
     if error.hint is not None:
         error.hint = re.sub(rf"pass {argument}=True|\b{argument}\b", lambda found: _named(found, option), error.hint)
     return error
+
+
+def _paths(words: Iterable[str]) -> Iterator[str]:
+    """Yield the paths that the values of a command line may be, and the folders above each."""
+    for word in words:
+        value = word.partition("=")[2] if word.startswith("--") else word[2:] if word.startswith("-") else word
+        yield from map(str, (Path(value), *Path(value).parents))
 
 
 def _name_fields(error: MareyError, given: Mapping[str, str]) -> MareyError:

@@ -40,6 +40,8 @@ from marey.core.validation import problem_of
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 CHOSEN = "marey.command"
 """Key of the context: the command that was chosen."""
+WORDS = "marey.words"
+"""Key of the context: the words of the command line."""
 OF_THE_DISK = frozenset(
     {
         errno.EACCES, errno.EDQUOT, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOSPC,
@@ -89,7 +91,7 @@ class Commands(TyperGroup):
         chosen, words = command, list(rest)
         while isinstance(chosen, TyperGroup) and words:
             chosen = chosen.get_command(ctx, words.pop(0))
-        ctx.meta[CHOSEN] = chosen
+        ctx.meta[CHOSEN], ctx.meta[WORDS] = chosen, args
         return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
@@ -103,7 +105,8 @@ class Commands(TyperGroup):
         except MareyError as error:
             if isinstance(ctx.obj, tracing.Span):
                 ctx.obj.fail(error)
-            console.say(f"marey: {hints.name_options(error, _options_of(ctx.meta.get(CHOSEN)))}")
+            named = hints.name_options(error, _options_of(ctx.meta.get(CHOSEN)), ctx.meta.get(WORDS, ()))
+            console.say(f"marey: {named}")
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             console.say("marey: interrupted")
@@ -190,4 +193,8 @@ app.add_typer(admin.app, name="admin")
 def run() -> None:
     """The console script."""
     console.escape_output()  # also of the traceback of a bug, which is written when all else has ended
-    app()
+    try:
+        app()
+    except KeyboardInterrupt:  # before or after the command itself
+        console.say("marey: interrupted")
+        raise SystemExit(console.INTERRUPTED) from None

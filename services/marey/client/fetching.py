@@ -20,7 +20,7 @@ from marey.client.rigs import Rigs
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
-from marey.exporters import check_options, exporters, extension_of
+from marey.exporters import check_known, check_options, exporters, extension_of
 from marey.exporters.making import FileRecipe
 from marey.motion.export_options import PLAIN, ExportOptions
 from marey.motion.files import write_atomically
@@ -90,6 +90,7 @@ def fetch_job(
         Conflict: a file exists with other content, or a format can neither be fetched nor made; nothing is fetched
             then, unless the file is one that was to be made.
         MissingExtra: an extra that writes a format which is made here is not installed; nothing is fetched then.
+        InvalidInput: a format is not known here, and no motion tells whether the server has it.
         InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
     """
     observer = observer or FetchObserver()
@@ -97,6 +98,8 @@ def fetch_job(
     reviews = review if isinstance(review, str) or not review else [*review]
     pages = transport.pages(f"/v1/jobs/{job}/items", review=reviews or None, limit=1000)
     planned = plan(pages, folder, formats, template, export=export)
+    if not any(item["motion"] for item, _ in planned):  # else one says which formats it has
+        check_known(formats or (), hint="A format that only the server has can be fetched once there is a motion.")
     wanted = [file for _, files in planned for file in files]
     for recipe in dict.fromkeys(file.making for file in wanted if file.making is not None):
         recipe.check()

@@ -12,14 +12,44 @@ from marey.core.errors import MalformedRequest, MareyError, TooSlow
 from marey.core.settings import Settings
 from marey.http.problems import problem_response
 
+MAX_HEAD = 2**16
+"""Bytes of the first line and the headers of a request."""
+
+
+class LimitedConnection(h11.Connection):
+    """h11's connection that refuses a head over `MAX_HEAD` bytes, whole heads too: h11 has a limit only of what has
+    arrived of an event that is not complete."""
+
+    def next_event(self) -> h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]:
+        """Return the next event.
+
+        Raises:
+            RemoteProtocolError: the peer violates HTTP, or the head is too long.
+        """
+        event = super().next_event()
+        if isinstance(event, h11.Request) and _size_of(event) > MAX_HEAD:
+            raise h11.RemoteProtocolError(f"the head is over {MAX_HEAD} bytes")
+        return event
+
+
+def _size_of(head: h11.Request) -> int:
+    """Return the bytes of a head with one blank where blanks are."""
+    first = len(head.method) + len(head.target) + len(b"  HTTP/1.1\r\n")
+    return first + sum(len(name) + len(value) + len(b": \r\n") for name, value in head.headers) + len(b"\r\n")
+
 
 class PatientProtocol(H11Protocol):
-    """uvicorn's HTTP/1.1 with a time limit for the head of a request: uvicorn closes only connections that idle after
-    an answer. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to begin one.
+    """uvicorn's HTTP/1.1 with limits for the head of a request. Of time: uvicorn closes only connections that idle
+    after an answer; a head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to begin
+    one. Of size: `MAX_HEAD`.
 
     Requests that the parser refuses get a problem, as all others do."""
 
     head_timer: asyncio.TimerHandle | None = None
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.conn = LimitedConnection(h11.SERVER, MAX_HEAD)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Handle a new connection."""

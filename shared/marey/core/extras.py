@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 
@@ -32,12 +34,31 @@ def needs_extra(extra: str, error: ImportError) -> MissingExtra:
 
 @contextmanager
 def extra(name: str) -> Generator[None]:
-    """Import, in the block, what an extra installs.
+    """Import, in the block, what an extra installs. Ctrl-C acts when the imports have ended.
 
     Raises:
         MissingExtra: something that is imported in the block is not installed.
+        KeyboardInterrupt: Ctrl-C was pressed meanwhile.
     """
     try:
-        yield
+        with _interrupt_later():
+            yield
     except ImportError as error:
         raise needs_extra(name, error) from error
+
+
+@contextmanager
+def _interrupt_later() -> Generator[None]:
+    """Raise `KeyboardInterrupt` after the block: within an import, libraries take it for a missing module, or abort."""
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    interrupted = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        if interrupted.is_set():
+            raise KeyboardInterrupt

@@ -18,6 +18,8 @@ MAX_POINTS = 2000
 MAX_FRAME = 60 * 240
 MAX_COORDINATE = 1000.0
 """Metres from the origin."""
+MAX_HEADING = 1000.0
+"""Radians, about 160 turns either way."""
 HIGHEST, LOWEST = 2.6, -0.1
 """Heights in metres that a body on the floor reaches."""
 MAX_JOINTS, MAX_JOINT_NAME = 200, 100
@@ -92,6 +94,14 @@ def read_height(value: float, where: str) -> float:
     if not LOWEST <= value <= HIGHEST:
         raise InvalidInput(f"height {value:g} m is out of reach; {LOWEST:g} to {HIGHEST:g} m", where=where)
     return value
+
+
+def read_heading(value: object, where: str) -> float:
+    """Return a heading in radians."""
+    heading = read_number(value, where)
+    if abs(heading) > MAX_HEADING:
+        raise InvalidInput(f"{heading:g} radians are too many; -{MAX_HEADING:,g} to {MAX_HEADING:,g}", where=where)
+    return heading
 
 
 def read_points(value: object, where: str, width: int, count: int, beside: str) -> list[list[float]]:

@@ -19,6 +19,7 @@ from marey.items.constraint_values import (
     MAX_POINTS,
     check_same_length,
     read_frame,
+    read_heading,
     read_height,
     read_licence,
     read_list,
@@ -135,7 +136,7 @@ def _root_path(given: Mapping[str, object], where: str) -> Constraint:
     if "heading_radians" in given:
         values = read_list(given["heading_radians"], f"{where}.heading_radians", "a list of numbers")
         check_same_length(values, len(read[name]), f"{where}.heading_radians", name)
-        read["heading_radians"] = [read_number(v, f"{where}.heading_radians.{k}") for k, v in enumerate(values)]
+        read["heading_radians"] = [read_heading(v, f"{where}.heading_radians.{k}") for k, v in enumerate(values)]
     if name == "times":
         steps = pairwise(zip(read["times"], read["positions_xz"], strict=True))
         for point, ((before, a), (after, b)) in enumerate(steps, 1):

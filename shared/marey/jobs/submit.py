@@ -205,7 +205,7 @@ def _known_scopes(conn: sa.Connection, keys: set[str], policy: ScopePolicy) -> d
 
 
 def _check_item(item: NewItem) -> None:
-    where = f"items[{item.index}]"
+    where = f"items.{item.index}"
     check_text(item.prompt, f"{where}.prompt")
     check_text(item.name, f"{where}.name")
     for tag in item.tags:

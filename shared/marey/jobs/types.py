@@ -54,21 +54,31 @@ class Edits:
     Attributes:
         ops: as in JSON (`docs/reference/edits.md`); other motions stand in them by their ids.
         sources: the edited motion, then the others in the order of the operations.
+        asked: name of each operation in the request, for errors; empty where all are the same: a split becomes trims.
     """
 
     ops: tuple[Mapping[str, Any], ...]
     sources: tuple[UUID, ...]
+    asked: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, document: Mapping[str, Any] | None) -> Edits | None:
-        """Read the column; None if the item is not an edit."""
+        """Read the column; None if the item is not an edit.
+
+        Raises:
+            KeyError, TypeError, ValueError, AttributeError: it is no such value.
+        """
         if document is None:
             return None
-        return cls(tuple(document["ops"]), tuple(map(UUID, document["sources"])))
+        asked = tuple(map(str, document.get("asked", ())))
+        if len(asked) not in (0, len(document["ops"])):
+            raise ValueError(f"{len(asked)} names for {len(document['ops'])} operations")
+        return cls(tuple(document["ops"]), tuple(map(UUID, document["sources"])), asked)
 
     def as_json(self) -> dict[str, Sequence[object]]:
         """Return the value of the column."""
-        return {"ops": [dict(op) for op in self.ops], "sources": [str(source) for source in self.sources]}
+        asked = {"asked": [*self.asked]} if self.asked else {}
+        return {"ops": [dict(op) for op in self.ops], "sources": [str(source) for source in self.sources], **asked}
 
 
 UNREAD = "a person moves"

@@ -33,6 +33,8 @@ log = logger(__name__)
 STOP_SECONDS = 25.0  # below the 30 s after which Kubernetes kills
 KILL_SECONDS = 3.0
 WATCH_SECONDS, WATCH_LOOKS = 30.0, 3
+CHILD_LOG_LEVEL = "_MP_FORK_LOGLEVEL_"
+"""Variable of Celery: its pool writes lines of a format of its own until the child has set up its logging."""
 
 
 def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int:
@@ -63,6 +65,7 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
     os.environ[NAME_VARIABLE] = name
     os.environ["MAREY_DATABASE_URL"] = chosen.database_url.get_secret_value()  # the child is a fresh interpreter
     worker = _celery_worker(role, chosen.queue_url.get_secret_value(), name, chosen)
+    os.environ.pop(CHILD_LOG_LEVEL, None)
     threading.Thread(target=_watch, args=(chosen.home, name), name="watch", daemon=True).start()
     worker.start()
     status = read_status(chosen.home, name)

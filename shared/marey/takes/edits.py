@@ -268,9 +268,14 @@ def _item(number: int, steps: Sequence[Step], rows: Mapping[UUID, MotionRow], ed
         tags=source.tags,
         index=number,
         seed=source.seed,
-        edits=Edits(tuple(step.as_json() for step in steps), tuple(_sources(edit.motion, steps))),
+        edits=_edits(edit.motion, steps),
         **(KINEMATIC if edit.generator is None else edit.generator.columns(steps, edit.scope)),
     )
+
+
+def _edits(motion: UUID, steps: Sequence[Step]) -> Edits:
+    asked = tuple(step.asked or step.operation.name for step in steps) if any(step.asked for step in steps) else ()
+    return Edits(tuple(step.as_json() for step in steps), tuple(_sources(motion, steps)), asked)
 
 
 def _sources(motion: UUID, steps: Iterable[Step]) -> list[UUID]:

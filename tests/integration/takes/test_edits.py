@@ -189,7 +189,10 @@ def test_quotas_and_limits_of_frames_and_licences_hold(api: LiveApi, http: httpx
 def test_an_operation_that_the_motion_does_not_allow_fails_its_item_alone(api: LiveApi, http: httpx2.Client) -> None:
     source = stored(api)
     job = post(http, source["id"], {"op": "split", "at": 0.5}, {"op": "trim", "from": 1.0}).json()
+    late = post(http, source["id"], {"op": "split", "at": 99}, {"op": "mirror"}).json()
     work_edits(api)
+    for item in http.get(f"/v1/jobs/{late['id']}/items").json()["items"]:
+        assert (item["edits"]["ops"][0]["op"], item["error"]["where"]) == ("trim", "ops.0 (split)")
     good, bad = http.get(f"/v1/jobs/{job['id']}/items").json()["items"][::-1]
     assert (good["state"], bad["state"]) == ("succeeded", "failed")
     assert bad["error"]["where"] == "ops.1 (trim)"

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 
 import pytest
 from hypothesis import given
@@ -19,6 +20,7 @@ from marey.cli import console
 from marey.cli.live.screen import Screen
 from marey.cli.main import app
 from marey.core.characters import LINES, find_forbidden
+from marey.core.errors import InvalidInput
 
 TEXT = st.text(st.characters(), max_size=40)
 ATTACK = "a\x1b[2J\x1b]8;;http://evil\x07b\x9b31m\x7f\u202egnp.\u2066x\udc80\r"
@@ -86,6 +88,16 @@ def test_tables_bars_and_screens_of_a_terminal_escape_what_is_foreign(monkeypatc
     assert "[bold]x[/bold] :smile:" in shown
     assert "[link=http://evil]y[/link]" in shown
     assert "\x1b]" not in shown
+
+
+@pytest.mark.parametrize(("done", "shown"), [(0, False), (1, True)])
+def test_a_bar_stays_only_where_there_was_progress_before_an_error(done: int, shown: bool) -> None:
+    def act() -> None:
+        with suppress(InvalidInput), console.bar() as bar:
+            bar.update(bar.add_task("captions", total=2), completed=done)
+            raise InvalidInput("there is no such folder")
+
+    assert ("captions" in printed(act, terminal=False)) is shown
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,12 @@ def test_of_several_motions_the_one_that_cannot_be_edited_is_named(walk: Path):
     assert f"marey: {short}: --trim 1:: 1 s is after the end" in said
 
 
+def test_an_output_with_the_name_of_an_option_is_not_taken_for_it(walk: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(walk.parent)
+    Path("loop").write_text("a file")
+    assert "marey: loop: cannot write here" in run(walk, "-o", "loop/a.npz", "--mirror", code=2)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -15,7 +15,7 @@ from marey.client.file_to_fetch import FileToFetch
 from marey.client.folder_lock import alone_in
 from marey.client.server_address import Server
 from marey.client.transport import Transport
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, InvalidInput
 
 ITEM: dict[str, Any] = {
     "id": "i",
@@ -86,6 +86,17 @@ class Empty(BaseHTTPRequestHandler):
 
     def log_message(self, *_: object) -> None:
         pass
+
+
+def test_a_format_that_is_not_known_is_refused_before_there_is_a_motion(tmp_path: Path) -> None:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Empty) as http:
+        threading.Thread(target=http.serve_forever, args=(0.05,), daemon=True).start()
+        with Transport(Server(f"http://127.0.0.1:{http.server_port}", "key")) as transport:
+            with pytest.raises(InvalidInput, match="'wav' is not a known motion format"):
+                fetch_job(transport, "j", tmp_path / "out", ["npz", "wav"])
+            assert not (tmp_path / "out").exists()
+            assert fetch_job(transport, "j", tmp_path / "out", ["npz", "glb"]) == []
+        http.shutdown()
 
 
 def test_a_fetch_waits_for_another_one_into_the_folder(tmp_path: Path) -> None:

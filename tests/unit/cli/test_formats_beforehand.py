@@ -93,3 +93,14 @@ def test_edit(marey: Command, tmp_path: Path, options: tuple[str, ...], hint: st
 def test_convert_says_it_before_it_reads_the_source(marey: Command, tmp_path: Path) -> None:
     ran = marey("convert", tmp_path / "missing.npz", tmp_path / "out.usd")
     assert (ran.code, "pip install 'marey[usd]'" in ran.err) == (2, True)
+
+
+@pytest.mark.parametrize("option", ["--rig", "--body"])
+def test_a_file_is_no_rig_of_the_server(marey: Command, tmp_path: Path, option: str) -> None:
+    command = ("motions", "file", "0a1b2c3d", "glb", "-o", tmp_path / "out.glb", option, tmp_path / "hero.fbx")
+    missing = marey(*command)
+    assert (missing.code, f"{option}: is neither a file here nor" in missing.err) == (3, True)
+    assert "rigs add" not in missing.err
+    (tmp_path / "hero.fbx").write_bytes(b"")
+    there = marey(*command)
+    assert (there.code, f"{option}: is a file here" in there.err, "rigs add" in there.err) == (2, True, True)

@@ -60,6 +60,13 @@ def test_an_option_of_another_name_than_its_field_is_named_where_the_command_has
     assert name_options(InvalidInput("no", where="settings"), {"sampling": "--set"}).where == "--set"
 
 
+@pytest.mark.parametrize("words", [["-o", "loop"], ["-oloop"], ["--output=./loop"], ["walk.npz", "-o", "loop/a.npz"]])
+def test_an_error_about_a_file_with_the_name_of_an_option_names_the_file(words: list[str]) -> None:
+    error = InvalidInput("cannot write here", where="loop")
+    assert name_options(error, {"loop": "--loop"}, words).where == "loop"
+    assert name_options(error, {"loop": "--loop"}, ["--loop", "-o", "walk"]).where == "--loop"
+
+
 def test_each_option_exists() -> None:
     assert set(OPTIONS.values()) <= set(re.findall(r"--[a-z-]+", str(command_line())))
 

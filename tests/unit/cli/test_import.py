@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +29,36 @@ def test_the_client_needs_nothing_but_its_own_packages() -> None:
     assert not set(HEAVY[:-1]) & set(done.stdout.split())
 
 
-CLI = Path(__file__).resolve().parents[3] / "services" / "marey" / "cli"
+INTERRUPTED = """
+import os, signal, sys
+class Interrupting:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupting())
+sys.argv[1:] = {arguments!r}
+from marey.cli.start import run
+run()
+"""
+
+
+@pytest.mark.parametrize("module", ["typer", "marey.cli.commands.train", "marey.cli.roles.data", "numpy.linalg"])
+def test_ctrl_c_during_imports_ends_with_one_line(module: str) -> None:
+    code = INTERRUPTED.format(module=module, arguments=["data", "inspect", "nowhere"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "marey: interrupted\n")
+
+
+def test_the_console_script_begins_before_the_imports() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["scripts"] == {"marey": "marey.cli.start:run"}
+    code = "import marey.cli.start, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"typer", "click", "rich", "marey.core.errors"} & set(done.stdout.split())
+
+
+ROOT = Path(__file__).resolve().parents[3]
+CLI = ROOT / "services" / "marey" / "cli"
 HTTP = (
     *("marey.client.transport", "marey.client.stream_socket", "httpx", "httpx2", "requests", "websockets"),
     *("http.client", "urllib.request", "urllib3"),

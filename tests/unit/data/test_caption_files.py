@@ -62,7 +62,8 @@ def test_captions_of_all_authors_join_those_of_the_index_and_the_manifest_names_
         ("id,captions\na@0,walk\nb,walk\n", r"x\.csv, line 3: the index has no clip 'b'"),
         ("id,captions\na@0,walk\na@0,go\n", "line 3: 'a@0' has a line already"),
         ("id,captions\na@0, | \n", "line 2: has no captions"),
-        ("id,captions\na@0,walk,slowly\n", "line 2: has not as many cells"),
+        ("id,captions\na@0,walk,slowly\n", "line 2: has 3 cells, the header 2"),
+        ("id;captions\na@0;walk\n", "its header is not id,captions\n.*separated by semicolons"),
         ("clip,captions\na@0,walk\n", "its header is not id,captions"),
     ],
 )

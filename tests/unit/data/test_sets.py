@@ -73,7 +73,15 @@ def test_a_file_that_the_index_lists_must_be_there(folder: Path) -> None:
         ("name,action\nx,walk\n", "no column `file`"),
         ("file,split\na,training\n", "line 2"),
         ("file,start,end\na,9,3\n", "ends before it starts"),
-        ("file,action\na,walk,more\n", "as many cells"),
+        ("file,action\na,walk,more\n", "line 2: has 3 cells, the header 2"),
+        ("file,action\nb,walk\n\na\n", "line 4: has 1 cell, the header 2"),
+        ('file,action\nb,walk\na,"walk\nc,run\n', "line 3: is not CSV: a quote is never closed"),
+        ('file,action\na,"walk" on\n', "line 2: is not CSV"),
+        ("file,action,action\na,walk,run\n", "two columns 'action'"),
+        ("file;action\na;walk\n", "no column `file`\n.*separated by semicolons"),
+        ("file,captions\na,a person\0walks\n", "line 2: `captions` holds a NUL"),
+        ("file,captions\na,a \x1b[31mperson\n", "line 2: `captions` holds the control character"),
+        ("file,error_cm\na,nan\n", "error_cm: is not a finite number"),
         ("file,id\na,x\nb,x\n", "two clips"),
     ],
 )
@@ -87,6 +95,18 @@ def test_columns_are_made_of_those_of_another_header() -> None:
     assert (row.file, row.source) == ("x", "mm squat")
     with pytest.raises(InvalidFile, match="no column 'who'"):
         parse_index("clip\nx\n", {"file": "{clip}", "source": "{who}"}, "i")
+    for template, says in (
+        ("{clip:>999999999999}", "more than names"),
+        ("{clip!r}", "more than names"),
+        ("{clip", "cannot be read"),
+    ):
+        with pytest.raises(InvalidFile, match=says):
+            parse_index("clip\nx\n", {"file": template}, "i")
+
+
+def test_blank_rows_of_an_index_are_left_out() -> None:
+    rows = parse_index('file,captions,,\n,,,\n\na,"one\ntwo",,\n,,,\n', {}, "i")
+    assert [(row.file, row.captions) for row in rows] == [("a", ("one\ntwo",))]
 
 
 @pytest.mark.parametrize("name", known_sets())

@@ -105,6 +105,7 @@ def changed(base: dict[str, Any], **changes: Any) -> dict[str, Any]:
         ([changed(PATH, positions_xz=[[0, 0], [0, math.nan], [0, 1]])], "constraints.0.positions_xz.1", "finite"),
         ([changed(PATH, positions_xz=[[0, 0], [0, 1, 2], [0, 1]])], "constraints.0.positions_xz.1", "3 numbers, not 2"),
         ([changed(PATH, heading_radians=[0])], "constraints.0.heading_radians", "1 entries"),
+        ([changed(PATH, heading_radians=[0, 1000, -1000.5])], "constraints.0.heading_radians.2", "-1000.5 radians"),
         ([FAST], "constraints.0.positions_xz.1", "20.0 m/s"),
         ([changed(HAND, joint="left_elbow")], "constraints.0.joint", "unknown joint 'left_elbow'"),
         ([changed(HAND, positions=[[0, 1, 0], [0, 3.5, 0]])], "constraints.0.positions.1", "out of reach"),

@@ -87,6 +87,7 @@ def test_channels_apply_in_the_order_they_are_named():
         ),
         lambda t: t.replace("1 90 2 90 0 0 0 90 0\n", "1 90 2 90 0 \n 0 0 90 0\n"),
         lambda t: t.replace("90 0", "9.0e1 0"),
+        lambda t: t.replace("90 0\n1 91", "90 0 1 91"),
     ],
 )
 def test_the_same_motion_is_read_however_it_is_written(change):
@@ -322,6 +323,16 @@ BROKEN = {
     "nan in motion": (SMALL.replace("1 91 2", "1 nan 2"), 20, "nan"),
     "cut off": (SMALL[:-10], 20, "needs? 9"),
     "a number too many": (SMALL.replace("1 90 2 90", "1 90 2 90 5"), 19, "10 numbers"),
+    "a number missing, and one too many": (
+        SMALL.replace("1 90 2 90 0 0 0 90 0\n1 91", "1 90 2 90 0 0 0 90\n0 1 91"),
+        19,
+        "8 numbers; the channels need 9",
+    ),
+    "a number too many, and one missing": (
+        SMALL.replace("0 90 0\n1 91", "0 90 0 1\n91"),
+        19,
+        "10 numbers; the channels need 9",
+    ),
     "no numbers": (SMALL[: SMALL.index("1 90 2")], None, "no frames"),
     "no channels": (
         SMALL.replace("\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n", "").replace(

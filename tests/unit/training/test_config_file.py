@@ -98,7 +98,7 @@ def test_a_name_is_a_preset(tmp_path: Path) -> None:
         ("[inner]\nwidth = 0", r"mine\.toml: inner\.width: is 0, not at least 1"),
         ("[inner]\nshare = 1.5", r"mine\.toml: inner\.share: is 1\.5, not 0 to 1"),
         ("pair = [0.1]", r"mine\.toml: pair: is \[0\.1\], not a list of 2, each a number, 0 to 1"),
-        ("pair = [0.1, 3]", r"mine\.toml: pair\[1\]: is 3\.0, not 0 to 1"),
+        ("pair = [0.1, 3]", r"mine\.toml: pair\.1: is 3\.0, not 0 to 1"),
         ("windows = 3", r"mine\.toml: windows: is 3, not a list, each a whole number, at least 1"),
         ("[inner]\nwidth = 9", r"mine\.toml: inner\.width: is too wide"),
         ("[train_pose]\nema = 1", r"mine\.toml: train_pose\.ema: is 1\.0, not 0 to 0\.99999"),

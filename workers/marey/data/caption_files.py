@@ -5,15 +5,14 @@ The columns are `id`, the id of a clip in the index, and `captions`, joined by `
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile
+from marey.data.csv_table import CsvTable
 from marey.data.index import MAX_BYTES, SEPARATOR, Row
 
 PATTERN = "captions-*.csv"
@@ -56,14 +55,11 @@ def _read(path: Path, ids: set[str]) -> CaptionFile:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidFile(f"is not UTF-8: {error.reason}", where=where) from None
-    reader = csv.DictReader(io.StringIO(text, newline=""))
-    if tuple(reader.fieldnames or ()) != COLUMNS:
-        raise InvalidFile(f"its header is not {','.join(COLUMNS)}", where=where)
+    table = CsvTable.of(text, where)
+    if table.header != COLUMNS:
+        raise InvalidFile(f"its header is not {','.join(COLUMNS)}", where=where, hint=table.hint_of_delimiter())
     captions = dict[str, tuple[str, ...]]()
-    for cells in reader:
-        place = f"{where}, line {reader.line_num}"
-        if None in cells or None in cells.values():
-            raise InvalidFile("has not as many cells as the header", where=place, hint="Quote cells that hold commas.")
+    for place, cells in table.rows():
         name, said = cells["id"].strip(), tuple(s for part in cells["captions"].split(SEPARATOR) if (s := part.strip()))
         if name not in ids:
             raise InvalidFile(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import string
 from collections.abc import Container, Mapping
 from pathlib import Path
@@ -14,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile
 from marey.core.validation import first_problem
+from marey.data.csv_table import CsvTable
 from marey.data.dataset import Dataset
 from marey.data.licences import Tier
 
@@ -43,7 +42,7 @@ class Row(BaseModel):
         facts: description of the motion, for authors of captions.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     file: str = Field(min_length=1)
     id: str = ""
@@ -106,21 +105,19 @@ def read_index(path: Path, dataset: Dataset) -> tuple[Row, ...]:
 
 def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row, ...]:
     """Parse the text of an index; `columns` as in `Dataset.columns`."""
-    reader = csv.DictReader(io.StringIO(text, newline=""))
-    header = tuple(reader.fieldnames or ())
+    table = CsvTable.of(text, where)
+    header = table.header
     templates = {name: f"{{{name}}}" for name in Row.model_fields if name in header}
     templates.update(columns)
     if "file" not in templates:
-        raise InvalidFile("has no column `file`", where=where, hint="Name it under [columns] of dataset.toml.")
+        hint = table.hint_of_delimiter() or "Name it under [columns] of dataset.toml."
+        raise InvalidFile("has no column `file`", where=where, hint=hint)
     for ours, template in templates.items():
-        for _, field, _, _ in string.Formatter().parse(template):
-            if field is not None and field not in header:
+        for field in _fields(ours, template, where):
+            if field not in header:
                 raise InvalidFile(f"has no column {field!r}, which `{ours}` needs", where=where)
     rows, seen = [], set[str]()
-    for cells in reader:
-        place = f"{where}, line {reader.line_num}"
-        if None in cells or None in cells.values():
-            raise InvalidFile("has not as many cells as the header", where=place)
+    for place, cells in table.rows():
         made = {ours: template.format_map(cells).strip() for ours, template in templates.items()}
         try:
             row = Row.model_validate(made)
@@ -134,6 +131,21 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
         seen.add(row.id)
         rows.append(row)
     return tuple(rows)
+
+
+def _fields(ours: str, template: str, where: str) -> list[str]:
+    """Return the columns of a template."""
+    try:
+        parts = [*string.Formatter().parse(template)]
+    except ValueError as error:
+        raise InvalidFile(
+            f"the template of `{ours}`, {template[:80]!r}, cannot be read: {error}", where=where
+        ) from None
+    if any(form or conversion for _, _, form, conversion in parts):
+        raise InvalidFile(
+            f"the template of `{ours}`, {template[:80]!r}, has more than names of columns in braces", where=where
+        )
+    return [field for _, field, _, _ in parts if field is not None]
 
 
 def _named(row: Row, taken: Container[str]) -> Row:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from uuid import UUID
 
 from marey.editing.judge import judged
 from marey.jobs import EDIT_QUEUE, ClaimedItem, Edits
 from marey.motion.clip import parse_npz
-from marey.motion.edits.editing import EditSource, FrameModel, edit
+from marey.motion.edits.editing import EditSource, FrameModel, edit_steps
 from marey.motion.edits.licences import strictest
+from marey.motion.edits.steps import read_steps
 from marey.runtime.editing import EditInput
 from marey.runtime.export_types import Export
 from marey.runtime.exporting import export_clip
@@ -63,7 +65,10 @@ def edited(edits: Edits, given: EditInput, model: FrameModel | None = None) -> C
     def load(name: str) -> EditSource:
         return _read(UUID(name), given)
 
-    (clip,) = edit(_read(edits.sources[0], given), edits.ops, load=load, model=model)
+    steps = read_steps(edits.ops)
+    if edits.asked:
+        steps = tuple(replace(step, asked=name) for step, name in zip(steps, edits.asked, strict=True))
+    (clip,) = edit_steps(_read(edits.sources[0], given), steps, load=load, model=model)
     terms = [] if model is None else [model.licence]
     licence = strictest([*(given.source(source).licence for source in edits.sources), *terms])
     return partial(export_clip, judged(clip), licence or "")

@@ -145,7 +145,7 @@ def _tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
     values = cast("list[Any]", value)
     wanted = [kinds[0]] * len(values) if every else kinds
     return tuple(
-        _typed(kind, each, f"{where}[{number}]") for number, (kind, each) in enumerate(zip(wanted, values, strict=True))
+        _typed(kind, each, f"{where}.{number}") for number, (kind, each) in enumerate(zip(wanted, values, strict=True))
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
@@ -14,9 +15,9 @@ from marey.cli import console, options
 from marey.cli.exporting import ServerBody, ServerRig, with_export
 from marey.cli.operations import OperationsCommand, Ops, given_operations, naming_operations, with_operations
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidInput, NotFound
 from marey.motion.edits.steps import read_steps
-from marey.motion.export_options import PLAIN, ExportOptions
+from marey.motion.export_options import PLAIN, RIG_NAME, ExportOptions
 
 if TYPE_CHECKING:
     from marey.client import Client
@@ -204,12 +205,30 @@ def make_file(
     """Have the server make a file of a motion, and fetch it; nothing is computed on this machine."""
     from marey.client import Client
 
+    for option, named in (("--rig", export.rig), ("--body", export.body)):
+        _check_rig_name(option, named)
     with Client() as client:
         found = find(client, "motion", motion)
         path = client.motions.make_file(
             found.id, output, file_format=file_format, fps=fps, overwrite=overwrite, **export.values
         )
     console.result(console.home_relative(path))
+
+
+def _check_rig_name(option: str, named: str | None) -> None:
+    """Check that a rig of the server is named, not a file.
+
+    Raises:
+        NotFound: it is a file that does not exist.
+        InvalidInput: it is a file.
+    """
+    if named is None or re.fullmatch(RIG_NAME, named):
+        return
+    if not Path(named).is_file():
+        hint = "`marey rigs list` shows the rigs of the server, which have no ending."
+        raise NotFound(f"is neither a file here nor the name of a rig: {named[:80]!r}", where=option, hint=hint)
+    hint = f"`marey rigs add {named}` adds it to the server; `marey fetch JOB {option} {named}` makes the files here."
+    raise InvalidInput(f"is a file here, not a rig of the server: {named[:80]!r}", where=option, hint=hint)
 
 
 def _with_id(client: Client, step: Mapping[str, Any]) -> Mapping[str, Any]:

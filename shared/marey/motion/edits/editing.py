@@ -91,6 +91,13 @@ def edit(
         NotFound, InvalidFile: from reading another motion.
     """
     source = clip if isinstance(clip, EditSource) else EditSource(clip)
+    return edit_steps(source, read_steps(ops), load=load, model=model)
+
+
+def edit_steps(
+    source: EditSource, given: Sequence[Step], *, load: Load, model: FrameModel | None = None
+) -> tuple[MotionClip, ...]:
+    """Apply operations that have been read; otherwise as `edit`."""
     loaded: dict[int, EditSource] = {}
 
     def other(step: Step) -> EditSource:
@@ -99,7 +106,7 @@ def edit(
             loaded[key] = _loaded(step.values["with"], load)
         return loaded[key]
 
-    return tuple(_apply(source, steps, other, model) for steps in pieces_of(read_steps(ops)))
+    return tuple(_apply(source, steps, other, model) for steps in pieces_of(given))
 
 
 def _loaded(named: Any, load: Load) -> EditSource:
@@ -148,8 +155,7 @@ def _run(step: Step, clip: MotionClip, values: Mapping[str, Any], model: FrameMo
         made = step.operation.function()(*given)
         result = made if step.operation.keeps_place else at_origin(made)
     except InvalidInput as error:
-        where = f"{step.where} ({step.operation.name})"
-        raise type(error)(error.message, where=where, hint=error.hint) from None
+        raise type(error)(error.message, where=step.named, hint=error.hint) from None
     if result.frames > MOST_FRAMES:
         raise InvalidInput(f"the result has {result.frames} frames; the most is {MOST_FRAMES}", where=step.where)
     return result

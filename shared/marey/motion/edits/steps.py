@@ -27,11 +27,18 @@ class Step:
         operation: of the table.
         values: of every parameter, by name.
         where: its place in the request, for errors.
+        asked: name of the operation in the request, where that differs: a split becomes trims. Empty = the same.
     """
 
     operation: Operation
     values: Mapping[str, Any]
     where: str
+    asked: str = ""
+
+    @property
+    def named(self) -> str:
+        """Return the place with the name of the operation in the request, as `ops.0 (trim)`."""
+        return f"{self.where} ({self.asked or self.operation.name})"
 
     def as_json(self) -> dict[str, Any]:
         """Return the step as it stands in requests and manifests."""
@@ -78,7 +85,7 @@ def pieces_of(steps: Sequence[Step]) -> tuple[tuple[Step, ...], ...]:
         if step.operation.pieces:
             at = step.values["at"]
             cuts = ({"from": 0.0, "to": at}, {"from": at, "to": None})
-            trims = (Step(OPERATIONS["trim"], values, step.where) for values in cuts)
+            trims = (Step(OPERATIONS["trim"], values, step.where, step.operation.name) for values in cuts)
             return tuple(piece for trim in trims for piece in pieces_of([*steps[:index], trim, *steps[index + 1 :]]))
     return (merged(steps),)
 

@@ -212,13 +212,25 @@ def _numbers(data: bytes, header: BvhHeader, where: str) -> Array:
     width = header.channels
     if not width:
         raise header.fail("no joint has channels: there is no motion")
-    if values is None or values.size % width or not (np.abs(values) <= LARGEST).all():
+    if values is None or not (np.abs(values) <= LARGEST).all() or not _lines_hold_frames(data, header):
         raise _first_fault(data, header, where)
     if values.size // width > MAX_FRAMES:
         raise TooLarge(f"{values.size // width} frames, over the limit of {MAX_FRAMES}", where=where)
     if not values.size:
         raise header.fail("holds no frames")
     return values.reshape(-1, width)
+
+
+def _lines_hold_frames(data: bytes, header: BvhHeader) -> bool:
+    """Return True if no frame ends and another begins within a line, except on a line of whole frames. A frame may
+    take several lines. A number that is missing in one line and too many in the next fails, though the total fits."""
+    width, inside = header.channels, 0  # numbers of the frame before this line
+    for line in data[header.motion_at :].splitlines():
+        count = len(line.split())
+        if inside + count > width and (inside or count % width):
+            return False
+        inside = (inside + count) % width
+    return not inside
 
 
 def _first_fault(data: bytes, header: BvhHeader, where: str) -> InvalidFile:
