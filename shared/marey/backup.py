@@ -31,7 +31,7 @@ Sha256 = Annotated[str, Field(pattern=worded(r"^[0-9a-f]{64}$", "64 digits of he
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class _Reason(_Record):
@@ -93,8 +93,8 @@ class MotionRecord(_Record):
     id: UUID
     licence: str
     frames: int = Field(ge=0)
-    fps: float
-    elapsed: float
+    fps: float = Field(gt=0)
+    elapsed: float = Field(ge=0)
     metadata: Annotated[dict[str, Any], AfterValidator(_as_manifest)]
     created_at: AwareDatetime
     review: Review | None

@@ -32,6 +32,8 @@ from marey.tenants import get_tenant
 
 MANIFEST = "manifest.json"
 RIGS = "rigs.jsonl"
+MOST_MANIFEST = 2**28
+"""Bytes of a manifest: a job takes 160."""
 MOST_BYTES = 2**31
 """Bytes of a job's records: 100,000 items take about 0.5 GiB."""
 TRIES = 3
@@ -169,7 +171,9 @@ def read_manifest(folder: Path) -> BackupManifest:
     """Read the manifest of a backup; raises as `import_tenant`."""
     path = folder / MANIFEST
     try:
-        return BackupManifest.model_validate_json(_plain(path).read_bytes())
+        if _plain(path).stat().st_size > MOST_MANIFEST:
+            raise InvalidFile(f"is over {MOST_MANIFEST // 2**20} MiB: no manifest of a backup", where=str(path))
+        return BackupManifest.model_validate_json(path.read_bytes())
     except FileNotFoundError:
         raise NotFound(
             "there is no whole backup", where=str(path), hint="The manifest is written last; was it broken off?"

@@ -104,7 +104,7 @@ def asked_to_wait(header: str | None, now: datetime | None = None) -> float:
         return float(header.strip()[:12])
     try:
         at = parsedate_to_datetime(header)
-    except ValueError:
+    except (ValueError, OverflowError):  # a year of twenty digits
         return 0.0
     at = at if at.tzinfo is not None else at.replace(tzinfo=UTC)
     return max((at - (now or datetime.now(UTC))).total_seconds(), 0.0)

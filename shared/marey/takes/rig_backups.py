@@ -22,7 +22,7 @@ from marey.takes.rigs import MEDIA_TYPE, lock_rigs, rigs_query
 class RigRecord(BaseModel):
     """A rig without the content of its file; fields as of `RigRow`."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: Annotated[str, Field(pattern=f"^{RIG_NAME}$")]
     version: int = Field(ge=1)

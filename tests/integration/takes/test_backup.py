@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable, Sequence
@@ -439,6 +440,21 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
         lambda b: edit_job(b, lambda d: d.replace(b'"metadata":{}', b'"metadata":{"prompts":5}', 1)),
         InvalidFile,
         "metadata.*prompts",
+    ),
+    "a rate that is no number": (
+        lambda b: edit_job(b, lambda d: re.sub(rb'"fps":[0-9.]+', b'"fps":NaN', d, count=1)),
+        InvalidFile,
+        "fps: is not a finite number",
+    ),
+    "no frames a second": (
+        lambda b: edit_job(b, lambda d: re.sub(rb'"fps":[0-9.]+', b'"fps":0', d, count=1)),
+        InvalidFile,
+        "fps: is not above 0",
+    ),
+    "a manifest of a gigabyte": (
+        lambda b: os.truncate(b / "manifest.json", 2**30),
+        InvalidFile,
+        "manifest.json: is over 256 MiB",
     ),
     "what no text can hold": (
         lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),

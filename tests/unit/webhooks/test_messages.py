@@ -64,6 +64,7 @@ def test_while_a_secret_is_rotated_receivers_that_know_either_take_a_message() -
         (None, 0), ("120", 120), (" 7 ", 7), ("Sun, 22 Nov 2026 03:01:30 GMT", 90),
         ("Sun, 22 Nov 2026 02:59:00 GMT", 0),
         ("soon", 0), ("-5", 0), ("1.5", 0), ("", 0), ("²", 0), ("9" * 5000, 1e12 - 1),
+        ("Mon, 1 Jan 99999999999999999999 00:00:00 GMT", 0),
     ],
 )  # fmt: skip
 def test_a_receiver_may_ask_for_a_wait_in_seconds_or_by_a_date(header: str | None, seconds: float) -> None:
