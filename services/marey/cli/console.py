@@ -181,8 +181,11 @@ def bar() -> Progress:
         def __exit__(
             self, kind: type[BaseException] | None, error: BaseException | None, place: TracebackType | None
         ) -> None:
-            self.live.transient = error is not None and not any(task.completed for task in self.tasks)
-            super().__exit__(kind, error, place)
+            if error is None or any(task.completed for task in self.tasks):
+                super().__exit__(kind, error, place)
+            else:
+                self.live.transient = True
+                self.live.stop()
 
     return Bar(
         TextColumn("{task.description}", markup=False),

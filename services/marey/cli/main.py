@@ -44,11 +44,13 @@ WORDS = "marey.words"
 """Key of the context: the words of the command line."""
 OF_THE_DISK = frozenset(
     {
-        errno.EACCES, errno.EDQUOT, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOSPC,
+        errno.EACCES, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOSPC,
         errno.ENOTDIR, errno.EPERM, errno.EROFS,
     }
 )  # fmt: skip
 """Refusals of a file system that are no bug of ours; a file that is missing may be one."""
+FULL = frozenset({errno.EDQUOT, errno.EFBIG, errno.ENOSPC})
+"""Refusals of a disk without room; libraries that write do not say the name of the file."""
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a trace collector that does not answer."""
 
@@ -115,9 +117,10 @@ class Commands(TyperGroup):
             sys.stderr.close()  # the reader of our output left; Python would complain at exit
             raise typer.Exit(0) from None
         except OSError as error:
-            if error.filename is None or error.errno not in OF_THE_DISK:
+            if error.errno not in (FULL if error.filename is None else OF_THE_DISK):
                 raise
-            console.say(f"marey: {os.fsdecode(error.filename)}: {error.strerror}")
+            name = "a file cannot be written" if error.filename is None else os.fsdecode(error.filename)
+            console.say(f"marey: {name}: {error.strerror}")
             raise typer.Exit(InvalidInput.exit_code) from None
 
 

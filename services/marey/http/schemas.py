@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar, get_args
 
 from fastapi import Header, Query
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from marey.core.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text, normalize_newlines
@@ -64,6 +72,23 @@ IdempotencyKey = Annotated[
         description="The same key and body within 24 hours return the first result; another body is refused.",
     ),
 ]
+
+
+class JsonBody(BaseModel):
+    """Body, or part of one, in JSON: a text, true and false are no numbers there, as they are in a query."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _is_number(cls, value: object, info: ValidationInfo) -> object:
+        if not isinstance(value, bool | str):
+            return value
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        kinds = {*(get_args(annotation) or (annotation,))} - {type(None)}
+        if kinds and kinds <= {int, float}:
+            raise PydanticCustomError("int_type" if kinds == {int} else "float_type", "not a number")
+        return value
 
 
 class View(BaseModel):

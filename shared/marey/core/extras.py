@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
+from types import FrameType
 
 from marey.core.errors import InvalidInput
 
@@ -55,7 +56,11 @@ def _interrupt_later() -> Generator[None]:
         yield
         return
     interrupted = threading.Event()
-    signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        interrupted.set()
+
+    signal.signal(signal.SIGINT, note)
     try:
         yield
     finally:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 from fastapi import FastAPI
+from pydantic import ValidationError
 from starlette.testclient import TestClient
 
+from marey.api.edits.schemas import NewEditBody
 from marey.api.evaluations.schemas import NewEvaluationBody
 from marey.api.jobs.schemas import JobPatch, NewJobBody
 from marey.api.jobs.service import job_fields, read_fields
@@ -51,3 +53,22 @@ def test_of_a_body_that_the_route_parses_itself() -> None:
         read_fields(ScheduleFields, {"pause": True}, SchedulePatch)
     with pytest.raises(InvalidItems, match="prompts, name, comment"):
         read_fields(NewEvaluationBody, {"prompt": "a person walks", "bundle": "hgm3"})
+
+
+@pytest.mark.parametrize("value", [True, "3", "3.0"])
+def test_a_text_and_true_are_no_numbers_in_json_and_a_text_is_one_in_a_query(client: TestClient, value: object) -> None:
+    for field in ("priority", "fail_early"):
+        problem = client.patch("/job", json={field: value}).json()
+        assert (problem["where"], "not a" in problem["detail"]) == (field, True)
+    for model, field, whole in ((NewEvaluationBody, "seed", None), (NewEvaluationBody, "repeats", None)):
+        with pytest.raises(InvalidItems, match="whole number"):
+            read_fields(model, {"bundle": "hgm3", field: value}, whole)
+    with pytest.raises(InvalidItems, match="whole number"):
+        job_fields({"keep_days": value}, NewJobBody)
+    with pytest.raises(ValidationError, match="keep_days"):
+        NewEditBody.model_validate({"ops": [{"op": "mirror"}], "keep_days": value})
+    assert job_fields({"keep_days": 3.0}, NewJobBody).keep_days == 3
+
+
+def test_numbers_of_a_query_are_texts() -> None:
+    assert job_fields({"keep_days": "3", "fail_early": "0.5"}).keep_days == 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,18 @@ def test_a_path_that_the_file_system_refuses_is_told_in_a_line(folder: Path, wor
     assert ran.output.startswith("marey: ")
     assert len(ran.output.splitlines()) == 1
     assert "too long" in ran.output or "directory" in ran.output or "exists" in ran.output
+    assert [path.name for path in folder.iterdir()] == ["walk.npz"]
+
+
+def test_a_full_disk_is_told_in_a_line_where_a_library_writes(folder: Path) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        words = "data segment walk.npz -o cut --shortest 0.1 --longest 0.2"
+        ran = CliRunner().invoke(app, words.split())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert (ran.exit_code, ran.output) == (2, "marey: a file cannot be written: File too large\n")
     assert [path.name for path in folder.iterdir()] == ["walk.npz"]
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -18,6 +20,7 @@ from marey.data.pack import SPLITS, split_root
 from marey.motion.features import FeatureLayout
 
 Float32 = NDArray[np.float32]
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LEAST_STD = 1e-4
 """Smallest deviation of a number: a constant one must not be divided by zero."""
 
@@ -50,11 +53,18 @@ class PreparedWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Remove an unfinished folder."""
+    def __exit__(self, _kind: object, error: BaseException | None, _place: object) -> None:
+        """Remove an unfinished folder.
+
+        Raises:
+            InvalidInput: it cannot be written: the disk is full, or files may not be so large.
+        """
         for file in (self._features, self._local, self._roots):
-            file.close()
+            with suppress(OSError):  # what is left of a full disk's buffer is written again
+                file.close()
         shutil.rmtree(self.work, ignore_errors=True)
+        if isinstance(error, OSError) and error.errno in FULL:
+            raise InvalidInput(f"cannot be written: {error.strerror}", where=str(self.out)) from error
 
     def place(self, features: NDArray[np.floating]) -> dict[str, Any]:
         """Return the fields of a `Clip` that say where these features (T, D) come to lie as the next clip."""

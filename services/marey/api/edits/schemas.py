@@ -11,7 +11,7 @@ from marey.api.jobs.estimates import EstimateView
 from marey.api.jobs.schemas import SCOPE, CommonJobFields, ScopeReportView
 from marey.http.fields import MAX_MODEL, SAMPLING
 from marey.http.problems import QuotaBody
-from marey.http.schemas import View
+from marey.http.schemas import JsonBody, View
 from marey.items.values import MODEL_PATTERN
 from marey.motion.edits.steps import MOST
 from marey.motion.edits.table import OPERATIONS
@@ -33,7 +33,7 @@ def _schema() -> Mapping[str, Any]:
 EditOperation = Annotated[dict[str, Any], WithJsonSchema(dict(_schema()))]
 
 
-class NewEditBody(CommonJobFields):
+class NewEditBody(CommonJobFields, JsonBody):
     """Operations on a motion, as a job."""
 
     model: str | None = Field(

@@ -7,22 +7,20 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 from uuid import UUID
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from marey.api.files import FileView
 from marey.api.jobs.schemas import TimelineRowBody
 from marey.evaluations import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
 from marey.http.fields import EXPECTED, PROMPT, SAMPLING, TIMELINE
-from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
+from marey.http.schemas import MAX_NAME, Comment, FreeText, JsonBody, Name, View
 from marey.items.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
 from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL_PATTERN
 from marey.jobs.states import JobState
 
 
-class EvaluationPromptBody(BaseModel):
+class EvaluationPromptBody(JsonBody):
     """One prompt. For the documentation: `marey.items.evaluation_prompts` validates it, with more detailed messages."""
-
-    model_config = ConfigDict(extra="forbid")
 
     prompt: str | None = Field(
         None,
@@ -41,10 +39,8 @@ class EvaluationPromptBody(BaseModel):
     constraints: list[dict[str, Any]] | None = Field(None, description="What the motion keeps to, as in items.")
 
 
-class EvaluationFields(BaseModel):
+class EvaluationFields(JsonBody):
     """Subject and parameters of an evaluation."""
-
-    model_config = ConfigDict(extra="forbid")
 
     bundle: str = Field(
         pattern=MODEL_PATTERN, max_length=200, description="Model, bundle or exact bundle that generates."

@@ -12,7 +12,7 @@ from marey.api.jobs.estimates import EstimateView
 from marey.api.takes.schemas import MotionView
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS, TIMELINE
 from marey.http.problems import QuotaBody
-from marey.http.schemas import Comment, Name, View
+from marey.http.schemas import Comment, JsonBody, Name, View
 from marey.items.item import MAX_ITEMS
 from marey.items.timeline import MAX_TIMELINE_SECONDS, MIN_ROW_SECONDS
 from marey.items.values import MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
@@ -124,7 +124,11 @@ class JobFields(CommonJobFields):
     scope: ScopePolicy = Field("warn", description=SCOPE)
 
 
-class NewJobBody(JobFields):
+class JsonJobFields(JobFields, JsonBody):
+    """Fields of the job as a whole, in a body of JSON."""
+
+
+class NewJobBody(JsonJobFields):
     """A job as JSON."""
 
     items: list[NewItemBody] = Field(
@@ -132,10 +136,8 @@ class NewJobBody(JobFields):
     )
 
 
-class JobPatch(BaseModel):
+class JobPatch(JsonBody):
     """Changes to a job; omitted fields stay as they are."""
-
-    model_config = ConfigDict(extra="forbid")
 
     priority: int | None = Field(None, ge=-PRIORITY_LIMIT, le=PRIORITY_LIMIT)
     comment: Comment | None = None

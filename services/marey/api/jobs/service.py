@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
 from marey.api.jobs.poses import NamedPoses, Poses, check_terms, posed
-from marey.api.jobs.schemas import JobFields, NewJobBody
+from marey.api.jobs.schemas import JobFields, JsonJobFields, NewJobBody
 from marey.bundles import Bundle
 from marey.bundles.scope import refuse_unknown
 from marey.core.errors import InvalidInput, MareyError, TooLarge
@@ -271,7 +271,7 @@ def job_fields(values: Mapping[str, Any], whole: type[BaseModel] = JobFields) ->
     Raises:
         InvalidItems: with the problems of each field.
     """
-    return read_fields(JobFields, values, whole)
+    return read_fields(JsonJobFields if issubclass(whole, JsonJobFields) else JobFields, values, whole)
 
 
 def read_fields(model: type[Fields], values: Mapping[str, Any], whole: type[BaseModel] | None = None) -> Fields:
