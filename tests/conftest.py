@@ -28,6 +28,7 @@ from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler.loadfile import LoadFileScheduling
 
+from marey.core.garbage import end_without_collection
 from marey.db import create_engine, upgrade
 from marey.embedded import EmbeddedServer, start_postgres, start_valkey
 from marey.runtime.queue import redis_client
@@ -42,6 +43,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 """A run starts hundreds of processes: each would compile the whole package anew."""
+end_without_collection()
 settings.register_profile("shared machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shared machine")
 """No test depends on the time that it takes: other work may be on the machine."""

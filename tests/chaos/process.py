@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import sys
 
-from celery.platforms import set_pdeathsig
+from marey.core.garbage import end_without_collection, no_collection
 
-from marey.core.settings import settings
-from marey.runtime.handler import Role
-from marey.runtime.worker import worker_main
-from marey.scheduler.main import scheduler_main
+with no_collection():
+    from celery.platforms import set_pdeathsig
+
+    from marey.core.settings import settings
+    from marey.runtime.handler import Role
+    from marey.runtime.worker import worker_main
+    from marey.scheduler.main import scheduler_main
 
 
 def main(what: str, *arguments: str) -> int:
@@ -33,4 +36,5 @@ def main(what: str, *arguments: str) -> int:
 
 
 if __name__ == "__main__":
+    end_without_collection()
     sys.exit(main(*sys.argv[1:]))

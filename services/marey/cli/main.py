@@ -35,6 +35,7 @@ from marey.cli.commands import (
 from marey.cli.operations import OperationsCommand
 from marey.core import tracing
 from marey.core.errors import InvalidInput, MareyError
+from marey.core.garbage import end_without_collection
 from marey.core.validation import problem_of
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
@@ -196,6 +197,7 @@ app.add_typer(admin.app, name="admin")
 def run() -> None:
     """The console script."""
     console.escape_output()  # also of the traceback of a bug, which is written when all else has ended
+    end_without_collection()
     try:
         app()
     except KeyboardInterrupt:  # before or after the command itself

@@ -20,6 +20,7 @@ from starlette.responses import Response
 
 from marey.bundles import list_bundles
 from marey.core.errors import InvalidInput, MareyError
+from marey.core.garbage import no_collection
 from marey.core.settings import Settings, settings
 from marey.http import problems
 from marey.http.bodies import BodyDeadline, BodyGuard
@@ -79,7 +80,8 @@ def serve_text(path: Path | None = None) -> None:
     """
     config = settings()
     app = create_text_app(config)
-    import torch
+    with no_collection():
+        import torch
 
     torch.set_num_threads(1)
     options = prepare_process("text", config)
@@ -108,9 +110,10 @@ def _unix_socket(path: Path) -> Iterator[socket.socket]:
 def _preload(config: Settings, loaded: threading.Event) -> None:
     """Load the pipeline of each bundle. A broken bundle is reported when it is requested."""
     try:
-        for bundle in list_bundles(config=config, kind="generator"):
-            if bundle.manifest.text is not None:
-                load_pipeline(bundle.manifest.text)
+        with no_collection():
+            for bundle in list_bundles(config=config, kind="generator"):
+                if bundle.manifest.text is not None:
+                    load_pipeline(bundle.manifest.text)
     except MareyError as error:
         log.warning("not_preloaded", error=str(error))
     except Exception:

@@ -49,7 +49,8 @@ def restore(stored: Mapping[str, NDArray[np.generic]], *, where: str | None = No
         value, scale = stored[name], stored.get(scale_of(name))
         if scale is None or scale.shape != value.shape[:1]:
             raise InvalidBundle(f"the matrix {name!r} of 8 bits does not fit its scales", where=where)
-        restored[name] = value.astype(np.float32) * scale.astype(np.float32).reshape(-1, *[1] * (value.ndim - 1))
+        rows = scale.astype(np.float32).reshape(-1, *[1] * (value.ndim - 1))
+        restored[name] = np.multiply(value, rows, dtype=np.float32)
     return restored
 
 

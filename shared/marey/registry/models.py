@@ -20,6 +20,7 @@ from typing import Any
 
 from marey.core.configs import Between
 from marey.core.errors import InvalidInput, NotFound, PluginError
+from marey.core.garbage import no_collection
 from marey.registry.imports import IMPORTS, ImportKind
 from marey.registry.plugins import PlugIns
 from marey.registry.training import TRAININGS, Training
@@ -307,7 +308,8 @@ def resolve(reference: str) -> Any:
         AttributeError: the module has no such attribute.
     """
     module, _, attribute = reference.partition(":")
-    found: Any = import_module(module)
+    with no_collection():
+        found: Any = import_module(module)
     for name in attribute.split("."):
         found = getattr(found, name)
     return found

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from marey.core.errors import InvalidInput
+from marey.core.garbage import no_collection
 from marey.core.private_home import UMASK
 
 
@@ -32,7 +33,7 @@ def serve(
     from marey.cli.roles.serving import default_roles, parse_roles
     from marey.core.extras import extra
 
-    with extra("worker"):
+    with extra("worker"), no_collection():
         from marey.cli.supervisor import Supervisor
         from marey.core.settings import Settings, settings
     changes: dict[str, object] = {}
@@ -66,7 +67,7 @@ def worker(
     from marey.cli.roles.serving import expand, live_models, parse_roles, role_of
     from marey.core.extras import extra
 
-    with extra("worker"):
+    with extra("worker"), no_collection():
         from marey.core.settings import settings
         from marey.runtime.worker import worker_main
     where = "MODEL" if model else "MAREY_ROLE"
@@ -113,7 +114,7 @@ def scheduler() -> None:
     os.umask(UMASK)
     from marey.core.extras import extra
 
-    with extra("server"):
+    with extra("server"), no_collection():
         from marey.core.settings import settings
         from marey.scheduler.main import scheduler_main
     raise typer.Exit(scheduler_main(settings()))
@@ -124,7 +125,7 @@ def api() -> None:
     os.umask(UMASK)
     from marey.core.extras import extra
 
-    with extra("server"):
+    with extra("server"), no_collection():
         from marey.api.app import serve as serve_api
     serve_api()
 
@@ -137,7 +138,7 @@ def probe(
     """Check the workers and schedulers of this machine; exit 4 if one is unhealthy. For health checks of containers."""
     from marey.core.extras import extra
 
-    with extra("server"):
+    with extra("server"), no_collection():
         from marey.core.settings import settings
         from marey.runtime.status import check_health
     check_health(settings().home, ready=health == "ready")

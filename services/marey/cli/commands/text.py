@@ -12,6 +12,7 @@ from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
 from marey.client.rows import right_items
 from marey.core import defaults
+from marey.core.garbage import no_collection
 from marey.core.private_home import UMASK
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def serve(
     os.umask(UMASK)
     from marey.core.extras import extra
 
-    with extra("worker"):
+    with extra("worker"), no_collection():
         from marey.text_service.server import serve_text
     serve_text(path)
 
