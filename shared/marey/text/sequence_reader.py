@@ -42,7 +42,7 @@ LEAST_CUT = 0.03
 """Probability from which on a cut is considered."""
 ACTION_WEIGHT = 4.0
 """Weight of the actions of clauses beside that of the cuts."""
-SURE = 0.5
+SURE = 0.4
 """Probability that each movement of a sequence has at least."""
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
