@@ -86,12 +86,12 @@ def test_a_job_without_items_is_refused_and_leaves_nothing(engine: sa.Engine) ->
 @pytest.mark.parametrize(
     ("change", "where"),
     [
-        ({"prompt": "walk\0"}, r"items\[3\].prompt"),
-        ({"prompt": "\ud800"}, r"items\[3\].prompt"),
-        ({"prompt": "walk", "name": "a\0"}, r"items\[3\].name"),
-        ({"prompt": "walk", "tags": ("\0",)}, r"items\[3\].tags"),
-        ({"prompt": "walk", "seed": -1}, r"items\[3\].seed"),
-        ({"prompt": "walk", "seed": 2**31}, r"items\[3\].seed"),
+        ({"prompt": "walk\0"}, r"items\.3\.prompt"),
+        ({"prompt": "\ud800"}, r"items\.3\.prompt"),
+        ({"prompt": "walk", "name": "a\0"}, r"items\.3\.name"),
+        ({"prompt": "walk", "tags": ("\0",)}, r"items\.3\.tags"),
+        ({"prompt": "walk", "seed": -1}, r"items\.3\.seed"),
+        ({"prompt": "walk", "seed": 2**31}, r"items\.3\.seed"),
     ],
 )
 def test_a_bad_item_refuses_the_whole_job(engine: sa.Engine, change: dict[str, object], where: str) -> None:

@@ -42,7 +42,7 @@ SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "tr
 CHOSEN = "marey.command"
 """Key of the context: the command that was chosen."""
 WORDS = "marey.words"
-"""Key of the context: the words of the command line."""
+"""Key of the context: the words of the command line behind the name of the command."""
 OF_THE_DISK = frozenset(
     {
         errno.EACCES, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOSPC,
@@ -94,7 +94,7 @@ class Commands(TyperGroup):
         chosen, words = command, list(rest)
         while isinstance(chosen, TyperGroup) and words:
             chosen = chosen.get_command(ctx, words.pop(0))
-        ctx.meta[CHOSEN], ctx.meta[WORDS] = chosen, args
+        ctx.meta[CHOSEN], ctx.meta[WORDS] = chosen, words
         return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
