@@ -157,8 +157,6 @@ REPETITIONS: Mapping[str, Callable[[Motion], list[Repetition]]] = {
     "push-ups": _push_ups,
     "sit-ups": _sit_ups,
     "cartwheel": _upside_down,
-    "flip": _upside_down,
-    "roll": _upside_down,
     "knee-to-elbow": _knees,
     "spin": _turns,
 }
