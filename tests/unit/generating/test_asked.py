@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from marey.generation import asked
 from marey.generation.asked import SPEEDS, AskedMotion, generate_as_asked
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
@@ -71,10 +72,10 @@ def test_motions_that_a_mirror_does_not_help_stay(joints: np.ndarray[Any, Any], 
 
 
 def test_motions_around_kept_frames_are_not_mirrored() -> None:
-    asked = ask("a man waves with his right hand")
+    request = ask("a man waves with his right hand")
     kept = KeptFrames(0, np.zeros((4, 263), np.float32))
-    assert isinstance(make(waver("left"), replace(asked, kept=(kept,))), RawMotion)
-    assert isinstance(make(waver("left"), replace(asked, free=True)), RawMotion)
+    assert isinstance(make(waver("left"), replace(request, kept=(kept,))), RawMotion)
+    assert isinstance(make(waver("left"), replace(request, free=True)), RawMotion)
 
 
 def bower(times: int) -> np.ndarray[Any, Any]:
@@ -103,6 +104,20 @@ def test_a_motion_of_a_fixed_length_keeps_it() -> None:
 def test_repetitions_stay_where_the_fixed_length_would_change_the_pace_too_much() -> None:
     features = HUMANML3D_263.encode(bower(4))
     assert isinstance(make(bower(4), replace(ask("a man bows once"), frames=len(features))), RawMotion)
+
+
+def test_a_motion_whose_length_is_not_that_of_its_request_stays() -> None:
+    """Models may round a length to whole tokens."""
+    features = HUMANML3D_263.encode(bower(2))
+    request = replace(ask("a man bows twice"), frames=len(features) + 2)
+    assert isinstance(make(bower(2), request), RawMotion)
+
+
+def test_no_motion_becomes_longer_than_one_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    request = replace(ask("a man bows 12 times"), open=True)
+    assert count(make(bower(1), request)) == 12
+    monkeypatch.setattr(asked, "MAX_SECONDS", 10.0)
+    assert isinstance(make(bower(1), request), RawMotion)
 
 
 @pytest.mark.parametrize(("word", "pace"), [("slowly", "slow"), ("quickly", "fast")])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
+from marey.items.values import MAX_SECONDS
 from marey.motion.features import FeatureLayout
 from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
@@ -138,12 +139,12 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     fixed = None if request.open else request.frames
     if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
         often = repeated(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
-        if often is not None and often is not features and _fits(len(often), fixed, wish.speed):
+        if often is not None and often is not features and _fits(len(often), fixed, wish.speed, layout.fps):
             made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
             features = often
             changes["repetitions"] = {"made": made, "asked": wish.count}
     frames = fixed or max(round(len(features) / wish.speed), 2)
-    if frames != len(features):
+    if frames != len(features) and ("repetitions" in changes or wish.speed != 1.0):
         changes["speed"] = round(len(features) / frames, 3)
         features = pace_features(features, layout.slices, frames)
     return AskedMotion(features, changes) if changes else motion
@@ -170,7 +171,8 @@ def _repetitions(joints: NDArray[np.floating], fps: float, action: str) -> Seque
     return REPETITIONS[action](Motion(joints, fps)) if len(joints) >= SHORTEST else []
 
 
-def _fits(frames: int, fixed: int | None, speed: float) -> bool:
-    """Return True if a motion can be brought to a length that is fixed without a pace that shows."""
+def _fits(frames: int, fixed: int | None, speed: float, fps: float) -> bool:
+    """Return True if a motion is no longer than one may be, and can be brought to a length that is fixed without
+    a pace that shows."""
     low, high = STRETCHED
-    return fixed is None or low <= frames / fixed / speed <= high
+    return frames / speed <= MAX_SECONDS * fps if fixed is None else low <= frames / fixed / speed <= high

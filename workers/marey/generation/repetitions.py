@@ -24,7 +24,7 @@ FARTHEST = 0.25
 LOOK_AHEAD = 0.15
 """Seconds of velocity that weigh as much as the place of a joint."""
 BLEND = 0.4
-"""Seconds after a joint within which a motion comes back to its own frames."""
+"""Seconds after a seam within which a motion comes back to its own frames."""
 HELD = 0.1
 """Metres of such a distance up to which a body holds still."""
 LONGEST_HOLD = 0.5
