@@ -83,11 +83,13 @@ def test_repetitions_of_several_are_not_held_long() -> None:
 
 
 def test_another_number_than_was_asked_for_does_not_show_the_prompt() -> None:
-    def value(prompt: str) -> float:
+    def value(prompt: str, times: int = 2) -> float:
         steps = wanted_of([prompt])
         assert steps is not None
-        return match(Motion(bows(2), FPS), steps)
+        return match(Motion(bows(times), FPS), steps)
 
     assert value("a person bows") >= SHOWN
     assert value("a person bows twice") >= SHOWN
     assert value("a person bows three times") < SHOWN
+    assert value("a person bows, three bows") < SHOWN
+    assert value("a person bows, bows", 3) >= SHOWN  # said once in plain words, and once by the prompt

@@ -103,13 +103,14 @@ def _step(sentence: str) -> Step | None:
     side = side_of(sentence)
     circles = {each.action for each in scope.actions if _CIRCLE.search(each.text)} if goes_round(sentence) else set()
     counted = wanted[0] if len(wanted) == 1 and wanted[0] in REPETITIONS else None
+    prompt = sentence.partition(", ")[2] if first is not None else sentence  # "a person bows, bows" asks for one bow
     return (
         tuple(
             WantedAction(
                 name,
                 side if actions[name].sided else "",
                 circle=name == "turn" and name in circles,
-                count=stated_count(sentence, name) if name == counted else None,
+                count=stated_count(prompt, name) if name == counted else None,
             )
             for name in wanted
         )
