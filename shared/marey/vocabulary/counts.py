@@ -9,12 +9,12 @@ from itertools import pairwise
 
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import noun_forms
+from marey.vocabulary.lengths import TO_TWENTY
 from marey.vocabulary.word_lists import load_word_lists
 
 MOST = 20
 """More repetitions than these are not read."""
-_TO_TWELVE = "one two three four five six seven eight nine ten eleven twelve"
-_NUMBERS = {word: number for number, word in enumerate(_TO_TWELVE.split(), 1)} | {
+_NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split()[:12], 1)} | {
     "single": 1,
     "double": 2,
     "couple": 2,

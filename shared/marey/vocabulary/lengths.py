@@ -8,10 +8,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-_TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
+TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
 seventeen eighteen nineteen twenty"""
+"""The numbers from 1 on in words, with blanks between them."""
 _NUMBERS = {
-    **{name: float(value) for value, name in enumerate(_TO_TWENTY.split(), 1)},
+    **{name: float(value) for value, name in enumerate(TO_TWENTY.split(), 1)},
     "thirty": 30.0,
     "forty": 40.0,
     "fifty": 50.0,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import body_frame, heading, velocity
 from marey.motion.features import FeatureLayout
+from marey.motion.filters import smoothstep
 from marey.selector.repetitions import Repetition
 
 Float32 = NDArray[np.float32]
@@ -57,15 +58,17 @@ def repeated(
         find: returns the repetitions in joints (T, J, 3).
         count: at least 1.
     """
-    found = find(layout.decode(features))
+    joints = layout.decode(features)
+    found = find(joints)
     if not found:
         return None
     if len(found) == count:
         return features
-    if count > 1:
-        features = _without_holds(features, found, layout)
-        found = find(layout.decode(features))
-    distances = _distances(layout.decode(features), layout.fps)
+    distances = _distances(joints, layout.fps)
+    if count > 1 and (holds := list(_holds(found, distances, layout.fps))):
+        features = _joined(features, holds, layout)
+        joints = layout.decode(features)
+        found, distances = find(joints), _distances(joints, layout.fps)
     ways = _removals(found, count, distances) if len(found) > count else _additions(found, count, distances)
     for seams in islice(ways, TRIES):
         made = _joined(features, seams, layout)
@@ -90,16 +93,14 @@ def _distances(joints: NDArray[np.floating], fps: float) -> NDArray[np.floating]
     return np.sqrt(np.maximum(between, 0) / joints.shape[1])
 
 
-def _without_holds(features: Float32, found: Sequence[Repetition], layout: FeatureLayout) -> Float32:
-    """Return features in which no repetition holds still for longer than `LONGEST_HOLD`."""
-    distances, spare = _distances(layout.decode(features), layout.fps), round(LONGEST_HOLD * layout.fps)
-    seams = list[Seam]()
+def _holds(found: Sequence[Repetition], distances: NDArray[np.floating], fps: float) -> Iterator[Seam]:
+    """Yield seams over which no repetition holds still for longer than `LONGEST_HOLD`."""
+    spare = round(LONGEST_HOLD * fps)
     for each in found:
         held = np.argwhere(np.triu(distances[each.begin : each.end, each.begin : each.end] <= HELD, spare + 1))
         if len(held):
             first, last = held[np.argmax(held[:, 1] - held[:, 0])] + each.begin
-            seams.append(Seam(int(first) + spare, int(last), float(distances[first, last])))
-    return _joined(features, seams, layout) if seams else features
+            yield Seam(int(first) + spare, int(last), float(distances[first, last]))
 
 
 def _seam(before: tuple[int, int], after: tuple[int, int], distances: NDArray[np.floating]) -> Seam | None:
@@ -139,8 +140,8 @@ def _smooth(seams: Iterable[Seam | None]) -> list[Seam]:
 def _joined(features: Float32, seams: Sequence[Seam], layout: FeatureLayout) -> Float32:
     """Return features that go over seams, in order of `before`; what differs at a seam fades out after it."""
     length = max(round(BLEND * layout.fps), 1)
-    share = np.linspace(1, 0, length + 2, dtype=np.float32)[1:]
-    fade = np.concatenate([share * share * (3 - 2 * share), np.zeros(len(features), np.float32)])[:, None]
+    share = np.concatenate([np.linspace(1, 0, length + 2)[1:], np.zeros(len(features))]).astype(np.float32)
+    fade = smoothstep(share)[:, None]
     parts, begin, offset = list[Float32](), 0, np.zeros_like(features[0])
     for seam in seams:
         part = features[begin : seam.before]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import HEAD, KNEES, NECK, PELVIS, SHOULDERS, WRISTS, body_frame, smooth, swings
+from marey.checks.kinematics import KNEES, PELVIS, SHOULDERS, WRISTS, smooth, swings
 from marey.motion.feet import runs
 from marey.selector.gaits import stays
 from marey.selector.grades import every, least, most, of_side, share, some
@@ -26,9 +26,7 @@ def laugh(m: Motion, side: str) -> float:
 
 def nod(m: Motion, side: str) -> float:
     """Tip the head down and up twice."""
-    forward, _ = body_frame(m.joints[:, HEAD] - m.joints[:, NECK], m.heading)
-    pitch = np.degrees(np.arctan2(forward, (m.joints[:, HEAD] - m.joints[:, NECK])[:, 1]))
-    nods = swings(smooth(pitch, 0.03, m.fps), 7)
+    nods = swings(smooth(m.pitch, 0.03, m.fps), 7)
     times = np.diff(nods) / m.fps
     steady = min(most(float(np.ptp(m.lean)), 14, 5), most(m.extent, 0.2, 0.08))
     return min(least(sum(times < 1.2), 2.5, 1), steady, most(float(np.percentile(m.hand_speed, 95)), 1.0, 0.4))

@@ -167,6 +167,13 @@ class Motion:
         local = self.joints - self.joints[:, :1]
         return smooth(np.linalg.norm(velocity(local, self.fps), axis=-1).mean(axis=1), 0.5, self.fps)
 
+    @Signal
+    def pitch(self) -> Array:
+        """(T,) degrees by which the head is tipped forward on the neck."""
+        head = self.joints[:, HEAD] - self.joints[:, NECK]
+        forward, _ = body_frame(head, self.heading)
+        return np.degrees(np.arctan2(forward, head[:, 1]))
+
     # -- legs
 
     @Signal

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marey.checks.kinematics import HEAD, NECK, WRISTS, body_frame, smooth, swings, trunk_up
+from marey.checks.kinematics import HEAD, WRISTS, smooth, swings, trunk_up
 from marey.motion.feet import runs
 from marey.selector.motion import OFF_FLOOR, Array, Motion
 
@@ -105,9 +105,7 @@ def _raised(m: Motion) -> list[Repetition]:
 
 
 def _nods(m: Motion) -> list[Repetition]:
-    forward, _ = body_frame(m.joints[:, HEAD] - m.joints[:, NECK], m.heading)
-    pitch = np.degrees(np.arctan2(forward, (m.joints[:, HEAD] - m.joints[:, NECK])[:, 1]))
-    return _tops(smooth(pitch, 0.03, m.fps), 7)
+    return _tops(smooth(m.pitch, 0.03, m.fps), 7)
 
 
 def _push_ups(m: Motion) -> list[Repetition]:
