@@ -32,6 +32,7 @@ from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement, sequence_reader
 from marey.text.words import EDGE_PUNCTUATION
+from marey.vocabulary.entries import load_vocabulary
 
 if TYPE_CHECKING:
     from marey.text.spelling import Speller
@@ -48,10 +49,18 @@ class _Reading:
     Attributes:
         worded: the text that the model reads.
         movements: those that it asks for, if there are several, one after the other.
+        plain: its one action in plain words; empty if it asks for several or none, or in doubt.
     """
 
     worded: str
     movements: tuple[ReadMovement, ...] = ()
+    plain: str = ""
+
+    @classmethod
+    def of(cls, text: str, action: str | None) -> _Reading:
+        """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
+        plain = "" if action is None else load_vocabulary().need(action).plain_words
+        return cls(with_plain_action(text, action), plain=plain)
 
 
 class TextPipeline:
@@ -124,7 +133,7 @@ class TextPipeline:
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
         readings = self._readings([each.text for each in rewritten])
-        graphs = [graph for graph, _ in self._read([reading.worded for reading in readings])]
+        graphs = [graph for graph, _ in self._read(readings)]
         return [
             ParsedPrompt(
                 prompt,
@@ -200,7 +209,7 @@ class TextPipeline:
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
         readings = self._readings([each.text for each in rewritten])
-        read = self._read([reading.worded for reading in readings])
+        read = self._read(readings)
         return [
             replace(
                 self._features(prompt, graph, actions),
@@ -223,7 +232,7 @@ class TextPipeline:
         if not self.spec.plain_action:
             return [_Reading(text) for text in texts]
         if not self._reads_actions:
-            return [_Reading(with_plain_action(text, only_action(text))) for text in texts]
+            return [_Reading.of(text, only_action(text)) for text in texts]
         reader = action_reader()
         read = [reader.read(text, vector) for text, vector in zip(texts, self.pooled(texts), strict=True)]
         return list(map(self._reading, texts, read))
@@ -232,7 +241,7 @@ class TextPipeline:
         sure = read.action is not None and read.probability >= SURE_OF_SEVERAL
         if self.spec.movements and not sure and (movements := self._movements_in(text, read.action)):
             return _Reading(text, movements)
-        return _Reading(with_plain_action(text, read.action))
+        return _Reading.of(text, read.action)
 
     def _movements_in(self, text: str, action: str | None) -> tuple[ReadMovement, ...]:
         with self._lock:
@@ -244,11 +253,17 @@ class TextPipeline:
         """True if prompts are read by the vectors of this encoder."""
         return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
 
-    def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
+    def _read(self, readings: Sequence[_Reading]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
-        time."""
-        graphs = self._graphs(texts)
+        time.
+
+        A text that would say its one action twice, such as "a person dies, falls down and dies", is not split.
+        """
+        graphs = self._graphs([reading.worded for reading in readings])
         actions = [split_actions(graph) for graph in graphs]
+        for k, reading in enumerate(readings):
+            if reading.plain and join_in_order(actions[k]).lower().count(reading.plain) > 1:
+                actions[k] = (graphs[k].text,)
         if self.spec.in_order:
             several = [k for k, found in enumerate(actions) if len(found) > 1]
             for k, graph in zip(several, self._graphs([join_in_order(actions[k]) for k in several]), strict=True):

@@ -7,22 +7,53 @@ says stays behind the plain words.
 
 from __future__ import annotations
 
-from marey.text.action_reader import STANDING
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import every_action, match_scope
+import re
+from functools import lru_cache
 
-VERSION = 2
+from marey.text.action_reader import STANDING
+from marey.text.clause_normalization import DEFAULT_SUBJECT
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import third_person
+from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.word_lists import load_word_lists
+
+VERSION = 3
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
 TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
+_WORD = re.compile(r"[A-Za-z]+")
+
+
+def with_subject(prompt: str) -> str:
+    """Return a prompt that begins with a verb in the third person behind its subject: "bows deeply" as "a person bows
+    deeply"; any other as it is.
+
+    Captions have subjects. Behind the plain words of its action, "a person bows, bows deeply" is two bows.
+    """
+    words = _WORD.findall(prompt)
+    first = next((word for word in words if not word.lower().endswith("ly")), "")
+    begins = prompt.startswith(words[0]) if words else False
+    if not begins or first.lower() not in _third_persons():
+        return prompt
+    return f"{DEFAULT_SUBJECT} {_lowered(prompt)}"
+
+
+@lru_cache(maxsize=1)
+def _third_persons() -> frozenset[str]:
+    """Return the forms with -s of all verbs that are known, but for those that are parts of the body, too: "arms"."""
+    lists = load_word_lists()
+    phrases = (phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near))
+    verbs = {phrase.split()[0] for phrase in phrases} | {phrase.split()[0] for phrase in lists.other_verbs}
+    return frozenset(third_person(verb) for verb in verbs if verb.isalpha()) - lists.body_parts - lists.uncounted
 
 
 def with_plain_action(prompt: str, action: str | None) -> str:
     """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
-    As written where it has the plain words, or no action is known that it asks for.
+    Without them where it has them already, and as written where no action is known that it asks for. A verb without
+    a subject gets one (`with_subject`).
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -30,7 +61,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     """
     if action is None:
         return prompt
-    plain = load_vocabulary().need(action).plain_words
+    prompt, plain = with_subject(prompt), load_vocabulary().need(action).plain_words
     return prompt if plain in prompt.lower() else f"{plain}, {_lowered(prompt)}"
 
 

@@ -15,9 +15,7 @@ from marey.generate.poses import with_poses
 from marey.generation.candidates import DrawPlan
 from marey.generation.constraints import choose, draw
 from marey.generation.constraints.constraint_set import asked_of
-from marey.generation.constraints.curves import fades, smooth_open, through
 from marey.generation.constraints.draw import constrained_clips, constrained_request
-from marey.generation.constraints.paths import stand_clock
 from marey.generation.constraints.playing import played
 from marey.generation.constraints.timing import NO_JUMPS, Timing, play_times
 from marey.generation.port import Request
@@ -25,6 +23,8 @@ from marey.generation.shots.dispatch import generate_any
 from marey.items.constraints import read_constraints
 from marey.motion.arrange import placement_of
 from marey.motion.clip import MotionClip
+from marey.motion.courses import stand_clock
+from marey.motion.curves import fades, smooth_open, through
 from marey.motion.edits.licences import terms_with
 from marey.motion.feet import clean_feet, skate
 from marey.motion.kinematics import forward_kinematics

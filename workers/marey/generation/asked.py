@@ -1,8 +1,8 @@
-"""Motions as the words of their prompt ask: on the side, as often, and at the pace that they name.
+"""Motions as the words of their prompt ask: on the side, as often, as far round and at the pace that they name.
 
 A network knows what an action looks like, but seldom reads one word that changes it: its training motions are
-mirrored, so both sides are as likely to it; it repeats an action as often as its length has room for; and it does so
-at the pace of its data. All three can be mended in the motion that it made.
+mirrored, so both sides are as likely to it; it repeats an action as often as its length has room for; it turns by some
+angle; and it does so at the pace of its data. All of these can be mended in the motion that it made.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
+from marey.generation.turned import turned_features
 from marey.items.values import MAX_SECONDS
+from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
 from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
@@ -26,9 +28,11 @@ from marey.selector.matching import Step, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
+from marey.text.plain_action import TURNING
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.paces import stated_pace
+from marey.vocabulary.turns import Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
 
@@ -49,8 +53,9 @@ class AskedMotion:
     Attributes:
         features: (T, D), in the layout's own units.
         changes: for the manifest: `mirrored`, true where left and right are exchanged; `repetitions`, how often the
-            network `made` and the prompt `asked` for the action; `speed`, how many times as fast the motion is played
-            as the network made it.
+            network `made` and the prompt `asked` for the action; `turn`, degrees from the first frame to the last,
+            positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
+            the motion is played as the network made it.
     """
 
     features: Float32 = field(repr=False)
@@ -71,6 +76,7 @@ class _Wish:
         action: id of the only one; empty = several, or none that is known.
         limb: that acts, on one side; empty = either.
         count: repetitions; None = any number.
+        turn: how far the body turns; None = as it comes.
         speed: in relation to what the network makes.
     """
 
@@ -78,6 +84,7 @@ class _Wish:
     action: str = ""
     limb: NamedLimb | None = None
     count: int | None = None
+    turn: Turn | None = None
     speed: float = 1.0
 
     @classmethod
@@ -87,18 +94,21 @@ class _Wish:
             return cls()
         text = request.text
         steps = wanted_of(text.actions or (text.rewritten,))
-        single = steps[0][0].action if steps and len(steps) == 1 == len(steps[0]) else ""
+        single = _one_action(steps or ())
         action = load_vocabulary().said_first(text.rewritten) or single
         if not action:
             return cls(steps, limb=limb_of(text.prompt) if steps is None else None)
         count = stated_count(text.prompt, action) if action in REPETITIONS else None
+        if action == "spin":
+            count = count or stated_spins(text.prompt)
         own_pace = action in LEARNED or action in FALLING
         speed = 1.0 if own_pace else SPEEDS.get(stated_pace(text.prompt), 1.0)
-        return cls(steps, action, limb_of(text.prompt, action), count, speed)
+        return cls(steps, action, limb_of(text.prompt, action), count, stated_turn(text.prompt, action), speed)
 
-    def names_side(self) -> bool:
-        """Return True if an action is asked for on one side."""
-        return any(wanted.side in ("left", "right") for step in self.steps or () for wanted in step)
+    @property
+    def side(self) -> str:
+        """`left` or `right` if an action is asked for on one side, else empty."""
+        return next((each.side for step in self.steps or () for each in step if each.side in ("left", "right")), "")
 
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
@@ -106,6 +116,15 @@ class _Wish:
         if self.speed == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.speed)))
+
+
+def _one_action(steps: Sequence[Step]) -> str:
+    """Return the id of the only action; a way before a turn ("walks ahead and then changes direction") is part of it.
+    Empty if there are several or none."""
+    named = {each.action for step in steps for each in step}
+    if TURNING in named and named <= LEARNED | {TURNING}:
+        return TURNING
+    return named.pop() if len(named) == 1 == len(steps) else ""
 
 
 def generate_as_asked(
@@ -116,7 +135,7 @@ def generate_as_asked(
     control: GenerationControl | None = None,
 ) -> list[MotionFeatures | None]:
     """Generate one motion per request, as `Generator.generate`, and change those that do not show what their prompt
-    says of a side, a number or a pace.
+    says of a side, a number, a turn or a pace.
 
     Raises:
         InvalidInput: as `Limits.check`.
@@ -134,7 +153,7 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     """Return the motion, changed where the wish is not fulfilled and can be."""
     features: Float32 = motion.features
     changes: dict[str, Any] = {}
-    if (wish.limb or wish.names_side()) and _is_better_mirrored(features, layout, wish):
+    if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
@@ -143,6 +162,11 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
             made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
             features = often
             changes["repetitions"] = {"made": made, "asked": wish.count}
+    if wish.turn is not None and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+        other = turned_features(features, layout, wish.turn, wish.side)
+        if other is not None:
+            features, made = other
+            changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
     frames = fixed or max(round(len(features) / wish.speed), 2)
     if frames != len(features) and ("repetitions" in changes or wish.speed != 1.0):
         changes["speed"] = round(len(features) / frames, 3)
@@ -165,6 +189,12 @@ def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -
     if wish.limb is not None:
         return wish.limb.is_other(Motion(joints, layout.fps))
     return SHOWN > mirrored > as_made
+
+
+def _turn(features: Float32, layout: FeatureLayout) -> float:
+    """Return the degrees by which a motion turns, positive to the left."""
+    headings = natural_course(layout.decode(features), layout.skeleton, layout.fps).headings
+    return float(np.degrees(headings[-1] - headings[0]))
 
 
 def _repetitions(joints: NDArray[np.floating], fps: float, action: str) -> Sequence[Repetition]:

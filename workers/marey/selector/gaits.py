@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from marey.checks.kinematics import turning_points
@@ -105,22 +107,42 @@ def walk_backward(m: Motion, side: str) -> float:
 
 def turn(m: Motion, side: str) -> float:
     """Change the direction of a walk or run."""
-    angle = {"left": m.turn, "right": -m.turn}.get(side, abs(m.turn))
-    going = least(m.path, 0.6, 0.2)
-    return min(least(angle, 45, 15), most(angle, 200, 30), going, least(m.travel[0], 0.4, 0.2))
-
-
-def circle(m: Motion, side: str) -> float:
-    """Walk or run all the way round."""
-    angle = {"left": m.turn, "right": -m.turn}.get(side, abs(m.turn))
-    return min(least(angle, 300, 60), least(m.path, 1.0, 0.4), least(m.travel[0], 0.8, 0.4))
+    return _turns_on_way(m, side, (45, 200))
 
 
 def turn_around(m: Motion, side: str) -> float:
     """Turn on the spot."""
+    return _turns_on_spot(m, side, (70, 270))
+
+
+def turn_by(degrees: float) -> Callable[[Motion, str], float]:
+    """Return the rule of a walk or run that turns so far."""
+    return lambda m, side: _turns_on_way(m, side, _about(degrees))
+
+
+def turn_around_by(degrees: float) -> Callable[[Motion, str], float]:
+    """Return the rule of a turn on the spot so far."""
+    return lambda m, side: _turns_on_spot(m, side, _about(degrees))
+
+
+def _about(degrees: float) -> tuple[float, float]:
+    """Return the bounds of a turn that one calls a turn by some degrees."""
+    spare = max(20.0, 0.15 * degrees)
+    return degrees - spare, degrees + spare
+
+
+def _turns_on_way(m: Motion, side: str, bounds: tuple[float, float]) -> float:
+    low, high = bounds
+    angle = {"left": m.turn, "right": -m.turn}.get(side, abs(m.turn))
+    going = min(least(m.path, 0.6, 0.2), least(m.travel[0], 0.4, 0.2))
+    return min(least(angle, low, 15), most(angle, high, 30), going)
+
+
+def _turns_on_spot(m: Motion, side: str, bounds: tuple[float, float]) -> float:
+    low, high = bounds
     angle = m.heading - m.heading[0]
     angle = {"left": angle, "right": -angle}.get(side, np.abs(angle))
-    return min(least(float(angle[-1]), 70, 20), most(float(angle.max()), 270, 30), most(m.extent, 0.8, 0.2))
+    return min(least(float(angle[-1]), low, 20), most(float(angle.max()), high, 30), most(m.extent, 0.8, 0.2))
 
 
 def spin(m: Motion, side: str) -> float:

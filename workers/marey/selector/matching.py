@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from marey.quality.record import SHOWN
-from marey.selector.gaits import circle
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.repetitions import REPETITIONS
-from marey.selector.rules import RULES, TURNS, WHILE_TURNING, Rule
+from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.turns import stated_turn
 
 LEAST_PART = 0.5
 """Seconds that each action of several needs."""
@@ -24,14 +24,14 @@ FEWEST_CUTS = 7
 
 NOT_AS_OFTEN = 0.4
 """Best value of a motion with another number of repetitions than was asked for."""
+WAYS, ON_THE_SPOT, TURNING = frozenset({"walk", "run", "sprint"}), "turn-around", "turn"
+"""A way and a turn to one side in one sentence are a turn on the way: "walks and turns left 90 degrees"."""
 SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2}
 """Repetitions that the definition of an action asks for; a prompt may ask for fewer."""
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
 _LETTER = re.compile(r"\b([lr])[ -](?:hand|arm|fist|palm|elbow|leg|foot|knee)\b")
-_CIRCLE = re.compile(r"\bcircl(?:es?|ed|ing)\b")
-_PART_OF_CIRCLE = re.compile(r"\b(?:half|semi|quarter|part)\b")
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class WantedAction:
     Attributes:
         action: id in the vocabulary, one that `RULES` has.
         side: `left`, `right`, `both`, or empty: any.
-        circle: a `turn` that the words say goes all the way round, beyond the angles of its definition.
+        degrees: of an action of `EXACT`, where the words say how far; None: as in its definition.
         count: how often, of an action that `REPETITIONS` has; None: any number.
     """
 
     action: str
     side: str = ""
-    circle: bool = False
+    degrees: float | None = None
     count: int | None = None
 
 
@@ -101,7 +101,8 @@ def _step(sentence: str) -> Step | None:
         beside.add("idle")
     wanted = [name for name in names if name not in beside] or names
     side = side_of(sentence)
-    circles = {each.action for each in scope.actions if _CIRCLE.search(each.text)} if goes_round(sentence) else set()
+    if ON_THE_SPOT in wanted and any(name in WAYS for name in wanted) and side in ("left", "right"):
+        wanted = [TURNING]
     counted = wanted[0] if len(wanted) == 1 and wanted[0] in REPETITIONS else None
     prompt = sentence.partition(", ")[2] if first is not None else sentence  # "a person bows, bows" asks for one bow
     return (
@@ -109,7 +110,7 @@ def _step(sentence: str) -> Step | None:
             WantedAction(
                 name,
                 side if actions[name].sided else "",
-                circle=name == "turn" and name in circles,
+                degrees=_degrees(prompt, name),
                 count=stated_count(prompt, name) if name == counted else None,
             )
             for name in wanted
@@ -118,9 +119,9 @@ def _step(sentence: str) -> Step | None:
     )
 
 
-def goes_round(sentence: str) -> bool:
-    """Return True if a circle that a sentence names is a whole one."""
-    return not _PART_OF_CIRCLE.search(sentence.lower())
+def _degrees(sentence: str, action: str) -> float | None:
+    stated = stated_turn(sentence, action) if action in EXACT else None
+    return stated.most if stated is not None and stated.is_exact else None
 
 
 def side_of(sentence: str) -> str:
@@ -156,7 +157,7 @@ def _grade(motion: Motion, step: Step) -> float:
 
 
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
-    rule = circle if wanted.circle else rules[wanted.action]
+    rule = rules[wanted.action] if wanted.degrees is None else EXACT[wanted.action](wanted.degrees)
     return rule if wanted.count is None else _counted(rule, wanted.action, wanted.count)
 
 

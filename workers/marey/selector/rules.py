@@ -97,6 +97,8 @@ RULES: Mapping[str, Rule] = {
 
 TURNS = frozenset({"turn", "turn-around"})
 """Actions that turn the body, on its way or on the spot."""
+EXACT: Mapping[str, Callable[[float], Rule]] = {"turn": gaits.turn_by, "turn-around": gaits.turn_around_by}
+"""Rules of turns whose degrees the words name; they may lie beyond the definition of the action."""
 WHILE_TURNING: Mapping[str, Rule] = {
     "walk": gaits.walk_any_way,
     "walk-backward": gaits.walk_backward_any_way,

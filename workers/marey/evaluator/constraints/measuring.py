@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from marey.evaluator.constraints.cases import Case
-from marey.generation.constraints.paths import carried, natural_course
 from marey.motion.clip import MotionClip
+from marey.motion.courses import carried, natural_course
 from marey.motion.feet import find_contacts, skate
 from marey.motion.rotations import Array
 from marey.quality.record import read_quality

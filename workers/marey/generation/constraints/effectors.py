@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.constraints.constraint_set import Target
-from marey.generation.constraints.curves import fades
 from marey.generation.constraints.poses import BodyMotion
+from marey.motion.curves import fades
 from marey.motion.hands import arms
 from marey.motion.kinematics import facing, forward_kinematics, global_rotations
 from marey.motion.legs import follow_feet, foot_chain, two_bone_knee

@@ -5,21 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from marey.generation.constraints.constraint_set import ConstraintSet
-from marey.generation.constraints.curves import smooth_open, through
 from marey.generation.constraints.effectors import with_targets
-from marey.generation.constraints.paths import (
-    Course,
-    asked_places,
-    bent,
-    course_asked,
-    directions,
-    gradient,
-    natural_course,
-)
+from marey.generation.constraints.paths import asked_places, course_asked, directions
 from marey.generation.constraints.playing import played
 from marey.generation.constraints.poses import BodyMotion, with_poses
 from marey.generation.constraints.timing import NO_JUMPS, Timing, find_jumps, play_times
 from marey.motion.clip import MotionClip
+from marey.motion.courses import Course, bent, gradient, natural_course
+from marey.motion.curves import smooth_open, through
 from marey.motion.edits.place import posed as clip_of
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton

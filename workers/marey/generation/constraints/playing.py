@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.generation.constraints.curves import hump
 from marey.generation.constraints.poses import BodyMotion
 from marey.generation.constraints.timing import Timing
 from marey.motion.clip import MotionClip
+from marey.motion.curves import hump
 from marey.motion.feet import clean_feet
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import follow_feet, foot_chain

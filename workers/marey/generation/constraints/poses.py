@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.constraints.constraint_set import Keyframe
-from marey.generation.constraints.curves import fades
+from marey.motion.curves import fades
 from marey.motion.filters import smooth_above
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.legs import MAX_DROP, follow_feet, foot_chain

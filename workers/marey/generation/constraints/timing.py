@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.constraints.curves import smooth_open
+from marey.motion.curves import smooth_open
 from marey.motion.filters import smooth
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, about, rotate

@@ -1,0 +1,91 @@
+"""Motions that turn as far as their prompt asks.
+
+A network learned that an action turns, but hardly how far: "turns around" ends after a turn of 300 degrees. The turn
+of a motion is made larger or smaller all along it, as its path is bent to a constraint (Gleicher 2001): standing feet
+stay, and steps take up the difference.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.motion.bones import bone_fit
+from marey.motion.courses import Course, bent, natural_course, turned
+from marey.motion.features import FeatureLayout
+from marey.motion.feet import find_contacts
+from marey.motion.filters import smoothstep
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.pose import solve_pose
+from marey.motion.rotations import Array
+from marey.vocabulary.turns import Turn
+
+Float32 = NDArray[np.float32]
+
+NEAR = 5.0
+"""Degrees by which a turn may differ."""
+MOST_SCALED = 1.6
+"""How many times as large a turn is made at most; what is missing to a larger one is added in the middle."""
+FASTEST = 150.0
+"""Degrees a second of a turn that is added: steps on the spot keep up with it."""
+
+
+def turned_features(features: Float32, layout: FeatureLayout, turn: Turn, side: str) -> tuple[Float32, float] | None:
+    """Return features (T, D) that turn as far as is asked for, and the degrees (positive to the left) by which the
+    motion turned before; None if it turns so far by itself, or has no time to.
+
+    Args:
+        features: (T, D), in the layout's own units.
+        layout: of the features.
+        turn: what is asked for.
+        side: `left` or `right`, for a motion that hardly turns by itself; any other means left.
+    """
+    joints = layout.decode(features).astype(np.float64)
+    natural = natural_course(joints, layout.skeleton, layout.fps)
+    made = float(np.degrees(natural.headings[-1] - natural.headings[0]))
+    wanted = turn.of(made)
+    if abs(abs(made) - wanted) <= NEAR and not turn.even:
+        return None
+    sign = (-1.0 if side == "right" else 1.0) if abs(made) < turn.least / 4 else math.copysign(1.0, made)
+    headings = _headings(natural.headings, math.radians(sign * wanted), layout.fps, even=turn.even)
+    if headings is None:
+        return None
+    return layout.encode(_going_on(_along(joints, layout, natural, headings))), made
+
+
+def _headings(headings: Array, wanted: float, fps: float, *, even: bool) -> Array | None:
+    """Return headings (T,) that turn by `wanted` radians; None if there is no time to."""
+    turns, frames = headings - headings[0], len(headings)
+    time = np.linspace(0.0, 1.0, frames)
+    if even:
+        return headings[0] + wanted * time + (turns - turns[-1] * time) * (turns[-1] * wanted > 0)
+    made = turns[-1]
+    share = wanted / made if made * wanted > 0 else 0.0
+    if share > MOST_SCALED or (wanted and not share):
+        share = MOST_SCALED if share else 1.0
+    missing = wanted - share * made
+    span = min(2 * abs(missing) / math.radians(FASTEST) * fps / frames, 1.0)
+    if abs(missing) > math.radians(FASTEST) * frames / fps / 1.5:
+        return None
+    span = max(span, 0.5)
+    added = smoothstep(np.clip((time - 0.5) / span + 0.5, 0.0, 1.0))
+    return headings[0] + share * turns + missing * added
+
+
+def _along(joints: Array, layout: FeatureLayout, natural: Course, headings: Array) -> Array:
+    """Return joints (T, J, 3) of a motion with other headings (T,), which goes its way as before from its own view."""
+    skeleton, fps = layout.skeleton, layout.fps
+    change = headings - natural.headings
+    steps = turned(np.diff(natural.places, axis=0), 0.5 * (change[1:] + change[:-1]))
+    places = natural.places[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    pose = solve_pose(bone_fit(skeleton).fit(joints), skeleton, fps=fps, measure=False)
+    contacts = find_contacts(joints, skeleton, fps)
+    rotations, root, _ = bent(pose.rotations, pose.root, contacts, natural, Course(places, headings), skeleton, fps)
+    return forward_kinematics(skeleton, rotations, root)
+
+
+def _going_on(joints: Array) -> Array:
+    """Return joints with one frame more, since features hold the steps from each frame to the next."""
+    return np.concatenate([joints, joints[-1:] + (joints[-1:] - joints[-2:-1])])
