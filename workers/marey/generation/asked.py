@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.fine import FINE, drawn_features
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
 from marey.generation.turned import turned_features
@@ -28,6 +29,7 @@ from marey.selector.matching import Step, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
+from marey.selector.rules import RULES
 from marey.text.plain_action import TURNING
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
@@ -52,7 +54,8 @@ class AskedMotion:
 
     Attributes:
         features: (T, D), in the layout's own units.
-        changes: for the manifest: `mirrored`, true where left and right are exchanged; `repetitions`, how often the
+        changes: for the manifest: `mirrored`, true where left and right are exchanged; `drawn`, the action whose small
+            movement is drawn on what the network made (`marey.generation.fine`); `repetitions`, how often the
             network `made` and the prompt `asked` for the action; `turn`, degrees from the first frame to the last,
             positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
             the motion is played as the network made it.
@@ -156,6 +159,10 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
+    if wish.action in FINE and layout.skeleton.name == HUMANML3D.name and not _shows(features, layout, wish):
+        drawn = drawn_features(features, layout, wish.action, wish.count, request.seed)
+        if drawn is not None:
+            features, changes["drawn"] = drawn, wish.action
     if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
         often = repeated(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
         if often is not None and often is not features and _fits(len(often), fixed, wish.speed, layout.fps):
@@ -189,6 +196,15 @@ def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -
     if wish.limb is not None:
         return wish.limb.is_other(Motion(joints, layout.fps))
     return SHOWN > mirrored > as_made
+
+
+def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
+    """Return True if a motion shows its action, as often as it is asked for, by itself."""
+    if len(features) < SHORTEST:
+        return False
+    motion = Motion(layout.decode(features), layout.fps)
+    as_often = wish.count is None or len(REPETITIONS[wish.action](motion)) == wish.count
+    return as_often and RULES[wish.action](motion, "") >= SHOWN
 
 
 def _turn(features: Float32, layout: FeatureLayout) -> float:

@@ -1,0 +1,102 @@
+"""Movements so small that a tokenizer's codes lose them: nods and trembling, drawn on the motion that a network made.
+
+The network gives the body that nods or shivers, where its arms are and how it stands; of the movement itself no code
+keeps 8 degrees of the head, nor 4 mm at 4 Hz (`models/hgm3-open/README.md`, "Tokenizer"). They are drawn as those of
+the made clips of the training data are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.motion.features import FeatureLayout
+from marey.motion.filters import smooth, smoothstep
+from marey.motion.kinematics import facing
+from marey.motion.rotations import Array, from_rotvec, rotate
+from marey.motion.skeleton import HUMANML3D
+
+Float32 = NDArray[np.float32]
+Draw = Callable[[Array, float, int | None, np.random.Generator], Array]
+"""`(joints, fps, count, generator)` to joints (T, 22, 3), metres."""
+
+NOD_DEGREES, NOD_HZ = (11.0, 17.0), (1.3, 1.7)
+NODS, PAUSE_S = (3, 5), (0.6, 1.2)
+"""Nods in a row, and seconds between two rows, where no number is asked for."""
+EDGE_S = 0.3
+"""Seconds at both ends in which nothing is drawn."""
+SHAKE_HZ = (4.3, 5.2)
+SHAKES: Mapping[str, float] = {
+    **dict.fromkeys(("L_wrist", "R_wrist"), 0.013),
+    **dict.fromkeys(("L_elbow", "R_elbow", "head"), 0.007),
+    **dict.fromkeys(("L_shoulder", "R_shoulder", "L_knee", "R_knee", "neck"), 0.005),
+    **dict.fromkeys(("L_collar", "R_collar", "spine3", "spine2"), 0.003),
+}
+"""Metres by which joints tremble."""
+
+
+def drawn_features(
+    features: Float32, layout: FeatureLayout, action: str, count: int | None, seed: int
+) -> Float32 | None:
+    """Return features (T, D) with the small movement of an action of `FINE`; None if the motion is too short for it.
+
+    Args:
+        features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
+        layout: of the features.
+        action: id in the vocabulary.
+        count: repetitions; None = any number.
+        seed: of the motion; decides rates and sizes.
+    """
+    joints = layout.decode(features).astype(np.float64)
+    if len(joints) < 2 * (2 * EDGE_S) * layout.fps:
+        return None
+    drawn = FINE[action](joints, layout.fps, count, np.random.default_rng([seed, len(action)]))
+    return layout.encode(np.concatenate([drawn, 2 * drawn[-1:] - drawn[-2:-1]]))
+
+
+def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
+    """Return joints whose head tips down and up, in rows of a few nods or as often as is asked for."""
+    frames, rate = len(joints), rng.uniform(*NOD_HZ)
+    down, at = np.zeros(frames), EDGE_S * fps
+    left, row = count if count is not None else frames, int(rng.integers(*NODS, endpoint=True))
+    period = fps / rate
+    if count is not None:
+        period = min(period, (frames - 2 * at) / count)
+        at = max(at, (frames - count * period) / 2 - rng.uniform(0.0, 0.2) * frames)
+    time = np.arange(frames)
+    while left and at + period <= frames - EDGE_S * fps + 1e-6:
+        inside = (time >= at) & (time <= at + period)
+        degrees = rng.uniform(*NOD_DEGREES)
+        down[inside] = degrees * (0.5 - 0.5 * np.cos(2 * np.pi * (time[inside] - at) / period))
+        at, left, row = at + period, left - 1, row - 1
+        if not row and count is None:
+            at, row = at + rng.uniform(*PAUSE_S) * fps, int(rng.integers(*NODS, endpoint=True))
+    neck, head = HUMANML3D.index("neck"), HUMANML3D.index("head")
+    forward = smooth(facing(joints, HUMANML3D), 0.2 * fps)
+    left_of = np.stack([forward[:, 2], np.zeros(frames), -forward[:, 0]], axis=1)
+    moved = joints.copy()
+    turn = from_rotvec(np.radians(down)[:, None] * left_of)
+    moved[:, head] = joints[:, neck] + rotate(turn, joints[:, head] - joints[:, neck])
+    return moved
+
+
+def trembling(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
+    """Return joints that tremble, the hands most; the feet stand."""
+    del count  # nobody trembles a number of times
+    time = np.arange(len(joints)) / fps
+    edge = np.minimum(time, time[-1] - time) / EDGE_S
+    strength, rate = smoothstep(np.clip(edge, 0.0, 1.0)), rng.uniform(*SHAKE_HZ)
+    moved = joints.copy()
+    for name, size in SHAKES.items():
+        phases = rng.uniform(0, 2 * np.pi, 3)
+        unsteady = 0.35 * np.sin(2 * np.pi * 0.8 * time + phases[2])
+        shake = np.sin(2 * np.pi * rate * time[:, None] + phases + unsteady[:, None])
+        way = rng.normal(size=3)
+        moved[:, HUMANML3D.index(name)] += size * strength[:, None] * shake[:, :1] * way / np.linalg.norm(way)
+    return moved
+
+
+FINE: Mapping[str, Draw] = {"nod": nodded, "shiver": trembling}
+"""What is drawn, by action."""
