@@ -71,6 +71,18 @@ _JOINING = re.compile(
 """Words and signs at the beginning of a clause that join it to others."""
 
 
+WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
+"""Actions that a stop ends."""
+STILL = "stands still"
+_STOP = re.compile(
+    r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to))*\s
+    (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
+    (?:sudden(?:ly)?\s|abrupt(?:ly)?\s|complete\s|full\s|dead\s)?
+    (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
+    re.IGNORECASE | re.VERBOSE,
+)
+
+
 @dataclass(frozen=True)
 class ReadMovement:
     """One movement of a prompt.
@@ -125,7 +137,8 @@ class SequenceReader(Reader):
         """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
         other, or that is in doubt.
 
-        Standing still beside the one action that a prompt is taken for is no movement, nor is the way before a turn.
+        Standing still beside the one action that a prompt is taken for is no movement but at the end of a way, nor is
+        the way before a turn.
         Prompts that say what is not done are not split.
 
         Args:
@@ -134,6 +147,8 @@ class SequenceReader(Reader):
             pooled: returns the sentence vectors (W,) of texts.
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
+        if action in WAYS and (way := way_to_a_stop(prompt)):
+            return ReadMovement(way, action), ReadMovement(STILL, STANDING)
         groups = in_order(self._clauses(prompt, encoding, pooled))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
@@ -251,6 +266,13 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
         else:
             merged.append(group)
     return merged
+
+
+def way_to_a_stop(text: str) -> str:
+    """Return the words before the stop that a text ends with: "walks up to the door" of "walks up to the door and
+    stops"; empty if it ends with none."""
+    match = _STOP.search(text)
+    return text[: match.start()].strip(" ,;") if match is not None else ""
 
 
 def _is_one_action(names: set[str], action: str | None) -> bool:
