@@ -34,6 +34,7 @@ _FIELDS = {
     "flight_s",
     "in_place",
     "plain",
+    "counted",
 }
 
 
@@ -54,6 +55,7 @@ class Action:
         implies: actions that every clip of this action shows as well.
         kind_of: the action that this one is a manner of; it is read as that where a bundle knows no better.
         sided: meaning of left and right.
+        counted: it is done as often as the prompt says (`REPETITIONS` of `marey.selector`).
     """
 
     id: str
@@ -68,6 +70,7 @@ class Action:
     implies: tuple[str, ...] = ()
     kind_of: str = ""
     sided: Sided = ""
+    counted: bool = False
 
     @property
     def plain_words(self) -> str:
@@ -182,6 +185,7 @@ def _action(name: str, value: object, where: str) -> Action:
         implies=_words(table, "implies", place),
         kind_of=str(table.get("kind_of", "")),
         sided=cast("Sided", _one_of(table, "sided", "", get_args(Sided), place)),
+        counted=bool(table.get("counted", False)),
     )
 
 

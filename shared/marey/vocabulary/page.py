@@ -48,8 +48,9 @@ def _row(action: Action) -> str:
     words = ", ".join([*action.verbs, *action.nouns][:MOST_WORDS])
     kind = f" A manner of `{action.kind_of}`." if action.kind_of else ""
     sides = f" Left and right name the {action.sided}." if action.sided else ""
+    number = " Can be counted." if action.counted else ""
     definition = action.definition.removeprefix("The body ").replace("|", "\\|")
-    return f"| `{action.id}` | {definition}{kind}{sides} | {words} |"
+    return f"| `{action.id}` | {definition}{kind}{sides}{number} | {words} |"
 
 
 def main(arguments: list[str]) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, get_args
 
+from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
 from marey.vocabulary.lengths import stated_length
@@ -215,6 +216,8 @@ class ScopeMatcher:
         if foreign is not None or not found:
             left = "verb" if foreign is None and self._may_act(words, denied) else None
             return _Reading((), (*flags, foreign or "no-action"), left)
+        if "counts" in flags and self._are_counted(prompt, found):
+            flags.remove("counts")
         if self._flagger.has_other_script(words):
             flags.append("other-language")
         phrases = tuple(
@@ -222,6 +225,12 @@ class ScopeMatcher:
             for match in self._in_context(found)
         )
         return _Reading(phrases, tuple(flags), "noun" if self._phrases.may_be_things(words, found) else None)
+
+    def _are_counted(self, prompt: str, found: Sequence[Match]) -> bool:
+        """Return True if the number that a prompt states is read, and its actions can be done so often."""
+        named = {meaning.action for match in found for meaning in match.meanings}
+        actions = [name for name in named if name is not None and self._vocabulary.need(name).counted]
+        return len(actions) == len(named) and any(stated_count(prompt, name) for name in actions)
 
     def _may_act(self, words: list[Word], denied: Sequence[Span]) -> bool:
         """Return True if a person is named, and more than what is not done: not "he never sits down"."""

@@ -2,6 +2,7 @@
 
 from marey.checks.action_prompts import ReadingPrompt, ReadingSet, kind_prompts, reading_prompts
 from marey.selector import wanted_of
+from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, match_scope
 from tests.support.marey import REPOSITORY
@@ -10,6 +11,13 @@ from tests.support.marey import REPOSITORY
 def read(text: str) -> set[str]:
     """Return the actions with which a motion of a prompt is matched."""
     return {wanted.action for step in wanted_of([text]) or () for wanted in step}
+
+
+def flags_of(text: str, lists: ActionLists) -> frozenset[str]:
+    """Return the flags of a prompt, and `counts` where its number is read and kept."""
+    scope = match_scope(text, lists)
+    kept = any(load_vocabulary().need(name).counted and stated_count(text, name) for name in read(text))
+    return frozenset([*scope.flags, *(["counts"] if kept else [])])
 
 
 def test_the_published_counts_are_those_of_the_sets() -> None:
@@ -30,7 +38,7 @@ def test_the_published_counts_of_all_kinds_are_those_of_the_halves() -> None:
         prompts = [prompt for kind in kind_prompts(which).values() for prompt in kind]
         wanted = [[each.action for step in wanted_of([prompt.text]) or () for each in step] for prompt in prompts]
         ordered = [one.is_right(set(read)) and one.is_ordered(read) for one, read in zip(prompts, wanted, strict=True)]
-        flags = [prompt.is_flagged(frozenset(match_scope(prompt.text, every).flags)) for prompt in prompts]
+        flags = [prompt.is_flagged(flags_of(prompt.text, every)) for prompt in prompts]
         assert [len(prompts), sum(ordered), sum(flags)] == [int(count), int(right), int(flagged)]
 
 
