@@ -27,7 +27,7 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.plain_action import only_action, with_plain_action
+from marey.text.plain_action import only_action, with_plain_action, with_subject
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_a_stop
@@ -152,7 +152,9 @@ class TextPipeline:
             reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
         if rewrite.refused is not None:
             reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {rewrite.refused}")
-        if worded != rewrite.text:
+        if worded == with_subject(rewrite.text) != rewrite.text:
+            reasons.append("the verb gets its subject, as captions have one")
+        elif worded != rewrite.text:
             reasons.append("the model knows the action by the plain words that are put first")
         if graph.text != worded:
             reasons.append("the model reads several actions as one sentence each, in the order of time")

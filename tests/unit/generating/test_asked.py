@@ -16,7 +16,7 @@ from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
-from tests.support.bodies import Body, lift, raiser, waver
+from tests.support.bodies import Body, lift, raiser, walker, waver
 
 
 @dataclass(frozen=True)
@@ -150,3 +150,30 @@ def test_the_limb_that_acts_is_the_one_that_the_prompt_names() -> None:
     assert salute.changes == {"mirrored": True}
     assert isinstance(make(raiser("left"), ask("a guard salutes with his left hand")), RawMotion)
     assert isinstance(make(raiser("left"), ask("a guard salutes to the right")), RawMotion)
+
+
+def test_turns_are_as_large_as_asked_for() -> None:
+    made = make(walker(6.0, turn=150.0), ask("a man walks ahead and then turns left by 90 degrees"))
+    assert made.changes == {"turn": {"made": pytest.approx(150, abs=5), "shown": pytest.approx(90, abs=5)}}
+
+
+def test_a_turn_to_the_other_side_is_mirrored_first() -> None:
+    made = make(walker(6.0, turn=150.0), ask("a man walks and turns right 90 degrees"))
+    assert made.changes["mirrored"]
+    assert made.changes["turn"]["shown"] == pytest.approx(-90, abs=5)
+
+
+def test_ways_are_straight_unless_their_prompt_says_otherwise() -> None:
+    curved = walker(6.0, turn=50.0)
+    assert make(curved, ask("a man walks to work")).changes["turn"]["shown"] == pytest.approx(15, abs=5)
+    assert isinstance(make(curved, ask("a man wanders around")), RawMotion)
+
+
+@pytest.mark.parametrize(("prompt", "action"), [("a man nods twice", "nod"), ("she shivers", "shiver")])
+def test_small_movements_are_drawn_where_they_are_missing(prompt: str, action: str) -> None:
+    made = make(Body(4.0).joints(), ask(prompt))
+    assert made.changes["drawn"] == action
+    if action == "nod":
+        assert len(REPETITIONS["nod"](Motion(HUMANML3D_263.decode(made.features), 20.0))) == 2
+        again = make(HUMANML3D_263.decode(made.features), ask(prompt))
+        assert isinstance(again, RawMotion)

@@ -23,6 +23,11 @@ def pipeline() -> TextPipeline:
     return shared_pipeline()
 
 
+def plain_pipeline(pipeline: TextPipeline, **more: bool) -> TextPipeline:
+    spec = pipeline.spec.model_copy(update={"plain_action": True, **more})
+    return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+
+
 @pytest.mark.parametrize(
     ("prompt", "action", "read"),
     [
@@ -33,6 +38,9 @@ def pipeline() -> TextPipeline:
         ("I bow", "bow", "a person bows, I bow"),
         ("A person bows twice", "bow", "A person bows twice"),  # plain as it is
         ("she bows and then waves", None, "she bows and then waves"),
+        ("bows deeply", "bow", "a person bows deeply"),
+        ("Slowly takes a bow", "bow", "a person bows, a person slowly takes a bow"),
+        ("arms up", "raise-arm", "a person raises an arm, arms up"),
     ],
 )
 def test_it_comes_before_the_prompt(prompt: str, action: str | None, read: str) -> None:
@@ -57,6 +65,24 @@ def test_words_alone_name_the_action_for_encoders_without_a_reader(prompt: str, 
     assert only_action(prompt) == action
 
 
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("bows deeply", "a person bows deeply"),
+        ("falls backward and dies", "a person dies, a person falls backward and dies"),
+        ("kicks with the right leg", "a person kicks with the right leg"),
+        ("a man falls backward and dies", "a person dies, a man falls backward and dies"),
+    ],
+)
+def test_an_action_is_said_once(prompt: str, read: str, pipeline: TextPipeline) -> None:
+    """A model that reads "a person bows, and then a person bows deeply" bows twice."""
+    plain = plain_pipeline(pipeline, in_order=True)
+    (features,), (parsed,) = plain.features([prompt]), plain.explain([prompt])
+    assert features.rewritten == read == parsed.graph.text
+    assert features.actions == ()
+    assert ("subject" in (parsed.rewrite_reason or "")) == read.startswith(f"a person {prompt}")
+
+
 @pytest.mark.parametrize("action", load_vocabulary().actions.values(), ids=lambda action: action.id)
 def test_the_action_of_the_plain_words_is_told_from_them(action: Action) -> None:
     assert load_vocabulary().said_first(with_plain_action("do it like this", action.id)) == action.id
@@ -64,8 +90,7 @@ def test_the_action_of_the_plain_words_is_told_from_them(action: Action) -> None
 
 
 def test_a_bundle_says_whether_its_prompts_are_read_so(pipeline: TextPipeline) -> None:
-    spec = pipeline.spec.model_copy(update={"plain_action": True})
-    plain = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+    plain = plain_pipeline(pipeline)
     prompt = "The waiter takes a bow"
     (as_written,), (read,) = pipeline.explain([prompt]), plain.explain([prompt])
     assert (as_written.graph.text, as_written.rewrite_reason) == (prompt, None)
@@ -84,8 +109,7 @@ def test_where_the_reader_knows_another_encoder_the_words_decide(
     pipeline: TextPipeline, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prompts = ["The waiter takes a bow", "A young deer hunter hunkers low in the tall grass"]
-    spec = pipeline.spec.model_copy(update={"plain_action": True})
-    plain = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+    plain = plain_pipeline(pipeline)
     assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "a person crouches,"]
     monkeypatch.setattr(action_reader(), "encoder_sha256", "0" * 64)
     assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "A young deer hunte"]

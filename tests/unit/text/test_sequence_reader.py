@@ -23,6 +23,7 @@ from marey.text.sequence_reader import (
     SequenceReader,
     in_order,
     sequence_reader,
+    way_to_a_stop,
     without_joints,
 )
 from marey.vocabulary.entries import load_vocabulary
@@ -115,7 +116,7 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) ->
     prompt = "she bows low, then strolls off"
     (features,) = reading.features([prompt])
     assert [each.prompt for each in features.movements] == ["she bows low", "strolls off"]
-    assert features.movements[1].rewritten == "a person walks, strolls off"
+    assert features.movements[1].rewritten == "a person walks, a person strolls off"
     assert features.rewritten == prompt
     (parsed,) = reading.explain([prompt])
     assert parsed.to_json()["movements"] == [each.rewritten for each in features.movements]
@@ -124,6 +125,29 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) ->
     assert "movements" not in TextSpec().model_dump()
     with pytest.raises(ValueError, match="needs plain_action"):
         TextSpec(movements=True)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "way"),
+    [
+        ("he walks up to the door and stops", "he walks up to the door"),
+        ("jog to a stop", "jog"),
+        ("She sprints, then comes to a sudden halt.", "She sprints"),
+        ("a man walks on, stops dead", "a man walks on"),
+        ("walk until she stands still", "walk"),
+        ("he walks to the bus stop", ""),
+        ("walks on without stopping", ""),
+        ("he stops and waves", ""),
+    ],
+)
+def test_the_way_to_a_stop(prompt: str, way: str) -> None:
+    assert way_to_a_stop(prompt) == way
+
+
+def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> None:
+    walks, waves = reading.features(["a person walks forward and stops", "a man waves and stops"])
+    assert [each.rewritten for each in walks.movements] == ["a person walks forward", "a person stands still"]
+    assert waves.movements == ()
 
 
 def test_one_action_is_one_text(reading: TextPipeline) -> None:

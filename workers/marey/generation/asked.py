@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
-from marey.generation.turned import turned_features
+from marey.generation.turned import NEAR, turned_features
 from marey.items.values import MAX_SECONDS
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
@@ -182,10 +182,13 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
 
 
 def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
-    """Return True if only the mirror image matches the prompt, or both or neither does, and the other limb acts than
-    the one that the prompt names."""
+    """Return True if the motion turns to the other side, or only the mirror image matches the prompt, or both or
+    neither does, and the other limb acts than the one that the prompt names."""
     if layout.skeleton.name != HUMANML3D.name or len(features) < SHORTEST:
         return False
+    if wish.side and wish.turn is not None and (wish.turn.least or wish.turn.whole):
+        turn = _turn(features, layout)
+        return abs(turn) > NEAR and (turn < 0) == (wish.side == "left")
     joints = layout.decode(features)
     as_made, mirrored = (
         match_joints(each, layout.skeleton, layout.fps, wish.steps) or 0.0
