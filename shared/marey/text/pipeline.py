@@ -226,7 +226,8 @@ class TextPipeline:
         """Return the features of each movement of a sequence, which is one action."""
         graphs = self._graphs([each.worded for each in movements])
         return tuple(
-            self._features(each.text, graph, (graph.text,)) for each, graph in zip(movements, graphs, strict=True)
+            replace(self._features(each.text, graph, (graph.text,)), seconds=each.seconds)
+            for each, graph in zip(movements, graphs, strict=True)
         )
 
     def _readings(self, texts: Sequence[str]) -> list[_Reading]:

@@ -28,7 +28,7 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 1
+VERSION = 2
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
 """Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
@@ -73,7 +73,8 @@ _JOINING = re.compile(
 
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
-STILL = "stands still"
+STILL, REST_S = "stands upright and breathes calmly, arms hanging", 2.0
+"""What a stop is read as, in words after which `hgm3-open` stands on both feet with its arms down, and its seconds."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to))*\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -90,10 +91,12 @@ class ReadMovement:
     Attributes:
         text: its words, without those that join it to others.
         action: id of its action in the vocabulary; None = none, in doubt, or several at once.
+        seconds: that it lasts; None = the model decides.
     """
 
     text: str
     action: str | None
+    seconds: float | None = None
 
     @property
     def worded(self) -> str:
@@ -148,7 +151,7 @@ class SequenceReader(Reader):
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
         if action in WAYS and (way := way_to_a_stop(prompt)):
-            return ReadMovement(way, action), ReadMovement(STILL, STANDING)
+            return ReadMovement(way, action), ReadMovement(STILL, STANDING, REST_S)
         groups = in_order(self._clauses(prompt, encoding, pooled))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
@@ -157,7 +160,10 @@ class SequenceReader(Reader):
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
-        return tuple(_risen_from_there(map(_movement, groups)))
+        found = list(_risen_from_there(map(_movement, groups)))
+        if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(prompt):
+            found[-1] = ReadMovement(STILL, STANDING, REST_S)
+        return tuple(found)
 
     def _clauses(
         self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]

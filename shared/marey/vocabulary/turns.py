@@ -76,13 +76,14 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
     found = set(table.angles(text))
     if is_way and not found and not table.turning.intersection(_WORDS.findall(text)):
         return Turn()
-    if len(found) > 1 or (is_way and not found):
+    if len(found) > 1 or (not found and not usual):
         return None
     even = action != "turn-around" and action != "jump-turn" and _CIRCLES.search(text) is not None
     if found:
         angle = found.pop()
         return Turn(angle, angle, even)
-    return Turn(*table.extent(text, usual or (0.0, STRAIGHT)), even)
+    low, high = table.extent(text, usual or (0.0, STRAIGHT))
+    return Turn(low, high, even)
 
 
 def stated_spins(prompt: str) -> int | None:
@@ -96,7 +97,7 @@ def stated_spins(prompt: str) -> int | None:
 class _Table:
     """What `turns.toml` holds."""
 
-    usual: dict[str, tuple[float, float]]
+    usual: dict[str, tuple[float, ...]]
     ways: frozenset[str]
     turning: frozenset[str]
     phrases: tuple[tuple[float, re.Pattern[str]], ...]
@@ -112,7 +113,7 @@ class _Table:
             named = [angle for angle, pattern in self.phrases if pattern.search(text)]
             yield from named or ([WHOLE] if self.round.search(text) else [])
 
-    def extent(self, text: str, usual: tuple[float, float]) -> tuple[float, float]:
+    def extent(self, text: str, usual: tuple[float, ...]) -> tuple[float, ...]:
         """Return the degrees of a turn whose words name none, by the first extent that they speak of."""
         return next((degrees for degrees, pattern in self.extents if pattern.search(text)), usual)
 
@@ -121,7 +122,7 @@ class _Table:
 def _table() -> _Table:
     table: dict[str, Any] = tomllib.loads(_FILE.read_text("utf-8"))
     return _Table(
-        usual={action: (float(low), float(high)) for action, (low, high) in table["actions"].items()},
+        usual={action: tuple(map(float, bounds)) for action, bounds in table["actions"].items()},
         ways=frozenset(table["ways"]["actions"].split()),
         turning=frozenset(table["ways"]["turning"].split()),
         phrases=tuple((float(angle), _any_of(phrases)) for angle, phrases in table["degrees"].items()),

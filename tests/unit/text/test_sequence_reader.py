@@ -18,6 +18,8 @@ from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
     CONTEXT,
     MOST_CUTS,
+    REST_S,
+    STILL,
     ReadClause,
     ReadMovement,
     SequenceReader,
@@ -146,7 +148,11 @@ def test_the_way_to_a_stop(prompt: str, way: str) -> None:
 
 def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> None:
     walks, waves = reading.features(["a person walks forward and stops", "a man waves and stops"])
-    assert [each.rewritten for each in walks.movements] == ["a person walks forward", "a person stands still"]
+    assert [each.rewritten for each in walks.movements] == [
+        "a person walks forward",
+        f"a person stands still, a person {STILL}",
+    ]
+    assert [each.seconds for each in walks.movements] == [None, REST_S]
     assert waves.movements == ()
 
 

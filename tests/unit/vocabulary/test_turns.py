@@ -54,7 +54,13 @@ def test_extents_without_degrees(prompt: str, action: str, bounds: tuple[float, 
 
 @pytest.mark.parametrize(
     ("prompt", "action"),
-    [("he wanders about", "walk"), ("run to the left", "run"), ("bows 90 degrees", "bow"), ("zigzag run", "run")],
+    [
+        ("he wanders about", "walk"),
+        ("run to the left", "run"),
+        ("bows 90 degrees", "bow"),
+        ("zigzag run", "run"),
+        ("jump around", "jump-turn"),
+    ],
 )
 def test_what_turns_as_it_comes(prompt: str, action: str) -> None:
     assert stated_turn(prompt, action) is None

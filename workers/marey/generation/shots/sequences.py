@@ -57,8 +57,10 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
 
 
 def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> int | None:
-    """Return the frames of a movement that its words state; None = they do not, or the prompt has a length out of the
-    range of the bundle."""
+    """Return the frames of a movement that its words state, or its reader; None = they do not, or the prompt has a
+    length out of the range of the bundle."""
+    if movement.seconds is not None:
+        return limits.within(round(movement.seconds * limits.fps))
     whole, own = stated_length(request.text.prompt), stated_length(movement.prompt).seconds
     used = whole.is_partial or whole.within(limits.min_frames / limits.fps, limits.max_frames / limits.fps)
     return limits.within(round(own * limits.fps)) if used and own is not None else None
