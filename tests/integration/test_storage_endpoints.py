@@ -12,7 +12,7 @@ from pydantic import SecretStr
 
 from marey.core.errors import InvalidInput, Unreachable
 from marey.core.settings import Settings
-from marey.core.tls import trusting_context
+from marey.core.tls import context_for, trusting_context
 from marey.storage import open_store
 from marey.storage.s3 import S3Options, S3Store
 from tests.servers.receiver import Authority
@@ -53,6 +53,22 @@ def test_signed_urls_have_the_public_scheme_and_host(swift: Swift, front: TlsFro
         answer = client.get(signed)
     assert answer.content == CONTENT
     assert front.connections == 1
+
+
+def test_a_client_of_an_http_server_reads_authorities_at_its_first_tls_connection(
+    swift: Swift, front: TlsFront, authority: Authority, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("SSL_CERT_FILE", "SSL_CERT_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    url = f"https://localhost:{front.port}/"
+    with httpx2.Client(verify=context_for("http://localhost")) as client:
+        assert client.get(f"http://{swift.endpoint}/").status_code
+        monkeypatch.setenv("SSL_CERT_FILE", str(authority.file))
+        assert client.get(url).status_code
+    monkeypatch.delenv("SSL_CERT_FILE")
+    client = httpx2.Client(verify=context_for("http://localhost"))
+    with client, pytest.raises(httpx2.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
+        client.get(url)
 
 
 def test_the_store_may_be_reached_by_https_inside_and_http_outside(

@@ -19,7 +19,7 @@ from marey.client.retries import RequestRetries
 from marey.client.server_address import Server, ca_file
 from marey.core import tracing
 from marey.core.errors import InvalidInput, MareyError, Unreachable
-from marey.core.tls import trusting_context
+from marey.core.tls import context_for
 
 SUBMIT_BUSY_SECONDS = 900.0
 """Seconds to wait in all for a server that is busy with submits: it reads large ones one after the other."""
@@ -55,7 +55,7 @@ class Transport:
                 base_url=server.url,
                 headers={"Authorization": f"Bearer {server.key}"},
                 timeout=httpx2.Timeout(timeout, connect=5.0),
-                verify=trusting_context(ca_file()),
+                verify=context_for(server.url, ca_file()),
                 trust_env=not server.is_here,
             )
         except (httpx2.InvalidURL, ValueError, ImportError) as error:

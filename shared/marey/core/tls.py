@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import ssl
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from marey.core.errors import InvalidInput
 
@@ -40,6 +42,43 @@ def trusting_context(ca_file: Path | None = None) -> ssl.SSLContext:
             hint = "It names the PEM file of a certificate authority."
             raise InvalidInput(message, where=VARIABLE, hint=hint) from error
     return context
+
+
+def context_for(url: str, ca_file: Path | None = None) -> ssl.SSLContext:
+    """Return `trusting_context` for a client of a server, which may name files of another server.
+
+    Of plain HTTP it reads the machine's authorities at the first connection by TLS, if there is one: they take longer
+    than many a command.
+
+    Raises:
+        InvalidInput: as `trusting_context`; of plain HTTP for the file of `SSL_CERT_FILE` at that connection.
+    """
+    is_late = ca_file is None and not url.startswith("https")
+    return LateContext(ssl.PROTOCOL_TLS_CLIENT) if is_late else trusting_context(ca_file)
+
+
+class LateContext(ssl.SSLContext):
+    """A `trusting_context` that reads the authorities at its first connection; itself it trusts none."""
+
+    _protocols: tuple[str, ...] = ()
+
+    @cached_property
+    def _trusting(self) -> ssl.SSLContext:
+        context = trusting_context()
+        context.set_alpn_protocols(self._protocols)
+        return context
+
+    def set_alpn_protocols(self, alpn_protocols: Any) -> None:
+        """Set the protocols that connections offer; clients do so before the first."""
+        self._protocols = tuple(alpn_protocols)
+
+    def wrap_socket(self, *args: Any, **options: Any) -> ssl.SSLSocket:
+        """Return a connection by TLS on a socket."""
+        return self._trusting.wrap_socket(*args, **options)
+
+    def wrap_bio(self, *args: Any, **options: Any) -> ssl.SSLObject:
+        """Return a connection by TLS on buffers."""
+        return self._trusting.wrap_bio(*args, **options)
 
 
 def verification_error(error: BaseException) -> str | None:
