@@ -12,13 +12,16 @@ import gc
 import itertools
 import os
 import shutil
+import ssl
 import tempfile
 import tomllib
 from collections.abc import Iterator
 from contextlib import nullcontext
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
+import httpx2._transports.default
 import psycopg
 import pytest
 import sqlalchemy as sa
@@ -51,6 +54,25 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 """Tests run in several processes, which share the cores already; those of more threads set their number."""
 typer.testing._get_command = functools.cache(typer.main.get_command)  # pyright: ignore[reportPrivateImportUsage]
 """`CliRunner` builds all commands anew for each that it invokes: a tenth of a second."""
+
+
+_context = httpx2.create_ssl_context
+
+
+@functools.cache
+def _authorities(_file: str | None, _folder: str | None, trust_env: bool) -> ssl.SSLContext:
+    return _context(trust_env=trust_env)
+
+
+def _shared_context(verify: Any = True, cert: Any = None, trust_env: bool = True) -> ssl.SSLContext:
+    if verify is True and cert is None:
+        return _authorities(os.environ.get("SSL_CERT_FILE"), os.environ.get("SSL_CERT_DIR"), trust_env)
+    return _context(verify, cert, trust_env)
+
+
+httpx2._transports.default.create_ssl_context = _shared_context  # pyright: ignore[reportPrivateImportUsage]
+"""Each of the tests' own clients reads the machine's authorities anew: a twentieth of a second, thousands of times. The
+product's clients bring contexts of their own."""
 
 
 FEW_EXAMPLES = 40
