@@ -8,11 +8,13 @@ import pytest
 import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 
 from marey.core.errors import Conflict
-from marey.db import check_revision, create_engine, downgrade, upgrade
+from marey.db import check_revision, create_engine, downgrade, migrate, upgrade
 from marey.migrations.tables import metadata
 from tests.servers.jobs import submit_items
+from tests.support.marey import MIGRATIONS
 
 
 def things_in(engine: sa.Engine) -> dict[str, list[str]]:
@@ -50,6 +52,11 @@ def test_checks_generated_columns_and_indexes_are_those_in_the_code(engine: sa.E
         coded = [tuple(row) for row in conn.execute(query)]
     assert coded == migrated
     assert len(coded) > 60
+
+
+def test_the_names_of_the_scripts_give_their_revisions() -> None:
+    scripts = list(ScriptDirectory(str(MIGRATIONS)).walk_revisions())[::-1]
+    assert migrate.revisions() == [script.revision for script in scripts]
 
 
 def test_down_leaves_nothing_and_up_again_makes_the_same(engine: sa.Engine) -> None:

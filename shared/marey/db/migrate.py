@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import psycopg
 import sqlalchemy as sa
-from alembic import command
-from alembic.config import Config
-from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 
 from marey.core.errors import Conflict, Unreachable
 from marey.core.versions import check_postgres
 from marey.db.database import transaction
 from marey.db.deadlines import MIGRATION
+
+if TYPE_CHECKING:
+    from alembic.config import Config
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
 LOCK_SECONDS = 3.0
@@ -36,7 +35,7 @@ def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATI
             its server is too old.
         Unreachable: the database does not answer.
     """
-    _migrate(engine, command.upgrade, revision, patience)
+    _migrate(engine, "upgrade", revision, patience)
 
 
 def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -> None:
@@ -46,15 +45,18 @@ def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -
         Conflict: another transaction locked a table for `patience` seconds, or the database is of a newer version.
         Unreachable: the database does not answer.
     """
-    _migrate(engine, command.downgrade, revision, patience)
+    _migrate(engine, "downgrade", revision, patience)
 
 
-def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: str, patience: float) -> None:
+def _migrate(engine: sa.Engine, move: Literal["upgrade", "downgrade"], revision: str, patience: float) -> None:
+    from alembic import command  # few processes migrate, and all import this module
+    from alembic.util import CommandError
+
     until = time.monotonic() + patience
     while True:
         try:
             with transaction(engine, MIGRATION) as conn:
-                move(_config(conn), revision)
+                getattr(command, move)(_config(conn), revision)
             return
         except Unreachable as error:
             if not isinstance(getattr(error.__cause__, "orig", None), psycopg.errors.LockNotAvailable):
@@ -88,15 +90,18 @@ def check_revision(engine: sa.Engine) -> None:
         table, version = conn.execute(sa.select(sa.func.to_regclass("alembic_version"), VERSION)).one()
         check_postgres(version)
         found = table and conn.execute(sa.text("SELECT version_num FROM alembic_version")).scalar_one_or_none()
-    scripts = ScriptDirectory(str(_folder()))
-    newest = scripts.get_current_head()
-    older = {script.revision for script in scripts.walk_revisions()} - {newest}
+    *older, newest = revisions()
     if found is None or found in older:
         raise Conflict(
             f"the database is at revision {found or 'none'}, this version of Marey needs {newest}",
             where="database",
             hint="Run `marey admin migrate`.",
         )
+
+
+def revisions() -> list[str]:
+    """Return all revisions, oldest first: the name of each script begins with its own."""
+    return sorted(script.name.partition("_")[0] for script in (_folder() / "versions").glob("[0-9]*_*.py"))
 
 
 def _folder() -> Path:
@@ -107,6 +112,8 @@ def _folder() -> Path:
 
 
 def _config(conn: sa.Connection) -> Config:
+    from alembic.config import Config
+
     check_postgres(conn.execute(sa.select(VERSION)).scalar_one())
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
     conn.execute(sa.text(f"SET LOCAL lock_timeout = {int(LOCK_SECONDS * 1000)}"))
