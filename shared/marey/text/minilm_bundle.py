@@ -41,7 +41,7 @@ def load_weights(bundle: Bundle) -> dict[str, Tensor]:
         InvalidBundle: the bundle is damaged, or does not hold six layers of width 384.
     """
     restored = restore(bundle.tensors(PART), where=str(bundle.path))
-    weights = {name: torch.as_tensor(value.astype(np.float32)) for name, value in restored.items()}
+    weights = {name: torch.as_tensor(np.require(value, np.float32, "W")) for name, value in restored.items()}
     _check(weights, bundle.path)
     return weights
 
