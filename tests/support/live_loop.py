@@ -124,4 +124,4 @@ class Studio:
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < deadline, f"{what} did not come in {PATIENCE:g} s"
-            time.sleep(0.02)
+            time.sleep(0.05)
