@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tokenize
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -182,18 +182,18 @@ class Finding:
 
 def check_source(source: str, path: Path) -> list[Finding]:
     """Return the findings of one file, by line."""
-    tree = ast.parse(source)
-    found = [*_check_docstrings(tree, path), *_check_names(tree, path), *_check_comments(source, path)]
+    nodes = list(ast.walk(ast.parse(source)))
+    found = [*_check_docstrings(nodes, path), *_check_names(nodes, path), *_check_comments(source, path)]
     if not path.is_relative_to("tests"):
-        found += _check_messages(tree, path)
+        found += _check_messages(nodes, path)
     if path.stem in MODULES:
         found.append(Finding(path, 1, f"module {path.stem!r}: use {MODULES[path.stem]!r}"))
     return sorted(found, key=lambda finding: finding.line)
 
 
-def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
+def _docstrings(nodes: Sequence[ast.AST]) -> Iterator[ast.Constant]:
     """Yield docstrings of modules, classes, functions, and of the attributes that they follow."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         for index, statement in enumerate(node.body):
@@ -204,8 +204,8 @@ def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
                 yield statement.value
 
 
-def _check_docstrings(tree: ast.Module, path: Path) -> Iterator[Finding]:
-    for node in _docstrings(tree):
+def _check_docstrings(nodes: Sequence[ast.AST], path: Path) -> Iterator[Finding]:
+    for node in _docstrings(nodes):
         text = str(node.value).strip()
         first = re.match(r"\w+", text)
         if first and first.group() in FIRST_WORDS:
@@ -215,8 +215,8 @@ def _check_docstrings(tree: ast.Module, path: Path) -> Iterator[Finding]:
             yield Finding(path, node.lineno + text.count("\n", 0, word.start()), _replaced(word.group()))
 
 
-def _check_names(tree: ast.Module, path: Path) -> Iterator[Finding]:
-    for node in ast.walk(tree):
+def _check_names(nodes: Sequence[ast.AST], path: Path) -> Iterator[Finding]:
+    for node in nodes:
         names: list[str] = []
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             names = [node.name]
@@ -228,16 +228,18 @@ def _check_names(tree: ast.Module, path: Path) -> Iterator[Finding]:
 
 
 def _check_comments(source: str, path: Path) -> Iterator[Finding]:
+    if not any(_WORD.search(line) for line in source.splitlines() if "#" in line):
+        return  # most files: reading their tokens takes longer than all else
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
             for word in _WORD.finditer(token.string):
                 yield Finding(path, token.start[0], _replaced(word.group()))
 
 
-def _check_messages(tree: ast.Module, path: Path) -> Iterator[Finding]:
+def _check_messages(nodes: Sequence[ast.AST], path: Path) -> Iterator[Finding]:
     """Check strings that users read: of errors, log lines, options and fields."""
     lines: dict[tuple[int, int], ast.Constant] = {}
-    for node in ast.walk(tree):
+    for node in nodes:
         for text in _read_by_users(node):
             for part in ast.walk(text):
                 if isinstance(part, ast.Constant) and isinstance(part.value, str):
