@@ -74,7 +74,7 @@ _JOINING = re.compile(
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
 STILL, REST_S = "stands upright and breathes calmly, arms hanging", 2.0
-"""What a stop is read as, in words after which `hgm3-open` stands on both feet with its arms down, and its seconds."""
+"""A stop is read as this, in words after which `hgm3-open` stands on both feet with its arms down, and its seconds."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to))*\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?

@@ -95,7 +95,7 @@ def stated_spins(prompt: str) -> int | None:
 
 @dataclass(frozen=True)
 class _Table:
-    """What `turns.toml` holds."""
+    """Contents of `turns.toml`."""
 
     usual: dict[str, tuple[float, ...]]
     ways: frozenset[str]

@@ -84,7 +84,7 @@ def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generato
 
 def trembling(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
     """Return joints that tremble, the hands most; the feet stand."""
-    del count  # nobody trembles a number of times
+    del count  # trembling has no number
     time = np.arange(len(joints)) / fps
     edge = np.minimum(time, time[-1] - time) / EDGE_S
     strength, rate = smoothstep(np.clip(edge, 0.0, 1.0)), rng.uniform(*SHAKE_HZ)
@@ -99,4 +99,4 @@ def trembling(joints: Array, fps: float, count: int | None, rng: np.random.Gener
 
 
 FINE: Mapping[str, Draw] = {"nod": nodded, "shiver": trembling}
-"""What is drawn, by action."""
+"""Small movements by action."""
