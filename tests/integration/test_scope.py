@@ -50,7 +50,7 @@ def items(http: httpx2.Client, job: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def test_a_submit_warns_of_what_the_model_does_not_know_and_stores_each_scope(http: httpx2.Client) -> None:
-    job = submit(http, "a person walks", "she sprints", "he kicks twice", NONSENSE)
+    job = submit(http, "a person walks", "she sprints", "he kicks, then kicks again", NONSENSE)
     assert job["scope"] == "warn"
     assert {name: job["scope_report"][name] for name in ("known", "close", "tried", "unknown", "unlisted")} == {
         "known": 1, "close": 1, "tried": 1, "unknown": 1, "unlisted": 0,

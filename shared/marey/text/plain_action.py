@@ -32,21 +32,26 @@ def with_subject(prompt: str) -> str:
 
     Captions have subjects. Behind the plain words of its action, "a person bows, bows deeply" is two bows.
     """
-    words = _WORD.findall(prompt)
-    first = next((word for word in words if not word.lower().endswith("ly")), "")
-    begins = prompt.startswith(words[0]) if words else False
-    if not begins or first.lower() not in _third_persons():
+    words = _WORD.findall(prompt.lower())
+    first, after = ([word for word in words if not word.endswith("ly")] + ["", ""])[:2]
+    people = first.removesuffix("s") in load_word_lists().people and after in _verbs()  # "guards patrol the gate"
+    if not words or not prompt.lower().startswith(words[0]) or first not in _third_persons() or people:
         return prompt
     return f"{DEFAULT_SUBJECT} {_lowered(prompt)}"
+
+
+@lru_cache(maxsize=1)
+def _verbs() -> frozenset[str]:
+    """Return the base forms of all verbs that are known."""
+    phrases = [phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near)]
+    return frozenset(phrase.split()[0] for phrase in (*phrases, *load_word_lists().other_verbs))
 
 
 @lru_cache(maxsize=1)
 def _third_persons() -> frozenset[str]:
     """Return the forms with -s of all verbs that are known, but for those that are parts of the body, too: "arms"."""
     lists = load_word_lists()
-    phrases = (phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near))
-    verbs = {phrase.split()[0] for phrase in phrases} | {phrase.split()[0] for phrase in lists.other_verbs}
-    return frozenset(third_person(verb) for verb in verbs if verb.isalpha()) - lists.body_parts - lists.uncounted
+    return frozenset(third_person(verb) for verb in _verbs() if verb.isalpha()) - lists.body_parts - lists.uncounted
 
 
 def with_plain_action(prompt: str, action: str | None) -> str:

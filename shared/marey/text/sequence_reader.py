@@ -76,7 +76,7 @@ WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 STILL, REST_S = "stands upright and breathes calmly, arms hanging", 2.0
 """A stop is read as this, in words after which `hgm3-open` stands on both feet with its arms down, and its seconds."""
 _STOP = re.compile(
-    r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to))*\s
+    r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
     (?:sudden(?:ly)?\s|abrupt(?:ly)?\s|complete\s|full\s|dead\s)?
     (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",

@@ -16,7 +16,7 @@ from marey.storage.s3 import S3Store
 from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import Swift
 
-DEADLINE = 1.0
+DEADLINE = 2.0
 LARGE = hashlib.shake_128(b"marey").digest(3 << 20)
 
 

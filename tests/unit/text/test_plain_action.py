@@ -41,6 +41,8 @@ def plain_pipeline(pipeline: TextPipeline, **more: bool) -> TextPipeline:
         ("bows deeply", "bow", "a person bows deeply"),
         ("Slowly takes a bow", "bow", "a person bows, a person slowly takes a bow"),
         ("arms up", "raise-arm", "a person raises an arm, arms up"),
+        ("guards the door", "block", "a person blocks an attack, a person guards the door"),
+        ("guards walk to the door", "walk", "a person walks, guards walk to the door"),
     ],
 )
 def test_it_comes_before_the_prompt(prompt: str, action: str | None, read: str) -> None:
