@@ -38,16 +38,24 @@ class Course:
     places: Array = field(repr=False)
     headings: Array = field(repr=False)
 
+    @property
+    def turn(self) -> float:
+        """Degrees from the first frame to the last, positive to the left."""
+        return float(np.degrees(self.headings[-1] - self.headings[0]))
+
     def speeds(self, fps: float) -> Array:
         """Return metres a second (T,)."""
         return np.linalg.norm(gradient(self.places), axis=1) * fps
 
     def straight(self) -> Course:
         """Return a course in which the body keeps the heading of frame 0, and moves as it does from its heading."""
-        turns = self.headings - self.headings[0]
-        steps = turned(np.diff(self.places, axis=0), -0.5 * (turns[1:] + turns[:-1]))
-        places = self.places[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-        return Course(places, np.full(len(turns), self.headings[0]))
+        return self.facing(np.full(len(self.headings), self.headings[0]))
+
+    def facing(self, headings: Array) -> Course:
+        """Return a course with other headings (T,), in which the body moves as it does from its heading."""
+        change = headings - self.headings
+        steps = turned(np.diff(self.places, axis=0), 0.5 * (change[1:] + change[:-1]))
+        return Course(self.places[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)]), headings)
 
     def at(self, times: Array) -> Course:
         """Return the course at other frames (n,)."""

@@ -103,6 +103,12 @@ class PosedLayout(FeatureLayout, Protocol):
         ...
 
 
+def encode_all(layout: FeatureLayout, joints: Array) -> Float32:
+    """Encode a motion (T, J, 3) as features (T, D): those of a frame hold the step to the next, so the last step is
+    repeated."""
+    return layout.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+
+
 def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
     """Canonicalize a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
 

@@ -67,7 +67,7 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
         action: its id.
     """
     table = _table()
-    text = " ".join(prompt.lower().replace("’", "'").split())
+    text = _plain(prompt)
     is_way, usual = action in table.ways, table.usual.get(action)
     if action == "spin":
         return Turn(whole=True)
@@ -76,19 +76,21 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
     found = set(table.angles(text))
     if is_way and not found and not table.turning.intersection(_WORDS.findall(text)):
         return Turn()
-    if len(found) > 1 or (not found and not usual):
+    if len(found) > 1:
         return None
     even = action != "turn-around" and action != "jump-turn" and _CIRCLES.search(text) is not None
     if found:
         angle = found.pop()
         return Turn(angle, angle, even)
-    low, high = table.extent(text, usual or (0.0, STRAIGHT))
+    if not usual:
+        return None
+    low, high = table.extent(text, usual)
     return Turn(low, high, even)
 
 
 def stated_spins(prompt: str) -> int | None:
     """Return how many whole turns a prompt asks for by an angle: two of "spins 720 degrees"; None = it names none."""
-    found = set(_table().angles(" ".join(prompt.lower().split())))
+    found = set(_table().angles(_plain(prompt)))
     angle = found.pop() if len(found) == 1 else 0.0
     return int(angle // WHOLE) if angle and angle % WHOLE == 0 else None
 
@@ -129,6 +131,10 @@ def _table() -> _Table:
         extents=tuple((tuple(each["degrees"]), _any_of(each["phrases"])) for each in table["extents"].values()),
         round=_any_of(table["round"]["phrases"]),
     )
+
+
+def _plain(prompt: str) -> str:
+    return " ".join(prompt.lower().replace("’", "'").split())
 
 
 def _any_of(phrases: list[str]) -> re.Pattern[str]:

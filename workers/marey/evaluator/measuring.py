@@ -23,7 +23,7 @@ from marey.evaluator.shots import RowReading, constraints_of, rows_of
 from marey.items.expected import read_expected
 from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip, parse_npz
-from marey.motion.features import FeatureLayout, PosedLayout, layout
+from marey.motion.features import FeatureLayout, PosedLayout, encode_all, layout
 from marey.motion.resample import resample
 from marey.motion.rotations import conjugate, multiply
 from marey.quality.constraints import ConstraintError
@@ -215,7 +215,7 @@ def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
         onward = multiply(multiply(turns[-1:], conjugate(turns[-2:-1])), turns[-1:])
         return space.encode_pose(np.concatenate([turns, onward]), np.concatenate([root, 2 * root[-1:] - root[-2:-1]]))
     joints = scale * np.asarray(clip.joints, np.float64)
-    return space.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+    return encode_all(space, joints)
 
 
 def _read(

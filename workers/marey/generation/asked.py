@@ -25,12 +25,11 @@ from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import SHOWN
 from marey.selector.limbs import NamedLimb, limb_of
-from marey.selector.matching import Step, wanted_of
+from marey.selector.matching import TURNING, WAYS, Step, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
-from marey.text.plain_action import TURNING
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.paces import stated_pace
@@ -40,7 +39,7 @@ Float32 = NDArray[np.float32]
 
 SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.4}
 """How many times as fast a motion is played as the network made it, by the pace that its prompt names."""
-LEARNED = frozenset({"walk", "run", "sprint"})
+LEARNED = WAYS
 """Actions whose pace the network reads from the prompt itself; it has learned them at many."""
 FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
 """Actions whose pace gravity decides."""
@@ -125,7 +124,7 @@ def _one_action(steps: Sequence[Step]) -> str:
     """Return the id of the only action; a way before a turn ("walks ahead and then changes direction") is part of it.
     Empty if there are several or none."""
     named = {each.action for step in steps for each in step}
-    if TURNING in named and named <= LEARNED | {TURNING}:
+    if TURNING in named and named <= WAYS | {TURNING}:
         return TURNING
     return named.pop() if len(named) == 1 == len(steps) else ""
 
@@ -212,8 +211,7 @@ def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
 
 def _turn(features: Float32, layout: FeatureLayout) -> float:
     """Return the degrees by which a motion turns, positive to the left."""
-    headings = natural_course(layout.decode(features), layout.skeleton, layout.fps).headings
-    return float(np.degrees(headings[-1] - headings[0]))
+    return natural_course(layout.decode(features), layout.skeleton, layout.fps).turn
 
 
 def _repetitions(joints: NDArray[np.floating], fps: float, action: str) -> Sequence[Repetition]:

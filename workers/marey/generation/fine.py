@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.features import FeatureLayout
+from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, from_rotvec, rotate
@@ -52,8 +52,7 @@ def drawn_features(
     joints = layout.decode(features).astype(np.float64)
     if len(joints) < 2 * (2 * EDGE_S) * layout.fps:
         return None
-    drawn = FINE[action](joints, layout.fps, count, np.random.default_rng([seed, len(action)]))
-    return layout.encode(np.concatenate([drawn, 2 * drawn[-1:] - drawn[-2:-1]]))
+    return encode_all(layout, FINE[action](joints, layout.fps, count, np.random.default_rng([seed, len(action)])))
 
 
 def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.bones import bone_fit
-from marey.motion.courses import Course, bent, natural_course, turned
-from marey.motion.features import FeatureLayout
+from marey.motion.courses import Course, bent, natural_course
+from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.feet import find_contacts
 from marey.motion.filters import smoothstep
 from marey.motion.kinematics import forward_kinematics
@@ -44,7 +44,7 @@ def turned_features(features: Float32, layout: FeatureLayout, turn: Turn, side: 
     """
     joints = layout.decode(features).astype(np.float64)
     natural = natural_course(joints, layout.skeleton, layout.fps)
-    made = float(np.degrees(natural.headings[-1] - natural.headings[0]))
+    made = natural.turn
     wanted = turn.of(made)
     if abs(abs(made) - wanted) <= NEAR and not turn.even:
         return None
@@ -52,7 +52,7 @@ def turned_features(features: Float32, layout: FeatureLayout, turn: Turn, side: 
     headings = _headings(natural.headings, math.radians(sign * wanted), layout.fps, even=turn.even)
     if headings is None:
         return None
-    return layout.encode(_going_on(_along(joints, layout, natural, headings))), made
+    return encode_all(layout, _along(joints, layout, natural, natural.facing(headings))), made
 
 
 def _headings(headings: Array, wanted: float, fps: float, *, even: bool) -> Array | None:
@@ -74,18 +74,10 @@ def _headings(headings: Array, wanted: float, fps: float, *, even: bool) -> Arra
     return headings[0] + share * turns + missing * added
 
 
-def _along(joints: Array, layout: FeatureLayout, natural: Course, headings: Array) -> Array:
-    """Return joints (T, J, 3) of a motion with other headings (T,), which goes its way as before from its own view."""
+def _along(joints: Array, layout: FeatureLayout, natural: Course, wanted: Course) -> Array:
+    """Return joints (T, J, 3) of a motion bent to another course than its own."""
     skeleton, fps = layout.skeleton, layout.fps
-    change = headings - natural.headings
-    steps = turned(np.diff(natural.places, axis=0), 0.5 * (change[1:] + change[:-1]))
-    places = natural.places[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     pose = solve_pose(bone_fit(skeleton).fit(joints), skeleton, fps=fps, measure=False)
     contacts = find_contacts(joints, skeleton, fps)
-    rotations, root, _ = bent(pose.rotations, pose.root, contacts, natural, Course(places, headings), skeleton, fps)
+    rotations, root, _ = bent(pose.rotations, pose.root, contacts, natural, wanted, skeleton, fps)
     return forward_kinematics(skeleton, rotations, root)
-
-
-def _going_on(joints: Array) -> Array:
-    """Return joints with one frame more, since features hold the steps from each frame to the next."""
-    return np.concatenate([joints, joints[-1:] + (joints[-1:] - joints[-2:-1])])

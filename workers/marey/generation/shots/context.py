@@ -11,7 +11,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.kept import as_tokens
 from marey.motion.body import travel_scale
 from marey.motion.clip import MotionClip
-from marey.motion.features import FeatureLayout
+from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.resample import frame_times, resample
 from marey.motion.rotations import Array, about, rotate
@@ -47,8 +47,7 @@ def model_features(clip: MotionClip, layout: FeatureLayout) -> Float32:
     moving = resample(clip, layout.fps)
     root = moving.root.astype(np.float64) / travel_scale(training, clip.skeleton)
     joints = forward_kinematics(training, moving.rotations.astype(np.float64), root)
-    # Features of a frame hold its way to the next one.
-    return layout.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+    return encode_all(layout, joints)
 
 
 def _difference(given: Skeleton, training: Skeleton) -> str:
