@@ -12,6 +12,7 @@ import gc
 import itertools
 import os
 import shutil
+import signal
 import ssl
 import tempfile
 import tomllib
@@ -44,6 +45,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH")])
 )
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+"""A shell starts what ends in `&` deaf to Ctrl-C, and so would be the commands that tests interrupt."""
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 """A run starts hundreds of processes: each would compile the whole package anew."""
 end_without_collection()

@@ -181,7 +181,7 @@ def test_frames_that_do_not_follow_are_refused_with_the_number_that_would(client
     stream.write(lease, frames(0, 3))
     for first, count in ((4, 1), (2, 3), (1, 1)):
         with pytest.raises(Conflict, match=f"frame {first} does not follow; the next is 3"):
-            stream.write(lease, frames(first, count))
+            stream.write(lease, frames(first, count, prompt=1))
     with pytest.raises(InvalidInput, match="go up by one"):
         stream.write(lease, [*frames(3, 1), *frames(5, 1)])
     assert stream.bounds() == (0, 3)
@@ -195,6 +195,15 @@ def test_a_write_that_is_sent_again_is_written_once(client: redis.Redis) -> None
     assert numbers(stream.reader().read()) == [0, 1, 2]
     with pytest.raises(Conflict, match="does not follow"):
         stream.write(lease, frames(1, 2, prompt=1))  # other frames of the same numbers
+
+
+def test_a_write_whose_answer_was_lost_is_sent_again_with_the_frames_made_since(client: redis.Redis) -> None:
+    stream = new_stream(client)
+    lease = taken(stream)
+    stream.write(lease, frames(0, 2))
+    stream.write(lease, frames(2, 2))  # the writer does not hear of it
+    stream.write(lease, frames(2, 5))
+    assert numbers(stream.reader().read()) == list(range(7))
 
 
 def test_no_frames_are_no_write(client: redis.Redis) -> None:

@@ -58,18 +58,20 @@ if redis.call('GET', KEYS[1]) ~= ARGV[1] then return 0 end
 return redis.call('DEL', KEYS[1])
 """
 
-# The id of the last frame gives the number of the next. The client repeats a write whose answer was lost: the same last
-# frame under the same lease is that write.
+# The id of the last frame gives the number of the next. A write whose answer was lost is repeated, by the client as it
+# was and by the writer with the frames made since: what is stored already is left out. The last of it shows that these
+# are the same frames.
 _WRITE = """
 if redis.call('GET', KEYS[1]) ~= ARGV[1] then return {'lost', 0} end
-local first, count = tonumber(ARGV[4]), #ARGV - 4
+local first, count, stored = tonumber(ARGV[4]), #ARGV - 4, 0
 local last = redis.call('XREVRANGE', KEYS[2], '+', '-', 'COUNT', 1)
 if #last > 0 then
   local next = tonumber(string.match(last[1][1], '^%d+'))
-  if next == first + count and last[1][2][2] == ARGV[#ARGV] then return {'written', next} end
-  if next ~= first then return {'order', next} end
+  stored = next - first
+  if stored < 0 or stored > count then return {'order', next} end
+  if stored > 0 and last[1][2][2] ~= ARGV[4 + stored] then return {'order', next} end
 end
-for i = 1, count do
+for i = stored + 1, count do
   redis.call('XADD', KEYS[2], 'MAXLEN', '=', ARGV[2], string.format('%.0f-0', first + i), 'f', ARGV[4 + i])
 end
 redis.call('PEXPIRE', KEYS[2], ARGV[3])
@@ -184,7 +186,7 @@ class FrameStream:
             return bool(self._release(keys=[self.lease_key], args=[lease.value]))
 
     def write(self, lease: Lease, frames: Sequence[Frame]) -> None:
-        """Append frames, all or none. Idempotent.
+        """Append frames, all or none; of those that are stored already, the others. Idempotent.
 
         Raises:
             LeaseLost: another worker has it, or it expired.

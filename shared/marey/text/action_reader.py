@@ -27,6 +27,8 @@ VECTOR_SCALE, WORD_SCALE = 10.0, 3.0
 """Factors of the sentence vector, whose length is 1, and of the marks of actions that the words name."""
 SURE, SURE_OF_SEVERAL = 0.5, 0.8
 """Probabilities from which on a prompt asks for one action, and does so though its words name several."""
+AGREED = 0.2
+"""Probability from which on it is believed that a prompt asks for the only action that its words name."""
 SEVERAL, OUTSIDE = "several actions", "no action of the vocabulary"
 """Classes behind the actions."""
 
@@ -76,8 +78,8 @@ class ActionReader(Reader):
         scores = weights["out"] @ np.maximum(hidden, 0) + weights["out_bias"]
         shares = np.exp(scores - scores.max())
         best = int(scores.argmax())
-        several = len(load_vocabulary().without_implied(named_actions(prompt)) - {STANDING}) > 1
-        least = SURE_OF_SEVERAL if several else SURE
+        named = load_vocabulary().without_implied(named_actions(prompt)) - {STANDING}
+        least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if named == {self.classes[best]} else SURE
         return ReadAction(self.classes[best], float(shares[best] / shares.sum()), least)
 
 

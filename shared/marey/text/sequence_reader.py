@@ -25,10 +25,11 @@ from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 2
+VERSION = 3
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
 """Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
@@ -73,8 +74,8 @@ _JOINING = re.compile(
 
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
-STILL, REST_S = "stands upright and breathes calmly, arms hanging", 2.0
-"""A stop is read as this, in words after which `hgm3-open` stands on both feet with its arms down, and its seconds."""
+REST_S = 2.0
+"""Seconds of standing that a stop is read as."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -151,7 +152,7 @@ class SequenceReader(Reader):
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
         if action in WAYS and (way := way_to_a_stop(prompt)):
-            return ReadMovement(way, action), ReadMovement(STILL, STANDING, REST_S)
+            return ReadMovement(way, action), _rest()
         groups = in_order(self._clauses(prompt, encoding, pooled))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
@@ -162,7 +163,7 @@ class SequenceReader(Reader):
             return ()
         found = list(_risen_from_there(map(_movement, groups)))
         if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(prompt):
-            found[-1] = ReadMovement(STILL, STANDING, REST_S)
+            found[-1] = _rest()
         return tuple(found)
 
     def _clauses(
@@ -279,6 +280,11 @@ def way_to_a_stop(text: str) -> str:
     stops"; empty if it ends with none."""
     match = _STOP.search(text)
     return text[: match.start()].strip(" ,;") if match is not None else ""
+
+
+def _rest() -> ReadMovement:
+    """Return what a stop is read as: standing, in plain words alone."""
+    return ReadMovement(phrase_in_third_person(load_vocabulary().need(STANDING).plain), STANDING, REST_S)
 
 
 def _is_one_action(names: set[str], action: str | None) -> bool:

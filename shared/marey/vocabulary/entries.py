@@ -102,8 +102,8 @@ class Vocabulary:
 
     def said_first(self, text: str) -> str | None:
         """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
-        words, comma, _ = text.partition(", ")
-        return self._plain.get(words.lower()) if comma else None
+        text = text.lower()
+        return next((name for plain, name in self._plain.items() if text.startswith(f"{plain}, ")), None)
 
     @cached_property
     def _plain(self) -> dict[str, str]:

@@ -205,7 +205,7 @@ class PhraseFinder:
             for name, worth in names:
                 if name in children:
                     yield _Open(children[name], at, at, state.used + worth)
-        if word.text in lists.skipped or word.text.endswith("ly") or word.base == SELF:
+        if self._is_passed_over(word) or word.base == SELF:
             article = word.text in lists.determiners
             yield replace(state, at=at, adjectives=_MAX_ADJECTIVES if article else state.adjectives)
         elif word.text not in lists.breaks:
@@ -216,6 +216,10 @@ class PhraseFinder:
                     yield replace(state, at=at, gap=state.gap + 1)
                 if (wildcard := children.get(WILDCARD)) is not None:
                     yield _Open(wildcard, at, state.end, state.used, gap=1)
+
+    def _is_passed_over(self, word: Word) -> bool:
+        """Return True if a word may stand between those of a phrase: "walks slowly down"."""
+        return word.text in self._lists.skipped or word.text.endswith("ly")
 
     def _is_noun(self, word: Word) -> bool:
         """Return True if a word may be a noun or its adjective."""
@@ -243,7 +247,7 @@ class PhraseFinder:
         single = state.end - start == 1
         if single:
             stands = self.is_verb(words, start)
-        elif state.end - start == 2:
+        elif all(self._is_passed_over(word) for word in words[start + 1 : state.end - 1]):
             of_part = words[start].text in self._lists.limbs and last.text in _AWAY
             stands = not self._leads_to_place(words, start, state.end) and (not of_part or self.is_verb(words, start))
         else:

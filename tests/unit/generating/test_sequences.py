@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import SPEEDS
 from marey.generation.candidates import DrawPlan, best_clips
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.export import finish
+from marey.generation.paced import SPEEDS
 from marey.generation.port import Request
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
 from marey.items.timeline import read_timeline, timeline_rows

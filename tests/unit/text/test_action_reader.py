@@ -12,7 +12,16 @@ from safetensors.numpy import save_file
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
 from marey.referee.prompts import development_prompts
-from marey.text.action_reader import OUTSIDE, SEVERAL, SURE, SURE_OF_SEVERAL, ActionReader, ReadAction, action_reader
+from marey.text.action_reader import (
+    AGREED,
+    OUTSIDE,
+    SEVERAL,
+    SURE,
+    SURE_OF_SEVERAL,
+    ActionReader,
+    ReadAction,
+    action_reader,
+)
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder, shared_pipeline
 
@@ -56,8 +65,14 @@ def test_few_others_are_read_as_one_action() -> None:
 
 
 def test_prompts_whose_words_name_several_actions_must_be_read_surely() -> None:
-    prompts = ["she goes for a stroll", "she strolls ahead, then breaks into a jog", "he stands and waves"]
-    assert [each.least for each in read(prompts)] == [SURE, SURE_OF_SEVERAL, SURE]
+    prompts = ["a guard waits at the door", "she strolls ahead, then breaks into a jog", "he stands and waves"]
+    assert [each.least for each in read(prompts)] == [SURE, SURE_OF_SEVERAL, AGREED]
+
+
+def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
+    (read_as,) = read(["hey could I get a guy just ambling along the pavement, nothing fancy"])
+    assert read_as.action == "walk"
+    assert AGREED <= read_as.probability < SURE
 
 
 def test_in_doubt_it_names_none() -> None:

@@ -12,14 +12,13 @@ from marey.bundles import TextSpec
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
 from marey.referee.prompts import development_prompts
-from marey.text.action_reader import OUTSIDE
+from marey.text.action_reader import OUTSIDE, STANDING
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
     CONTEXT,
     MOST_CUTS,
     REST_S,
-    STILL,
     ReadClause,
     ReadMovement,
     SequenceReader,
@@ -150,7 +149,7 @@ def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> Non
     walks, waves = reading.features(["a person walks forward and stops", "a man waves and stops"])
     assert [each.rewritten for each in walks.movements] == [
         "a person walks forward",
-        f"a person stands still, a person {STILL}",
+        load_vocabulary().need(STANDING).plain_words,
     ]
     assert [each.seconds for each in walks.movements] == [None, REST_S]
     assert waves.movements == ()

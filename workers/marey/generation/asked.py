@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.fine import FINE, drawn_features
+from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
 from marey.generation.turned import NEAR, turned_features
@@ -32,17 +33,10 @@ from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.paces import stated_pace
 from marey.vocabulary.turns import Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
 
-SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.4}
-"""How many times as fast a motion is played as the network made it, by the pace that its prompt names."""
-LEARNED = WAYS
-"""Actions whose pace the network reads from the prompt itself; it has learned them at many."""
-FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
-"""Actions whose pace gravity decides."""
 STRETCHED = (0.6, 1.6)
 """Bounds of the speed at which a motion with another number of repetitions is brought to a length that is fixed."""
 
@@ -79,7 +73,7 @@ class _Wish:
         limb: that acts, on one side; empty = either.
         count: repetitions; None = any number.
         turn: how far the body turns; None = as it comes.
-        speed: in relation to what the network makes.
+        pace: at which it is done.
     """
 
     steps: tuple[Step, ...] | None = None
@@ -87,7 +81,7 @@ class _Wish:
     limb: NamedLimb | None = None
     count: int | None = None
     turn: Turn | None = None
-    speed: float = 1.0
+    pace: AskedPace = field(default_factory=AskedPace)
 
     @classmethod
     def of(cls, request: Request) -> _Wish:
@@ -103,9 +97,8 @@ class _Wish:
         count = stated_count(text.prompt, action) if action in REPETITIONS else None
         if action == "spin":
             count = count or stated_spins(text.prompt)
-        own_pace = action in LEARNED or action in FALLING
-        speed = 1.0 if own_pace else SPEEDS.get(stated_pace(text.prompt), 1.0)
-        return cls(steps, action, limb_of(text.prompt, action), count, stated_turn(text.prompt, action), speed)
+        turn, pace = stated_turn(text.prompt, action), AskedPace.of(text.prompt, action)
+        return cls(steps, action, limb_of(text.prompt, action), count, turn, pace)
 
     @property
     def side(self) -> str:
@@ -115,9 +108,9 @@ class _Wish:
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
         fixed."""
-        if self.speed == 1.0 or request.open or request.frames is None:
+        if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
-        return replace(request, frames=limits.within(round(request.frames * self.speed)))
+        return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
 
 
 def _one_action(steps: Sequence[Step]) -> str:
@@ -164,7 +157,7 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
             features, changes["drawn"] = drawn, wish.action
     if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
         often = repeated(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
-        if often is not None and often is not features and _fits(len(often), fixed, wish.speed, layout.fps):
+        if often is not None and often is not features and _fits(len(often), fixed, wish.pace.share, layout.fps):
             made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
             features = often
             changes["repetitions"] = {"made": made, "asked": wish.count}
@@ -173,11 +166,16 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         if other is not None:
             features, made = other
             changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
-    frames = fixed or max(round(len(features) / wish.speed), 2)
-    if frames != len(features) and ("repetitions" in changes or wish.speed != 1.0):
+    speed = wish.pace.of_motion(features, layout)
+    frames = max(round(len(features) / speed), 2)
+    if fixed is not None and (not wish.pace.of_way or frames < fixed):
+        frames = fixed
+    if frames != len(features) and ("repetitions" in changes or wish.pace.pace):
         changes["speed"] = round(len(features) / frames, 3)
         features = pace_features(features, layout.slices, frames)
-    return AskedMotion(features, changes) if changes else motion
+    if fixed is not None and wish.pace.of_way:
+        features = features[:fixed]  # a way may end at any step
+    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 
 
 def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
@@ -201,10 +199,13 @@ def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -
 
 
 def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
-    """Return True if a motion shows its action, as often as it is asked for, by itself."""
+    """Return True if a motion shows its small movement well, and as often as it is asked for, by itself."""
     if len(features) < SHORTEST:
         return False
-    motion = Motion(layout.decode(features), layout.fps)
+    joints = layout.decode(features)
+    if not FINE[wish.action].is_well(joints.astype(np.float64), layout.fps):
+        return False
+    motion = Motion(joints, layout.fps)
     as_often = wish.count is None or len(REPETITIONS[wish.action](motion)) == wish.count
     return as_often and RULES[wish.action](motion, "") >= SHOWN
 

@@ -1,4 +1,5 @@
-"""Movements so small that a tokenizer's codes lose them: nods and trembling, drawn on the motion that a network made.
+"""Movements so small that a tokenizer's codes lose them: nods, trembling and waves, drawn on the motion that a network
+made.
 
 The network gives the body that nods or shivers, where its arms are and how it stands; of the movement itself no code
 keeps 8 degrees of the head, nor 4 mm at 4 Hz (`models/hgm3-open/README.md`, "Tokenizer"). They are drawn as those of
@@ -8,10 +9,12 @@ the made clips of the training data are.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.waving import waved, waves_well
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
@@ -19,8 +22,8 @@ from marey.motion.rotations import Array, from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
 
 Float32 = NDArray[np.float32]
-Draw = Callable[[Array, float, int | None, np.random.Generator], Array]
-"""`(joints, fps, count, generator)` to joints (T, 22, 3), metres."""
+Draw = Callable[[Array, float, int | None, np.random.Generator], Array | None]
+"""`(joints, fps, count, generator)` to joints (T, 22, 3), metres; None if the movement has no place in them."""
 
 NOD_DEGREES, NOD_HZ = (11.0, 17.0), (1.3, 1.7)
 NODS, PAUSE_S = (3, 5), (0.6, 1.2)
@@ -40,7 +43,7 @@ SHAKES: Mapping[str, float] = {
 def drawn_features(
     features: Float32, layout: FeatureLayout, action: str, count: int | None, seed: int
 ) -> Float32 | None:
-    """Return features (T, D) with the small movement of an action of `FINE`; None if the motion is too short for it.
+    """Return features (T, D) with the small movement of an action of `FINE`; None if the motion has no place for it.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
@@ -52,7 +55,8 @@ def drawn_features(
     joints = layout.decode(features).astype(np.float64)
     if len(joints) < 2 * (2 * EDGE_S) * layout.fps:
         return None
-    return encode_all(layout, FINE[action](joints, layout.fps, count, np.random.default_rng([seed, len(action)])))
+    drawn = FINE[action].draw(joints, layout.fps, count, np.random.default_rng([seed, len(action)]))
+    return None if drawn is None else encode_all(layout, drawn)
 
 
 def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
@@ -97,5 +101,17 @@ def trembling(joints: Array, fps: float, count: int | None, rng: np.random.Gener
     return moved
 
 
-FINE: Mapping[str, Draw] = {"nod": nodded, "shiver": trembling}
+class Fine(NamedTuple):
+    """A small movement.
+
+    Attributes:
+        draw: draws it.
+        is_well: `(joints, fps)`; False if it is to be drawn in a motion that shows its action, too.
+    """
+
+    draw: Draw
+    is_well: Callable[[Array, float], bool] = lambda joints, fps: True
+
+
+FINE: Mapping[str, Fine] = {"nod": Fine(nodded), "shiver": Fine(trembling), "wave": Fine(waved, waves_well)}
 """Small movements by action."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marey.checks.kinematics import HEAD, WRISTS, smooth, swings, trunk_up
+from marey.checks.kinematics import HEAD, WRISTS, smooth, swings, trunk_up, velocity
 from marey.motion.feet import runs
 from marey.selector.motion import OFF_FLOOR, Array, Motion
 
@@ -104,6 +104,19 @@ def _raised(m: Motion) -> list[Repetition]:
     return max(([r for f, r in _rises(heights[:, k], 0.3) if heights[f, k] > -0.1] for k in (0, 1)), key=len)
 
 
+def _waves(m: Motion) -> list[Repetition]:
+    """A lifted hand swung to one side and back; of two hands, those of the busier one."""
+    lifting = np.abs(velocity(smooth(m.hands[..., 1], 0.15, m.fps)[..., None], m.fps))[..., 0]
+
+    def of(k: int) -> Iterator[Repetition]:
+        for begin, end in runs((m.hands[:, k, 1] > -0.28) & (lifting[:, k] < 0.4)):
+            aside = m.hands[begin:end, k, 2]
+            for each in _tops(aside - smooth(aside, 0.5, m.fps), 0.045):
+                yield Repetition(begin + each.begin, begin + each.end)
+
+    return max((list(of(k)) for k in (0, 1)), key=len)
+
+
 def _nods(m: Motion) -> list[Repetition]:
     return _tops(smooth(m.pitch, 0.03, m.fps), 7)
 
@@ -151,6 +164,7 @@ REPETITIONS: Mapping[str, Callable[[Motion], list[Repetition]]] = {
     "punch": _thrusts,
     "clap": _claps,
     "raise-arm": _raised,
+    "wave": _waves,
     "nod": _nods,
     "push-ups": _push_ups,
     "sit-ups": _sit_ups,

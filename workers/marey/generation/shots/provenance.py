@@ -67,8 +67,10 @@ def with_rows(clip: MotionClip, timeline: Sequence[TimedText]) -> MotionClip:
     """Return the clip of a timeline with the first frame of each prompt, and the match of each row, in its manifest."""
     record: Mapping[str, Any] = clip.manifest[KEY]
     prompts = [[round(row.start * clip.fps), row.text.prompt] for row in timeline]
-    rows = [{**row, "match": _match(clip, timed).value} for row, timed in zip(record["rows"], timeline, strict=True)]
     spans = record["transitions"]
+    rows = [
+        {**row, "match": _match(clip, timed, spans).value} for row, timed in zip(record["rows"], timeline, strict=True)
+    ]
     transitions = [{**span, "rise": rise} for span, rise in zip(spans, rises_of(clip, spans), strict=True)]
     told = {**record, "rows": rows, "transitions": transitions}
     return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: told})
@@ -82,8 +84,10 @@ def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> Motion
     return replace(clip, manifest={**clip.manifest, KEY: {**record, "rows": rows}})
 
 
-def _match(clip: MotionClip, row: TimedText) -> PromptMatch:
-    frames = slice(round(row.start * clip.fps), round(row.end * clip.fps))
+def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, Any]]) -> PromptMatch:
+    """Return the match of a row without the transition that it begins with: who stops first ends a step."""
+    begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
+    frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))
     return match_of(clip, row.text.actions or (row.text.rewritten,), row.scope, frames=frames)
 
 

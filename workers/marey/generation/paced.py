@@ -1,0 +1,96 @@
+"""Motions at the pace that their prompt names: how many times as fast they are played as the network made them.
+
+Most actions are played slower or faster by a share, whatever their pace was. Walks and runs, of which the network
+knows many, are brought to a speed over the floor, if they do not have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.motion.courses import natural_course
+from marey.motion.features import FeatureLayout
+from marey.selector.matching import WAYS
+from marey.vocabulary.paces import Pace, stated_pace
+
+Float32 = NDArray[np.float32]
+
+SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.4}
+"""How many times as fast a motion is played, by the pace that its prompt names."""
+FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
+"""Actions whose pace gravity decides."""
+
+
+@dataclass(frozen=True)
+class WaySpeeds:
+    """Speeds over the floor of a walk or run, m/s.
+
+    Attributes:
+        slow: of a slow one, at most.
+        fast: of a fast one, at least.
+        played: bounds of how many times as fast it is played: beyond them the steps are not those of a body that falls
+            from foot to foot.
+    """
+
+    slow: float
+    fast: float
+    played: tuple[float, float]
+
+
+WAY_SPEEDS: Mapping[str, WaySpeeds] = {
+    "walk": WaySpeeds(0.8, 1.5, (0.65, 1.45)),
+    "run": WaySpeeds(2.4, 3.8, (0.75, 1.35)),
+}
+MOVING = 0.3
+"""Speed of a body that goes somewhere, m/s."""
+
+
+@dataclass(frozen=True)
+class AskedPace:
+    """The pace that a prompt asks for.
+
+    Attributes:
+        pace: empty if it does not say.
+        action: id of the only action.
+    """
+
+    pace: Pace = ""
+    action: str = ""
+
+    @classmethod
+    def of(cls, prompt: str, action: str) -> AskedPace:
+        """Read the pace of a prompt; none of actions that have their own."""
+        has_own = action in FALLING or (action in WAYS and action not in WAY_SPEEDS)
+        return cls("" if has_own else stated_pace(prompt), action)
+
+    @property
+    def of_way(self) -> bool:
+        """True for a walk or run, whose motion decides how fast it is played."""
+        return bool(self.pace) and self.action in WAY_SPEEDS
+
+    @property
+    def share(self) -> float:
+        """How many times as fast the motion is played; 1 where the motion decides."""
+        return 1.0 if self.of_way else SPEEDS.get(self.pace, 1.0)
+
+    @property
+    def most(self) -> float:
+        """How many times as fast it is played at most."""
+        return max(WAY_SPEEDS[self.action].played[1], 1.0) if self.of_way and self.pace == "fast" else self.share
+
+    def of_motion(self, features: Float32, layout: FeatureLayout) -> float:
+        """Return how many times as fast a motion (T, D) in the layout's own units is played."""
+        if not self.of_way:
+            return self.share
+        course = natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps)
+        speeds = course.speeds(layout.fps)
+        speed = float(np.median(speeds[speeds > MOVING])) if (speeds > MOVING).mean() > 0.5 else 0.0
+        wanted = WAY_SPEEDS[self.action]
+        if not speed or (speed <= wanted.slow if self.pace == "slow" else speed >= wanted.fast):
+            return 1.0
+        low, high = wanted.played
+        return min(max((wanted.slow if self.pace == "slow" else wanted.fast) / speed, low), high)
