@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from marey.generation import asked
-from marey.generation.asked import SPEEDS, AskedMotion, generate_as_asked
+from marey.generation.asked import AskedMotion, generate_as_asked
+from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
-from tests.support.bodies import Body, lift, raiser, walker, waver
+from tests.support.bodies import Body, lift, raiser, steady, walker, waver
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def test_the_wrong_hand_is_mirrored() -> None:
     [
         (waver("left"), "a man waves with his left hand"),
         (waver("left"), "a man waves"),
-        (raiser("both"), "a man waves with his right hand"),
+        (raiser("both"), "a man claps his right hand"),
         (waver("left"), "a man walks to the right"),
         (waver("both"), "a man waves with his right hand"),
     ],
@@ -137,10 +138,53 @@ def test_the_pace_of_a_fixed_length_changes_what_is_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    "prompt", ["a man walks slowly", "a man jumps quickly", "a man bows", "a man bows beside a fast car"]
+    "prompt", ["a man sprints slowly", "a man jumps quickly", "a man bows", "a man bows beside a fast car"]
 )
 def test_learned_paces_and_those_of_gravity_stay(prompt: str) -> None:
     assert isinstance(make(bower(1), replace(ask(prompt), open=True)), RawMotion)
+
+
+def speed_of(made: Any) -> float:
+    joints = HUMANML3D_263.decode(made.features)
+    return float(np.linalg.norm(joints[-1, 0, [0, 2]] - joints[0, 0, [0, 2]]) / (len(joints) - 1) * 20.0)
+
+
+@pytest.mark.parametrize(("word", "pace"), [("slowly", "slow"), ("briskly", "fast")])
+def test_a_walk_is_brought_to_the_speed_of_its_pace(word: str, pace: str) -> None:
+    made = make(walker(6.0), replace(ask(f"a man walks {word}"), open=True))
+    assert speed_of(made) == pytest.approx(getattr(WAY_SPEEDS["walk"], pace), rel=0.05)
+    assert made.changes == {"speed": pytest.approx(getattr(WAY_SPEEDS["walk"], pace) / 1.1, rel=0.05)}
+
+
+def test_a_walk_that_has_the_pace_stays_as_it_is() -> None:
+    slow = Body(6.0, speed=steady(0.7), cadence=1.3).joints()
+    assert isinstance(make(slow, replace(ask("a man walks slowly"), open=True)), RawMotion)
+
+
+def test_a_walk_in_place_has_no_speed() -> None:
+    stepping = Body(6.0, speed=steady(0.02)).joints()
+    assert isinstance(make(stepping, replace(ask("a man walks in place slowly"), open=True)), RawMotion)
+
+
+def test_steps_of_a_run_are_not_slowed_down_for_long() -> None:
+    made = make(Body(4.0, speed=steady(4.5), duty=0.35).joints(), replace(ask("a man runs slowly"), open=True))
+    assert made.changes["speed"] == pytest.approx(WAY_SPEEDS["run"].played[0], rel=0.02)
+
+
+def test_a_slow_walk_of_a_fixed_length_ends_sooner_on_its_way() -> None:
+    features = HUMANML3D_263.encode(walker(6.0))
+    made = make(walker(6.0), replace(ask("a man walks slowly"), frames=len(features)))
+    assert len(made.features) == len(features)
+    assert speed_of(made) == pytest.approx(WAY_SPEEDS["walk"].slow, rel=0.05)
+
+
+def test_for_a_fast_walk_of_a_fixed_length_more_is_drawn() -> None:
+    generator = OneMotion(walker(6.0))
+    (made,) = generate_as_asked(generator, [replace(ask("a man walks fast"), frames=80)])  # type: ignore[arg-type]
+    assert generator.frames == [round(80 * WAY_SPEEDS["walk"].played[1])]
+    assert made is not None
+    assert len(made.features) == 80
+    assert speed_of(made) == pytest.approx(WAY_SPEEDS["walk"].fast, rel=0.05)
 
 
 def test_the_limb_that_acts_is_the_one_that_the_prompt_names() -> None:
