@@ -17,6 +17,8 @@ from marey.vocabulary.paces import stated_pace
         "taking her own sweet time she sits down",
         "punches in slow motion",
         "a wave at a very leisurely pace",
+        "at a leisurely pace she bows",
+        "a leisurely walk",
         "waves at half speed",
         "kicks, 25 % of normal",
         "sloooowly he turns",
