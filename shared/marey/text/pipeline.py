@@ -155,7 +155,7 @@ class TextPipeline:
         if worded == with_subject(rewrite.text) != rewrite.text:
             reasons.append("the verb gets its subject, as captions have one")
         elif worded != rewrite.text:
-            reasons.append("the model knows the action by the plain words that are put first")
+            reasons.append("the model knows the action by these plain words")
         if graph.text != worded:
             reasons.append("the model reads several actions as one sentence each, in the order of time")
         return "; ".join(reasons) or None

@@ -23,6 +23,8 @@ MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
 TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
+PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
+"""Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _WORD = re.compile(r"[A-Za-z]+")
 
 
@@ -58,7 +60,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
-    a subject gets one (`with_subject`).
+    a subject gets one (`with_subject`), and words that mislead are replaced (`PLAINER`).
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -67,6 +69,9 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     if action is None:
         return prompt
     prompt, plain = with_subject(prompt), load_vocabulary().need(action).plain_words
+    if action in PLAINER:
+        pattern, words = PLAINER[action]
+        prompt = pattern.sub(words, prompt)
     return prompt if plain in prompt.lower() else f"{plain}, {_lowered(prompt)}"
 
 

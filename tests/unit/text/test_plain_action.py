@@ -39,6 +39,8 @@ def plain_pipeline(pipeline: TextPipeline, **more: bool) -> TextPipeline:
         ("A person bows twice", "bow", "A person bows twice"),  # plain as it is
         ("she bows and then waves", None, "she bows and then waves"),
         ("bows deeply", "bow", "a person bows deeply"),
+        ("walks fast", "walk", "a person walks quickly"),
+        ("runs fast", "run", "a person runs fast"),
         ("Slowly takes a bow", "bow", "a person bows, a person slowly takes a bow"),
         ("arms up", "raise-arm", "a person raises an arm, arms up"),
         ("guards the door", "block", "a person blocks an attack, a person guards the door"),
@@ -97,7 +99,7 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(pipeline: TextPipeline) -
     (as_written,), (read,) = pipeline.explain([prompt]), plain.explain([prompt])
     assert (as_written.graph.text, as_written.rewrite_reason) == (prompt, None)
     assert read.graph.text.startswith("a person bows, the waiter")
-    assert read.rewrite_reason == "the model knows the action by the plain words that are put first"
+    assert read.rewrite_reason == "the model knows the action by these plain words"
     assert plain.features([prompt])[0].graph.text == read.graph.text
     assert feature_key(prompt, plain.spec) != feature_key(prompt, pipeline.spec)
 
