@@ -171,6 +171,18 @@ def test_steps_of_a_run_are_not_slowed_down_for_long() -> None:
     assert made.changes["speed"] == pytest.approx(WAY_SPEEDS["run"].played[0], rel=0.02)
 
 
+def test_a_run_without_a_pace_is_no_slower_than_a_jog() -> None:
+    made = make(Body(4.0, speed=steady(1.8), duty=0.4).joints(), replace(ask("a man runs"), open=True))
+    assert speed_of(made) == pytest.approx(WAY_SPEEDS["run"].least, rel=0.05)
+    assert isinstance(make(walker(6.0), replace(ask("a man walks"), open=True)), RawMotion)
+
+
+def test_a_run_of_a_fixed_length_keeps_it() -> None:
+    joints = Body(4.0, speed=steady(1.8), duty=0.4).joints()
+    made = make(joints, replace(ask("a man runs"), frames=len(HUMANML3D_263.encode(joints))))
+    assert isinstance(made, RawMotion)
+
+
 def test_a_slow_walk_of_a_fixed_length_ends_sooner_on_its_way() -> None:
     features = HUMANML3D_263.encode(walker(6.0))
     made = make(walker(6.0), replace(ask("a man walks slowly"), frames=len(features)))

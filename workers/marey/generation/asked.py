@@ -170,10 +170,10 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     frames = max(round(len(features) / speed), 2)
     if fixed is not None and (not wish.pace.of_way or frames < fixed):
         frames = fixed
-    if frames != len(features) and ("repetitions" in changes or wish.pace.pace):
+    if frames != len(features) and ("repetitions" in changes or speed != 1.0 or wish.pace.share != 1.0):
         changes["speed"] = round(len(features) / frames, 3)
         features = pace_features(features, layout.slices, frames)
-    if fixed is not None and wish.pace.of_way:
+    if wish.pace.of_way and changes.get("speed"):
         features = features[:fixed]  # a way may end at any step
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 

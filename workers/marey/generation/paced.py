@@ -32,18 +32,20 @@ class WaySpeeds:
     Attributes:
         slow: of a slow one, at most.
         fast: of a fast one, at least.
+        least: of one whose prompt does not say; 0 = any.
         played: bounds of how many times as fast it is played: beyond them the steps are not those of a body that falls
             from foot to foot.
     """
 
     slow: float
     fast: float
+    least: float
     played: tuple[float, float]
 
 
 WAY_SPEEDS: Mapping[str, WaySpeeds] = {
-    "walk": WaySpeeds(0.8, 1.5, (0.65, 1.45)),
-    "run": WaySpeeds(2.4, 3.8, (0.75, 1.35)),
+    "walk": WaySpeeds(0.8, 1.5, 0.0, (0.65, 1.45)),
+    "run": WaySpeeds(2.4, 3.8, 2.2, (0.75, 1.35)),
 }
 MOVING = 0.3
 """Speed of a body that goes somewhere, m/s."""
@@ -70,7 +72,7 @@ class AskedPace:
     @property
     def of_way(self) -> bool:
         """True for a walk or run, whose motion decides how fast it is played."""
-        return bool(self.pace) and self.action in WAY_SPEEDS
+        return self.action in WAY_SPEEDS
 
     @property
     def share(self) -> float:
@@ -80,7 +82,7 @@ class AskedPace:
     @property
     def most(self) -> float:
         """How many times as fast it is played at most."""
-        return max(WAY_SPEEDS[self.action].played[1], 1.0) if self.of_way and self.pace == "fast" else self.share
+        return WAY_SPEEDS[self.action].played[1] if self.of_way and self.pace == "fast" else self.share
 
     def of_motion(self, features: Float32, layout: FeatureLayout) -> float:
         """Return how many times as fast a motion (T, D) in the layout's own units is played."""
@@ -89,8 +91,7 @@ class AskedPace:
         course = natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps)
         speeds = course.speeds(layout.fps)
         speed = float(np.median(speeds[speeds > MOVING])) if (speeds > MOVING).mean() > 0.5 else 0.0
-        wanted = WAY_SPEEDS[self.action]
-        if not speed or (speed <= wanted.slow if self.pace == "slow" else speed >= wanted.fast):
-            return 1.0
-        low, high = wanted.played
-        return min(max((wanted.slow if self.pace == "slow" else wanted.fast) / speed, low), high)
+        speeds_of = WAY_SPEEDS[self.action]
+        wanted = {"slow": min(speed, speeds_of.slow), "fast": max(speed, speeds_of.fast)}
+        low, high = speeds_of.played
+        return min(max(wanted.get(self.pace, max(speed, speeds_of.least)) / speed, low), high) if speed else 1.0
