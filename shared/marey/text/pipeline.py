@@ -30,7 +30,7 @@ from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_plain_action, with_subject
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
-from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_a_stop
+from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
 from marey.text.words import EDGE_PUNCTUATION
 from marey.vocabulary.entries import load_vocabulary
 
@@ -241,7 +241,8 @@ class TextPipeline:
         return list(map(self._reading, texts, read))
 
     def _reading(self, text: str, read: ReadAction) -> _Reading:
-        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not way_to_a_stop(text)
+        rests = way_to_rest(text, read.action)
+        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
         if self.spec.movements and not sure and (movements := self._movements_in(text, read.action)):
             return _Reading(text, movements)
         return _Reading.of(text, read.action)

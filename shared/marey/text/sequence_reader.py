@@ -24,6 +24,7 @@ from marey.text.action_reader import OUTSIDE, STANDING, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
+from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import every_action, match_scope
@@ -151,7 +152,7 @@ class SequenceReader(Reader):
             pooled: returns the sentence vectors (W,) of texts.
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
-        if action in WAYS and (way := way_to_a_stop(prompt)):
+        if way := way_to_rest(prompt, action):
             return ReadMovement(way, action), _rest()
         groups = in_order(self._clauses(prompt, encoding, pooled))
         clauses = [clause for group in groups for clause in group]
@@ -280,6 +281,20 @@ def way_to_a_stop(text: str) -> str:
     stops"; empty if it ends with none."""
     match = _STOP.search(text)
     return text[: match.start()].strip(" ,;") if match is not None else ""
+
+
+def way_to_rest(text: str, action: str | None) -> str:
+    """Return the words of a way after which the body stands still, since the text says so or counts the steps; empty if
+    there is none.
+
+    Args:
+        text: of one action.
+        action: its id; None = several, none, or in doubt.
+    """
+    if action not in WAYS:
+        return ""
+    steps = stated_count(text, action) if action in STEPPING else None
+    return way_to_a_stop(text) or (text if steps is not None else "")
 
 
 def _rest() -> ReadMovement:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from functools import lru_cache
 from itertools import pairwise
 
@@ -41,18 +41,25 @@ _ONCE = re.compile(
 )
 _COUNTED = re.compile(rf"{_NUMBER}(?P<words>(?:[ -]+[a-z'’]+){{1,5}})")
 _ALTERNATIVES = ("or", "to")
+STEPPING = frozenset({"walk", "walk-backward", "run"})
+"""Actions of which steps are counted, and nothing else: "walks twice around the house" is one walk."""
+_STEPS = frozenset({"step", "steps", "pace", "paces", "stride", "strides"})
 _WORDS = re.compile(r"[a-z]+")
 
 
 def stated_count(prompt: str, action: str) -> int | None:
-    """Return how often a prompt asks for an action; None = it does not say, or says several numbers.
+    """Return how often a prompt asks for an action, or for how many steps of one of `STEPPING`; None = it does not say,
+    or says several numbers.
 
     Args:
         prompt: as a user typed it.
         action: id of the one action that it asks for.
     """
     text = " ".join(prompt.lower().split())
-    found = {*_of_times(text), *_of_things(text, action), *_of_words_again(text, action)}
+    if action in STEPPING:
+        found = set(_of_things(text, _STEPS))
+    else:
+        found = {*_of_times(text), *_of_things(text, _nouns(action)), *_of_words_again(text, action)}
     return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
 
 
@@ -64,9 +71,9 @@ def _of_times(text: str) -> Iterator[int]:
     yield from (1 for _ in _ONCE.finditer(text))
 
 
-def _of_things(text: str, action: str) -> Iterator[int]:
+def _of_things(text: str, nouns: Set[str]) -> Iterator[int]:
     """Yield numbers before the action as a thing: "two deep squats", but not "two hands"."""
-    nouns, uncounted = _nouns(action), load_word_lists().uncounted
+    uncounted = load_word_lists().uncounted - nouns
     for match in _COUNTED.finditer(text):
         words = _WORDS.findall(match["words"])
         for word, after in pairwise([*words, ""]):

@@ -14,6 +14,7 @@ from marey.generation.asked import AskedMotion, generate_as_asked
 from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
+from marey.generation.stepped import frames_of_steps
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
@@ -197,6 +198,25 @@ def test_for_a_fast_walk_of_a_fixed_length_more_is_drawn() -> None:
     assert made is not None
     assert len(made.features) == 80
     assert speed_of(made) == pytest.approx(WAY_SPEEDS["walk"].fast, rel=0.05)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_steps_are_as_many_as_asked_for(count: int) -> None:
+    made = make(walker(6.0), replace(ask(f"a man walks {count} steps"), open=True))
+    assert len(REPETITIONS["walk"](Motion(HUMANML3D_263.decode(made.features), 20.0))) == count
+    assert made.changes["repetitions"]["asked"] == count
+
+
+def test_a_motion_of_fewer_steps_stays_and_one_with_more_is_drawn_for_them() -> None:
+    generator = OneMotion(walker(3.0))
+    request = replace(ask("a man takes 12 steps"), frames=60, open=True)
+    (made,) = generate_as_asked(generator, [request])  # type: ignore[arg-type]
+    assert isinstance(made, RawMotion)
+    assert generator.frames == [frames_of_steps(12, 20.0)]
+
+
+def test_a_walk_that_is_done_twice_has_any_steps() -> None:
+    assert isinstance(make(walker(6.0), replace(ask("a man walks twice around the table"), open=True)), RawMotion)
 
 
 def test_the_limb_that_acts_is_the_one_that_the_prompt_names() -> None:

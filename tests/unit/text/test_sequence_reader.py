@@ -155,6 +155,15 @@ def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> Non
     assert waves.movements == ()
 
 
+def test_a_way_of_a_number_of_steps_comes_to_rest(reading: TextPipeline) -> None:
+    steps, walk, stairs = reading.features(["takes three steps forward", "walks forward", "walks up three steps"])
+    assert [each.rewritten for each in steps.movements] == [
+        "a person walks, a person takes three steps forward",
+        load_vocabulary().need(STANDING).plain_words,
+    ]
+    assert walk.movements == stairs.movements == ()
+
+
 def test_one_action_is_one_text(reading: TextPipeline) -> None:
     prompts = [
         "The waiter takes a bow",

@@ -18,6 +18,7 @@ from marey.generation.fine import FINE, drawn_features
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
+from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.turned import NEAR, turned_features
 from marey.items.values import MAX_SECONDS
 from marey.motion.courses import natural_course
@@ -31,7 +32,7 @@ from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
-from marey.vocabulary.counts import stated_count
+from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.turns import Turn, stated_spins, stated_turn
 
@@ -108,6 +109,8 @@ class _Wish:
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
         fixed."""
+        if self.count is not None and self.action in STEPPING and request.frames is not None:
+            return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
@@ -156,7 +159,8 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
     if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
-        often = repeated(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
+        as_often = stepped if wish.action in STEPPING else repeated
+        often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
         if often is not None and often is not features and _fits(len(often), fixed, wish.pace.share, layout.fps):
             made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
             features = often

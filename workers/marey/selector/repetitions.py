@@ -8,12 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marey.checks.kinematics import HEAD, WRISTS, smooth, swings, trunk_up, velocity
+from marey.checks.kinematics import ANKLES, HEAD, WRISTS, smooth, swings, trunk_up, velocity
 from marey.motion.feet import runs
 from marey.selector.motion import OFF_FLOOR, Array, Motion
+from marey.vocabulary.counts import STEPPING
 
 LOW = 0.35
 """Share of a rise up to which a repetition has not begun, and from which on it is over on the way back."""
+
+
+STANDS, LEAST_STEP = 0.6, 0.15
+"""Speed under which a foot stands, m/s, and metres from a place of a foot to the next one."""
 
 
 class Repetition(NamedTuple):
@@ -65,6 +70,20 @@ def _flights(m: Motion) -> list[Repetition]:
         for begin, end in runs(feet > OFF_FLOOR)
         if begin and end < m.frames and end - begin >= 0.08 * m.fps and feet[begin:end].max() >= 0.06
     ]
+
+
+def _steps(m: Motion) -> list[Repetition]:
+    """A foot lifted, and set down elsewhere."""
+
+    def of(k: int) -> Iterator[Repetition]:
+        stands = (m.step_speed[:, k] < STANDS) & (m.feet[:, k] < 0.08)
+        places = m.joints[:, ANKLES[k]] * [1, 0, 1]
+        spans = [(begin, end) for begin, end in runs(stands) if end - begin >= 0.1 * m.fps or not begin]
+        for (_, lifted), (landed, _) in pairwise(spans):
+            if np.linalg.norm(places[landed] - places[lifted - 1]) >= LEAST_STEP:
+                yield Repetition(lifted, landed)
+
+    return sorted((*of(0), *of(1)), key=lambda step: step.end)
 
 
 def _bows(m: Motion) -> list[Repetition]:
@@ -152,6 +171,7 @@ def _turns(m: Motion) -> list[Repetition]:
 
 
 REPETITIONS: Mapping[str, Callable[[Motion], list[Repetition]]] = {
+    **dict.fromkeys(STEPPING, _steps),
     "jump": _flights,
     "jump-forward": _flights,
     "hop": _flights,
