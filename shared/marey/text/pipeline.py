@@ -27,7 +27,7 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.plain_action import only_action, with_plain_action, with_subject
+from marey.text.plain_action import only_action, with_plain_action, with_subject, without_rise
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
@@ -234,6 +234,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [_Reading(text) for text in texts]
+        texts = [without_rise(text) for text in texts]
         if not self._reads_actions:
             return [_Reading.of(text, only_action(text)) for text in texts]
         reader = action_reader()

@@ -25,6 +25,12 @@ TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
+_UP_TO = re.compile(
+    r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
+    (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
+    (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
 _WORD = re.compile(r"[A-Za-z]+")
 
 
@@ -54,6 +60,14 @@ def _third_persons() -> frozenset[str]:
     """Return the forms with -s of all verbs that are known, but for those that are parts of the body, too: "arms"."""
     lists = load_word_lists()
     return frozenset(third_person(verb) for verb in _verbs() if verb.isalpha()) - lists.body_parts - lists.uncounted
+
+
+def without_rise(prompt: str) -> str:
+    """Return a prompt in which nobody goes up who goes up to somebody: "walks up to the door" as "walks to the door".
+
+    Of the words, models read a climb.
+    """
+    return _UP_TO.sub(r"\g<way> to", prompt)
 
 
 def with_plain_action(prompt: str, action: str | None) -> str:

@@ -12,7 +12,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -86,6 +86,9 @@ _STOP = re.compile(
 )
 
 
+_STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
+
+
 @dataclass(frozen=True)
 class ReadMovement:
     """One movement of a prompt.
@@ -154,11 +157,11 @@ class SequenceReader(Reader):
         """
         if way := way_to_rest(prompt, action):
             return ReadMovement(way, action), _rest()
-        groups = in_order(self._clauses(prompt, encoding, pooled))
+        groups = in_order(_with_origins(self._clauses(prompt, encoding, pooled)))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
-        if _is_one_action({clause.name for clause in clauses}, action):
+        if _is_one_action({clause.name for clause in clauses}, action) and not _stops_on_a_way(clauses):
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
@@ -238,12 +241,13 @@ def without_joints(text: str) -> str:
     return bare or text.strip()
 
 
-def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
+def in_order(clauses: Iterable[ReadClause]) -> list[list[ReadClause]]:
     """Return clauses in groups, in the order of time; those of a group come at once.
 
     Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
     down" and "before leaving, he bows" are told in the other order.
     """
+    clauses = list(clauses)
     groups: list[list[ReadClause]] = []
     at = 0
     for before, clause in zip([None, *clauses], clauses, strict=False):
@@ -307,6 +311,28 @@ def _is_one_action(names: set[str], action: str | None) -> bool:
     "walks ahead, then veers off", since who turns walks."""
     moving = names - {STANDING}
     return (TURNING in moving and moving <= TURNS) or (action is not None and len(moving) < 2)
+
+
+def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
+    """Return True if a way ends with a stop: "walks forward, stops and looks around"."""
+    return any(
+        way.name in WAYS and after.name == STANDING and _STOPS.match(without_joints(after.text)) is not None
+        for way, after in itertools.pairwise(clauses)
+    )
+
+
+def _with_origins(clauses: Sequence[ReadClause]) -> Iterator[ReadClause]:
+    """Yield clauses; what comes behind "from" belongs to the one before: "gets up from | lying on the ground"."""
+    last: ReadClause | None = None
+    for clause in clauses:
+        if last is not None and last.text.lower().endswith(" from"):
+            last = replace(last, text=f"{last.text} {clause.text}")
+            continue
+        if last is not None:
+            yield last
+        last = clause
+    if last is not None:
+        yield last
 
 
 def _risen_from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:

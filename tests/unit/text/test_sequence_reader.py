@@ -164,6 +164,22 @@ def test_a_way_of_a_number_of_steps_comes_to_rest(reading: TextPipeline) -> None
     assert walk.movements == stairs.movements == ()
 
 
+@pytest.mark.parametrize(
+    ("prompt", "movements"),
+    [
+        ("walk forward, stop, look around", ["walk forward", "stop, look around"]),
+        ("a man walks forward, stops and looks around", ["a man walks forward", "stops and looks around"]),
+        ("The hero walks up to a door and knocks on it", ["The hero walks to a door", "knocks on it"]),
+        ("get up from lying on the ground", []),
+    ],
+)
+def test_movements_around_a_stop_a_place_and_an_origin(
+    reading: TextPipeline, prompt: str, movements: list[str]
+) -> None:
+    (read,) = reading.features([prompt])
+    assert [each.prompt for each in read.movements] == movements
+
+
 def test_one_action_is_one_text(reading: TextPipeline) -> None:
     prompts = [
         "The waiter takes a bow",

@@ -45,6 +45,7 @@ class WaySpeeds:
 
 WAY_SPEEDS: Mapping[str, WaySpeeds] = {
     "walk": WaySpeeds(0.8, 1.5, 0.0, (0.65, 1.45)),
+    "walk-backward": WaySpeeds(0.6, 1.2, 0.0, (0.6, 1.45)),
     "run": WaySpeeds(2.4, 3.8, 2.2, (0.75, 1.35)),
 }
 MOVING = 0.3
