@@ -29,6 +29,8 @@ SURE, SURE_OF_SEVERAL = 0.5, 0.8
 """Probabilities from which on a prompt asks for one action, and does so though its words name several."""
 AGREED = 0.2
 """Probability from which on it is believed that a prompt asks for the only action that its words name."""
+LOST = 0.35
+"""Probability under which who stands or waits by the words does so: "a guard stands at the gate" is no fighter."""
 SEVERAL, OUTSIDE = "several actions", "no action of the vocabulary"
 """Classes behind the actions."""
 
@@ -78,9 +80,13 @@ class ActionReader(Reader):
         scores = weights["out"] @ np.maximum(hidden, 0) + weights["out_bias"]
         shares = np.exp(scores - scores.max())
         best = int(scores.argmax())
-        named = load_vocabulary().without_implied(named_actions(prompt)) - {STANDING}
-        least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if named == {self.classes[best]} else SURE
-        return ReadAction(self.classes[best], float(shares[best] / shares.sum()), least)
+        named = load_vocabulary().without_implied(named_actions(prompt))
+        named = named - {STANDING} or named
+        name, probability = self.classes[best], float(shares[best] / shares.sum())
+        if named == {STANDING} and probability < LOST:
+            name, probability = STANDING, AGREED
+        least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if named == {name} else SURE
+        return ReadAction(name, probability, least)
 
 
 def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:

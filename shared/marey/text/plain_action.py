@@ -13,6 +13,7 @@ from functools import lru_cache
 from marey.text.action_reader import STANDING
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
@@ -23,6 +24,8 @@ MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
 TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
+NODDING = "nod"
+"""Read in "shakes his head"."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _UP_TO = re.compile(
@@ -31,6 +34,7 @@ _UP_TO = re.compile(
     (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
+_NOD = re.compile(r"\bnod", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z]+")
 
 
@@ -63,9 +67,8 @@ def _third_persons() -> frozenset[str]:
 
 
 def without_rise(prompt: str) -> str:
-    """Return a prompt in which nobody goes up who goes up to somebody: "walks up to the door" as "walks to the door".
-
-    Of the words, models read a climb.
+    """Return a prompt in which who goes up to a place or a person goes there: "walks up to the door" as "walks to the
+    door". Of "up", models read a climb.
     """
     return _UP_TO.sub(r"\g<way> to", prompt)
 
@@ -74,15 +77,22 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
-    a subject gets one (`with_subject`), and words that mislead are replaced (`PLAINER`).
+    a subject gets one (`with_subject`), words that mislead are replaced (`PLAINER`), and those that have the head turn
+    left out.
 
     Args:
         prompt: as `check_prompt` returns it.
         action: id of the one action that it asks for; None = several, none, or in doubt.
     """
+    bare = without_gaze(prompt)  # the head moves alone: of "looks left" models turn the whole body
     if action is None:
-        return prompt
-    prompt, plain = with_subject(prompt), load_vocabulary().need(action).plain_words
+        return bare or prompt
+    if action == NODDING and bare != prompt and not _NOD.search(prompt):
+        action = STANDING
+    plain = load_vocabulary().need(action).plain_words
+    if not bare:
+        return plain
+    prompt = with_subject(bare)
     if action in PLAINER:
         pattern, words = PLAINER[action]
         prompt = pattern.sub(words, prompt)

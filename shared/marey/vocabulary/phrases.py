@@ -143,7 +143,7 @@ class PhraseFinder:
             return False
         if text == words[at].base:  # "make the man bow", "they slowly bow"
             return before in lists.people or before in lists.plural_people or before.endswith("ly")
-        return not self._lexicon.is_verb_form(before)
+        return before in lists.people or not self._lexicon.is_verb_form(before)  # "a guard stands"
 
     def _matches(self, words: list[Word]) -> list[Match]:
         spans = self._spans(words)

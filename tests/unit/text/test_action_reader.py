@@ -65,7 +65,11 @@ def test_few_others_are_read_as_one_action() -> None:
 
 
 def test_prompts_whose_words_name_several_actions_must_be_read_surely() -> None:
-    prompts = ["a guard waits at the door", "she strolls ahead, then breaks into a jog", "he stands and waves"]
+    prompts = [
+        "a goblin hums a tune",
+        "she strolls ahead, then breaks into a jog",
+        "he stands and waves",
+    ]
     assert [each.least for each in read(prompts)] == [SURE, SURE_OF_SEVERAL, AGREED]
 
 
@@ -73,6 +77,10 @@ def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
     (read_as,) = read(["hey could I get a guy just ambling along the pavement, nothing fancy"])
     assert read_as.action == "walk"
     assert AGREED <= read_as.probability < SURE
+
+
+def test_who_stands_by_the_words_does_where_the_network_knows_nothing() -> None:
+    assert [each.action for each in read(["a guard waits at the door", "a guard stands at the gate"])] == 2 * ["idle"]
 
 
 def test_in_doubt_it_names_none() -> None:

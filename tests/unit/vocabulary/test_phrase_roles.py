@@ -54,6 +54,8 @@ PARTICLES: list[Row] = [
     ("walking up and down", ["walk"]),
     ("a man walks up to the desk", ["walk"]),
     ("runs up to the gate", ["run"]),
+    ("a guard stands at the gate", ["idle"]),
+    ("the guard sits", ["sit"]),
     ("walks quickly down the street", ["walk"]),
     ("walks slowly down the stairs", ["climb-stairs"]),
     ("he turns very slowly around", ["turn-around"]),

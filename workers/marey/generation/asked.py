@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.fine import FINE, drawn_features
+from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
@@ -34,6 +35,7 @@ from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
 from marey.vocabulary.turns import Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
@@ -52,7 +54,7 @@ class AskedMotion:
             movement is drawn on what the network made (`marey.generation.fine`); `repetitions`, how often the
             network `made` and the prompt `asked` for the action; `turn`, degrees from the first frame to the last,
             positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
-            the motion is played as the network made it.
+            the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`).
     """
 
     features: Float32 = field(repr=False)
@@ -75,6 +77,7 @@ class _Wish:
         count: repetitions; None = any number.
         turn: how far the body turns; None = as it comes.
         pace: at which it is done.
+        gaze: where the head turns.
     """
 
     steps: tuple[Step, ...] | None = None
@@ -83,6 +86,7 @@ class _Wish:
     count: int | None = None
     turn: Turn | None = None
     pace: AskedPace = field(default_factory=AskedPace)
+    gaze: tuple[Glance, ...] = ()
 
     @classmethod
     def of(cls, request: Request) -> _Wish:
@@ -93,13 +97,14 @@ class _Wish:
         steps = wanted_of(text.actions or (text.rewritten,))
         single = _one_action(steps or ())
         action = load_vocabulary().said_first(text.rewritten) or single
+        prompt, gaze = without_gaze(text.prompt), stated_gaze(text.prompt)
         if not action:
-            return cls(steps, limb=limb_of(text.prompt) if steps is None else None)
-        count = stated_count(text.prompt, action) if action in REPETITIONS else None
+            return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
+        count = stated_count(prompt, action) if action in REPETITIONS else None
         if action == "spin":
-            count = count or stated_spins(text.prompt)
-        turn, pace = stated_turn(text.prompt, action), AskedPace.of(text.prompt, action)
-        return cls(steps, action, limb_of(text.prompt, action), count, turn, pace)
+            count = count or stated_spins(prompt)
+        turn, pace = stated_turn(prompt, action), AskedPace.of(prompt, action)
+        return cls(steps, action, limb_of(prompt, action), count, turn, pace, gaze)
 
     @property
     def side(self) -> str:
@@ -150,7 +155,7 @@ def generate_as_asked(
 def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: MotionFeatures) -> MotionFeatures:
     """Return the motion, changed where the wish is not fulfilled and can be."""
     features: Float32 = motion.features
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
     if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from marey.generation.asked import changes_of
+from marey.generation.gazing import with_gaze
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.shots.timelines import TimelineMotion
@@ -76,7 +77,7 @@ def finish(
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
     manifest = {**provenance, CLEANED: clean, "body": body.describe()}
     clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
-    return judged(clip, request)
+    return judged(with_gaze(clip), request)
 
 
 def judged(clip: MotionClip, request: Request) -> MotionClip:

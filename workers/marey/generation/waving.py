@@ -15,8 +15,10 @@ from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
+from marey.quality.record import SHOWN
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
+from marey.selector.rules import RULES
 
 UP = -0.28
 """Metres over the shoulder from which on a hand is up: the height of the chest."""
@@ -24,8 +26,6 @@ LEAST_S = 0.8
 """Seconds for which a hand is up at least that waves."""
 ELBOW_MOVES = 0.4
 """Median speed of the elbow, as a share of that of the wrist, from which on the whole arm swings."""
-LEAST_SWINGS = 2
-"""Swings to and fro of a wave without a number."""
 EDGE_S = 0.35
 """Seconds in which an arm passes into the wave, and out of it."""
 CALM_S = 0.3
@@ -50,8 +50,8 @@ def waved(joints: Array, fps: float, count: int | None, rng: np.random.Generator
     spans = [(k, *span) for k in (0, 1) for span in _lifted(joints, fps, k)]
     if not spans:
         return None
-    done = len(REPETITIONS["wave"](Motion(joints, fps)))
-    draws = done < LEAST_SWINGS if count is None else done != count
+    motion = Motion(joints, fps)
+    draws = RULES["wave"](motion, "") < SHOWN if count is None else len(REPETITIONS["wave"](motion)) != count
     longest = max(end - begin for _, begin, end in spans)
     rate, degrees = rng.uniform(*HZ), rng.uniform(*DEGREES)
     moved = joints.copy()

@@ -26,7 +26,7 @@ NOT_AS_OFTEN = 0.4
 """Best value of a motion with another number of repetitions than was asked for."""
 WAYS, ON_THE_SPOT, TURNING = frozenset({"walk", "run", "sprint"}), "turn-around", "turn"
 """A way and a turn to one side in one sentence are a turn on the way: "walks and turns left 90 degrees"."""
-SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, **dict.fromkeys(STEPPING, 4)}
+SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2, **dict.fromkeys(STEPPING, 4)}
 """Repetitions that the definition of an action asks for; a prompt may ask for fewer."""
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}

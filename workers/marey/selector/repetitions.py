@@ -130,7 +130,7 @@ def _waves(m: Motion) -> list[Repetition]:
     def of(k: int) -> Iterator[Repetition]:
         for begin, end in runs((m.hands[:, k, 1] > -0.28) & (lifting[:, k] < 0.4)):
             aside = m.hands[begin:end, k, 2]
-            for each in _tops(aside - smooth(aside, 0.5, m.fps), 0.045):
+            for each in _tops(aside - smooth(aside, 0.5, m.fps), 0.07):
                 yield Repetition(begin + each.begin, begin + each.end)
 
     return max((list(of(k)) for k in (0, 1)), key=len)

@@ -1,0 +1,71 @@
+"""Where a prompt has the head turn: "looks left, then right", "glances over her shoulder", "shakes his head"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Literal, cast
+
+Glance = Literal["left", "right", "up", "down", "around", "shake"]
+"""`around`: to one side and to the other; `shake`: quickly to and fro."""
+
+_WHERE = {
+    "left": r"left|leftwards?",
+    "right": r"right|rightwards?",
+    "up": r"up|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
+    "down": r"down|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
+    "around": r"around|about|both ways|(?:from )?side to side|left and right|right and left|behind (?:him|her|them)"
+    r"|over (?:his|her|their|the|one) (?:left |right )?shoulder",
+}
+_SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
+_ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
+_LOOKS = re.compile(
+    r"\b(?:look|glanc|gaz|peer|star|scan)(?:s|e|es|ing|ed)?\b"
+    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:his|her|their|the) head\b"
+)
+_STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b")
+_SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b|\bhead[ -]shak(?:e|ing)\b")
+_JOINT = re.compile(
+    r"(?:^|\s*[,;]|\s)\s*(?:(?:and|then|while|as|but|first)\s+)*(?:(?:an?|the)\s+(?:person|man|woman)\s+|(?:he|she|they)\s+)?"
+    r"(?:(?:is|are)\s+)?(?:\w+ly\s+)?$",
+    re.IGNORECASE,
+)
+"""What joins these words to others."""
+_DENIED = re.compile(r"\b(?:without|not|never|no|n't|don't|stops?|avoids?)\s+(?:\w+\s+)?$")
+
+
+def stated_gaze(prompt: str) -> tuple[Glance, ...]:
+    """Return where the head turns, in order; empty if a prompt does not say.
+
+    Args:
+        prompt: as a user typed it.
+    """
+    glances: list[Glance] = [glance for _, _, found in _spans(prompt) for glance in found]
+    return tuple(glance for glance, _ in groupby(glances))
+
+
+def without_gaze(prompt: str) -> str:
+    """Return a prompt without the words that have the head turn: "walks" of "walks while looking around"."""
+    kept, at = "", 0
+    for begin, end, _ in _spans(prompt):
+        joint = _JOINT.search(prompt[at:begin])
+        kept += prompt[at : begin if joint is None else at + joint.start()]
+        at = end
+    return (kept + prompt[at:]).strip(" ,;.") if at else prompt
+
+
+def _spans(prompt: str) -> Iterator[tuple[int, int, list[Glance]]]:
+    """Yield begin and end of the words that have the head turn, and where to."""
+    text = prompt.lower().replace("’", "'")
+    found: list[tuple[int, int, list[Glance]]] = [
+        (each.start(), each.end(), ["shake"]) for each in _SHAKES.finditer(text)
+    ]
+    for looks in _LOOKS.finditer(text):
+        at, glances = looks.end(), list[Glance]()
+        while (step := _STEP.match(text, at)) is not None:
+            glances.append(cast("Glance", next(name for name in _WHERE if step[name] is not None)))
+            at = step.end()
+        if glances:
+            found.append((looks.start(), at, glances))
+    yield from sorted(each for each in found if not _DENIED.search(text[: each[0]]))

@@ -1,0 +1,47 @@
+"""Where a prompt has the head turn."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.vocabulary.gazes import stated_gaze, without_gaze
+
+
+@pytest.mark.parametrize(
+    ("prompt", "gaze"),
+    [
+        ("look left, look right", ("left", "right")),
+        ("walk forward, stop, look around", ("around",)),
+        ("she glances over her shoulder", ("around",)),
+        ("looks to the left, then to the right", ("left", "right")),
+        ("looks up at the sky and then down", ("up", "down")),
+        ("turns her head to the right", ("right",)),
+        ("looks quickly to his left", ("left",)),
+        ("No: he shakes his head", ("shake",)),
+        ("he looks at her", ()),
+        ("walks without looking back", ()),
+        ("he does not look around", ()),
+        ("a good looking man turns left", ()),
+        ("looks for his keys", ()),
+        ("shakes a bottle", ()),
+    ],
+)
+def test_the_gaze_of_a_prompt(prompt: str, gaze: tuple[str, ...]) -> None:
+    assert stated_gaze(prompt) == gaze
+
+
+@pytest.mark.parametrize(
+    ("prompt", "left"),
+    [
+        ("a person walks while looking around", "a person walks"),
+        ("sits and looks left, then right", "sits"),
+        ("she walks through the forest, slowly looking left and right", "she walks through the forest"),
+        ("looks up, waves and sits down", "waves and sits down"),
+        ("look left, look right", ""),
+        ("A man looks around", ""),
+        ("walks without looking back", "walks without looking back"),
+        ("He waves.", "He waves."),
+    ],
+)
+def test_a_prompt_without_its_gaze(prompt: str, left: str) -> None:
+    assert without_gaze(prompt) == left
