@@ -215,6 +215,14 @@ def test_a_motion_of_fewer_steps_stays_and_one_with_more_is_drawn_for_them() -> 
     assert generator.frames == [frames_of_steps(12, 20.0)]
 
 
+def test_steps_of_a_fixed_length_are_drawn_and_kept_in_it() -> None:
+    generator = OneMotion(walker(6.0))
+    fixed = len(generator.made.features)
+    (made,) = generate_as_asked(generator, [replace(ask("a man takes 2 steps"), frames=fixed)])  # type: ignore[arg-type]
+    assert generator.frames == [fixed]
+    assert isinstance(made, RawMotion)  # two steps in six seconds would be too slow
+
+
 def test_a_walk_that_is_done_twice_has_any_steps() -> None:
     assert isinstance(make(walker(6.0), replace(ask("a man walks twice around the table"), open=True)), RawMotion)
 

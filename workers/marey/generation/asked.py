@@ -114,7 +114,7 @@ class _Wish:
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
         fixed."""
-        if self.count is not None and self.action in STEPPING and request.frames is not None:
+        if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
             return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
@@ -175,6 +175,14 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         if other is not None:
             features, made = other
             changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
+    features = _retimed(features, layout, wish, fixed, changes)
+    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+
+
+def _retimed(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion at the pace that is asked for, in as many frames as are `fixed`; `changes` says so."""
     speed = wish.pace.of_motion(features, layout)
     frames = max(round(len(features) / speed), 2)
     if fixed is not None and (not wish.pace.of_way or frames < fixed):
@@ -182,9 +190,9 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     if frames != len(features) and ("repetitions" in changes or speed != 1.0 or wish.pace.share != 1.0):
         changes["speed"] = round(len(features) / frames, 3)
         features = pace_features(features, layout.slices, frames)
-    if wish.pace.of_way and changes.get("speed"):
-        features = features[:fixed]  # a way may end at any step
-    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+    if wish.pace.of_way and "speed" in changes:
+        return features[:fixed]  # a way may end at any step
+    return features
 
 
 def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
