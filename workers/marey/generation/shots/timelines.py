@@ -21,6 +21,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.asked import changes_of, generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
+from marey.generation.shots.going_on import is_way, without_halt
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
@@ -273,9 +274,17 @@ class _Timeline:
         return sum(len(row.lengths) - len(row.windows) for row in self.rows) + between
 
     def settle(self, layout: FeatureLayout) -> None:
-        """Set the times of rows that are made: each is as long as its motion, and begins later where that begins much
-        higher or lower than the one before ends; not where people stand on something, since all movements begin on one
-        floor."""
+        """Set the times of rows that are made: each is as long as its motion, without a halt between two ways, and
+        begins later where that begins much higher or lower than the one before ends; not where people stand on
+        something, since all movements begin on one floor."""
+        for before, after in pairwise(self.rows):
+            if (
+                before.features is not None
+                and after.features is not None
+                and is_way(before.text)
+                and is_way(after.text)
+            ):
+                before.features, after.features = without_halt(before.features, after.features, layout)
         later, times = 0.0, list[TimedText]()
         heights = [_pelvis_heights(row.features, layout) for row in self.rows]
         for number, (timed, row) in enumerate(zip(self.timeline, self.rows, strict=True)):

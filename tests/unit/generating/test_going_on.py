@@ -1,0 +1,53 @@
+"""Walks and runs that go on into each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from marey.generation.shots.going_on import LEAST_S, MOST_S, is_way, without_halt
+from marey.generation.shots.windows import no_text
+from marey.motion.features import HUMANML3D_263
+from tests.support.bodies import Body, steady
+
+LAYOUT = HUMANML3D_263
+
+
+def way(begins: float, ends: float, seconds: float = 5.0) -> np.ndarray:
+    """Features of a walk at 1.2 m/s between two moments."""
+    body = Body(seconds, speed=lambda t: 1.2 * np.clip((t - begins) / 0.3, 0, 1) * np.clip((ends - t) / 0.3, 0, 1))
+    return LAYOUT.encode(body.joints())
+
+
+def test_the_halt_between_two_walks_is_left_out() -> None:
+    before, after = without_halt(way(-1.0, 4.0), way(0.8, 9.0), LAYOUT)
+    assert len(before) / LAYOUT.fps == pytest.approx(4.0, abs=0.45)
+    assert len(after) / LAYOUT.fps == pytest.approx(5.0 - 0.8, abs=0.45)
+
+
+def test_walks_that_go_on_stay_whole() -> None:
+    walk = LAYOUT.encode(Body(4.0, speed=steady(1.2)).joints())
+    before, after = without_halt(walk, walk, LAYOUT)
+    assert len(before) == len(after) == len(walk)
+
+
+def test_no_more_is_left_out_than_may_be() -> None:
+    before, _ = without_halt(way(-1.0, 3.0), way(-1.0, 9.0), LAYOUT)
+    assert len(before) / LAYOUT.fps == pytest.approx(5.0 - MOST_S, abs=0.1)
+    short = LAYOUT.encode(Body(1.5, speed=lambda t: np.where(t < 0.8, 1.2, 0.0)).joints())
+    assert len(without_halt(short, short, LAYOUT)[0]) / LAYOUT.fps >= LEAST_S - 0.05
+
+
+@pytest.mark.parametrize(
+    ("words", "is_one"),
+    [
+        ("a person walks forward", True),
+        ("a person runs", True),
+        ("a person bows", False),
+        ("a person walks and turns", False),
+    ],
+)
+def test_a_way_is_a_walk_or_a_run_alone(words: str, is_one: bool) -> None:
+    assert is_way(replace(no_text(4), prompt=words, rewritten=words)) is is_one

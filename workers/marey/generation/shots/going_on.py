@@ -1,0 +1,46 @@
+"""Walks and runs that go on into each other.
+
+Each movement of a sequence is made alone, so a walk may come to rest at its end, and the run after it begin from
+standing. Between two of them such frames are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.motion.courses import natural_course
+from marey.motion.features import FeatureLayout
+from marey.motion.rotations import Array
+from marey.selector.matching import WAYS, wanted_of
+from marey.text.features import TextFeatures
+
+Float32 = NDArray[np.float32]
+
+GOING = 0.7
+"""Share of its median speed under which a way begins or ends."""
+MOST_S, LEAST_S = 1.5, 1.0
+"""Seconds that are left out at most, and left at least."""
+
+
+def is_way(text: TextFeatures) -> bool:
+    """Return True if a text asks for a walk or run ahead, and for nothing else."""
+    steps = wanted_of(text.actions or (text.rewritten,)) or ()
+    return len(steps) == 1 and {each.action for each in steps[0]} <= WAYS
+
+
+def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tuple[Float32, Float32]:
+    """Return features (T, D) of two ways without the slow end of the first and the slow beginning of the second."""
+    end = len(before) - _slow(_speeds(before, layout)[::-1], layout.fps)
+    return before[:end], after[_slow(_speeds(after, layout), layout.fps) :]
+
+
+def _speeds(features: Float32, layout: FeatureLayout) -> Array:
+    """Return metres a second (T,) of a motion over the floor."""
+    return natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps).speeds(layout.fps)
+
+
+def _slow(speeds: Array, fps: float) -> int:
+    """Return how many of the first frames are slow."""
+    goes = np.flatnonzero(speeds >= GOING * np.median(speeds))
+    return max(min(int(goes[0]), round(MOST_S * fps), len(speeds) - round(LEAST_S * fps)), 0)
