@@ -31,7 +31,7 @@ _JOINT = re.compile(
     r"(?:(?:is|are)\s+)?(?:\w+ly\s+)?$",
     re.IGNORECASE,
 )
-"""What joins these words to others."""
+"""Words that join these to others."""
 _DENIED = re.compile(r"\b(?:without|not|never|no|n't|don't|stops?|avoids?)\s+(?:\w+\s+)?$")
 
 
