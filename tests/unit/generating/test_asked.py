@@ -261,3 +261,10 @@ def test_small_movements_are_drawn_where_they_are_missing(prompt: str, action: s
         assert len(REPETITIONS["nod"](Motion(HUMANML3D_263.decode(made.features), 20.0))) == 2
         again = make(HUMANML3D_263.decode(made.features), ask(prompt))
         assert isinstance(again, RawMotion)
+
+
+def test_a_glance_turns_the_head_and_leaves_the_pace_of_the_action() -> None:
+    made = make(walker(6.0), replace(ask("a man walks and quickly looks around"), open=True))
+    assert made.changes["gaze"] == ["around"]
+    assert "turn" not in made.changes
+    assert made.changes["speed"] > 1

@@ -97,13 +97,13 @@ class _Wish:
         steps = wanted_of(text.actions or (text.rewritten,))
         single = _one_action(steps or ())
         action = load_vocabulary().said_first(text.rewritten) or single
-        prompt, gaze = without_gaze(text.prompt), stated_gaze(text.prompt)
+        prompt, gaze = text.prompt, stated_gaze(text.prompt)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
         count = stated_count(prompt, action) if action in REPETITIONS else None
         if action == "spin":
             count = count or stated_spins(prompt)
-        turn, pace = stated_turn(prompt, action), AskedPace.of(prompt, action)
+        turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
         return cls(steps, action, limb_of(prompt, action), count, turn, pace, gaze)
 
     @property
