@@ -12,11 +12,11 @@ Glance = Literal["left", "right", "up", "down", "around", "shake"]
 
 _WHERE = {
     "left": r"left|leftwards?",
-    "right": r"right|rightwards?",
-    "up": r"up|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
-    "down": r"down|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
-    "around": r"around|about|both ways|(?:from )?side to side|left and right|right and left|behind (?:him|her|them)"
-    r"|over (?:his|her|their|the|one) (?:left |right )?shoulder",
+    "right": r"right(?! (?:at|into|in|through|past)\b)|rightwards?",
+    "up": r"up(?! (?:the|to) )|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
+    "down": r"down(?! the )|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
+    "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left"
+    r"|behind (?:him|her|them)|over (?:his|her|their|the|one) (?:left |right )?shoulder",
 }
 _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
@@ -24,7 +24,7 @@ _LOOKS = re.compile(
     r"\b(?:look|glanc|gaz|peer|star|scan)(?:s|e|es|ing|ed)?\b"
     r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:his|her|their|the) head\b"
 )
-_STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b")
+_STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")
 _SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b|\bhead[ -]shak(?:e|ing)\b")
 _JOINT = re.compile(
     r"(?:^|\s*[,;]|\s)\s*(?:(?:and|then|while|as|but|first)\s+)*(?:(?:an?|the)\s+(?:person|man|woman)\s+|(?:he|she|they)\s+)?"

@@ -23,6 +23,10 @@ from marey.vocabulary.gazes import stated_gaze, without_gaze
         ("he does not look around", ()),
         ("a good looking man turns left", ()),
         ("looks for his keys", ()),
+        ("looks right at the camera", ()),
+        ("looks down the street", ()),
+        ("looks about to fall", ()),
+        ("looks left-handed", ()),
         ("shakes a bottle", ()),
     ],
 )

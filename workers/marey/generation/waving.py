@@ -36,13 +36,8 @@ DEGREES, HZ = (18.0, 30.0), (1.6, 2.3)
 
 def waves_well(joints: Array, fps: float) -> bool:
     """Return True if a waving arm swings about its elbow."""
-    shares = [
-        share
-        for k in (0, 1)
-        for begin, end in _lifted(joints, fps, k)
-        if (share := _elbow_share(joints, fps, k, begin, end))
-    ]
-    return not shares or max(shares) <= ELBOW_MOVES
+    shares = (_elbow_share(joints, fps, k, begin, end) for k in (0, 1) for begin, end in _lifted(joints, fps, k))
+    return max(shares, default=0.0) <= ELBOW_MOVES
 
 
 def waved(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array | None:
