@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.curves import hump, smooth_open
+from marey.motion.features import FeatureLayout
 from marey.motion.feet import runs
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.legs import follow_feet, foot_chain
@@ -70,6 +71,11 @@ def natural_course(joints: Array, skeleton: Skeleton, fps: float) -> Course:
     headings = np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2]))
     sigma = NATURAL_S * fps
     return Course(smooth_open(joints[:, 0, [0, 2]], sigma), smooth_open(headings[:, None], sigma)[:, 0])
+
+
+def course_of(features: Array, layout: FeatureLayout) -> Course:
+    """Return the smoothed path of a motion of features (T, D), in the layout's own units."""
+    return natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps)
 
 
 def bent(

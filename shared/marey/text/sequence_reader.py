@@ -84,9 +84,8 @@ _STOP = re.compile(
     (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
     re.IGNORECASE | re.VERBOSE,
 )
-
-
 _STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
+"""Beginning of a clause that ends the way before it."""
 
 
 @dataclass(frozen=True)
@@ -241,13 +240,12 @@ def without_joints(text: str) -> str:
     return bare or text.strip()
 
 
-def in_order(clauses: Iterable[ReadClause]) -> list[list[ReadClause]]:
+def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
     """Return clauses in groups, in the order of time; those of a group come at once.
 
     Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
     down" and "before leaving, he bows" are told in the other order.
     """
-    clauses = list(clauses)
     groups: list[list[ReadClause]] = []
     at = 0
     for before, clause in zip([None, *clauses], clauses, strict=False):
@@ -321,18 +319,15 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
     )
 
 
-def _with_origins(clauses: Sequence[ReadClause]) -> Iterator[ReadClause]:
-    """Yield clauses; what comes behind "from" belongs to the one before: "gets up from | lying on the ground"."""
-    last: ReadClause | None = None
+def _with_origins(clauses: Iterable[ReadClause]) -> list[ReadClause]:
+    """Return clauses; what comes behind "from" belongs to the one before: "gets up from | lying on the ground"."""
+    found: list[ReadClause] = []
     for clause in clauses:
-        if last is not None and last.text.lower().endswith(" from"):
-            last = replace(last, text=f"{last.text} {clause.text}")
-            continue
-        if last is not None:
-            yield last
-        last = clause
-    if last is not None:
-        yield last
+        if found and found[-1].text.lower().endswith(" from"):
+            found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
+        else:
+            found.append(clause)
+    return found
 
 
 def _risen_from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:

@@ -103,11 +103,11 @@ class Vocabulary:
     def said_first(self, text: str) -> str | None:
         """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
         text = text.lower()
-        return next((name for plain, name in self._plain.items() if text.startswith(f"{plain}, ")), None)
+        return next((name for words, name in self._first_words.items() if text.startswith(words)), None)
 
     @cached_property
-    def _plain(self) -> dict[str, str]:
-        return {action.plain_words: action.id for action in self.actions.values()}
+    def _first_words(self) -> dict[str, str]:
+        return {f"{action.plain_words}, ": action.id for action in self.actions.values()}
 
     @cached_property
     def _implied(self) -> dict[str, frozenset[str]]:

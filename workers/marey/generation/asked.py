@@ -22,7 +22,7 @@ from marey.generation.repetitions import repeated
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.turned import NEAR, turned_features
 from marey.items.values import MAX_SECONDS
-from marey.motion.courses import natural_course
+from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
@@ -229,7 +229,7 @@ def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
 
 def _turn(features: Float32, layout: FeatureLayout) -> float:
     """Return the degrees by which a motion turns, positive to the left."""
-    return natural_course(layout.decode(features), layout.skeleton, layout.fps).turn
+    return course_of(features, layout).turn
 
 
 def _repetitions(joints: NDArray[np.floating], fps: float, action: str) -> Sequence[Repetition]:

@@ -74,15 +74,14 @@ def _turns(glances: Sequence[str], frames: int, fps: float, rng: np.random.Gener
             turns[begin:end, 0] = _shaken(end - begin, fps)
         else:
             turns[begin:end] = np.array(DEGREES[way]) * rng.uniform(0.85, 1.1)
-    shaken = np.array([way == "shake" for way in ways]).all()
-    return turns if shaken else smooth(turns, PASSES_S * fps)
+    return turns if set(ways) == {"shake"} else smooth(turns, PASSES_S * fps)
 
 
 def _shaken(frames: int, fps: float) -> Array:
     """Return degrees (T,) to the left of a head that is shaken, in rows."""
-    row, pause = SHAKES / SHAKE_HZ, PAUSE_S
-    within = (np.arange(frames) / fps) % (row + pause)
-    last = frames / fps // (row + pause) * (row + pause)
-    whole = (np.arange(frames) / fps < last) | (frames / fps - last >= row)
+    time, row = np.arange(frames) / fps, SHAKES / SHAKE_HZ
+    within = time % (row + PAUSE_S)
+    last = frames / fps // (row + PAUSE_S) * (row + PAUSE_S)
+    whole = (time < last) | (frames / fps - last >= row)
     swing = np.sin(2 * np.pi * SHAKE_HZ * within) * np.sin(np.pi * np.clip(within / row, 0, 1)) ** 0.5
     return SHAKE_DEGREES * swing * (within < row) * whole

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.courses import natural_course
+from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.selector.matching import WAYS
 from marey.vocabulary.paces import Pace, stated_pace
@@ -89,8 +89,7 @@ class AskedPace:
         """Return how many times as fast a motion (T, D) in the layout's own units is played."""
         if not self.of_way:
             return self.share
-        course = natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps)
-        speeds = course.speeds(layout.fps)
+        speeds = course_of(features, layout).speeds(layout.fps)
         speed = float(np.median(speeds[speeds > MOVING])) if (speeds > MOVING).mean() > 0.5 else 0.0
         speeds_of = WAY_SPEEDS[self.action]
         wanted = {"slow": min(speed, speeds_of.slow), "fast": max(speed, speeds_of.fast)}

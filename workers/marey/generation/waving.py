@@ -16,12 +16,10 @@ from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import SHOWN
-from marey.selector.motion import Motion
+from marey.selector.motion import UP, Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES
 
-UP = -0.28
-"""Metres over the shoulder from which on a hand is up: the height of the chest."""
 LEAST_S = 0.8
 """Seconds for which a hand is up at least that waves."""
 ELBOW_MOVES = 0.4
@@ -103,8 +101,7 @@ def _still_elbow(joints: Array, k: int, strength: Array, swing: Array | None, fp
     fore = joints[:, WRISTS[k]] - joints[:, ELBOWS[k]]
     elbow = joints[:, SHOULDERS[k]] + _calmed(upper, strength, fps)
     if swing is None:
-        wanted = joints[:, WRISTS[k]] - elbow
-        wrist = wanted * (np.linalg.norm(fore, axis=-1) / np.maximum(np.linalg.norm(wanted, axis=-1), 1e-6))[:, None]
+        wrist = _as_long(joints[:, WRISTS[k]] - elbow, fore)
     else:
         calm = _calmed(fore, strength, fps)
         wrist = rotate(from_rotvec(np.radians(swing)[:, None] * _axis(joints, calm, fps)), calm)
@@ -113,9 +110,12 @@ def _still_elbow(joints: Array, k: int, strength: Array, swing: Array | None, fp
 
 def _calmed(bones: Array, strength: Array, fps: float) -> Array:
     """Return vectors (T, 3) of the same length that go on their way without swinging."""
-    mixed = bones + strength[:, None] * (smooth(bones, CALM_S * fps) - bones)
-    length = np.linalg.norm(bones, axis=-1) / np.maximum(np.linalg.norm(mixed, axis=-1), 1e-6)
-    return mixed * length[:, None]
+    return _as_long(bones + strength[:, None] * (smooth(bones, CALM_S * fps) - bones), bones)
+
+
+def _as_long(vectors: Array, bones: Array) -> Array:
+    """Return vectors (T, 3) with the lengths of others."""
+    return vectors * (np.linalg.norm(bones, axis=-1) / np.maximum(np.linalg.norm(vectors, axis=-1), 1e-6))[:, None]
 
 
 def _axis(joints: Array, fore: Array, fps: float) -> Array:

@@ -20,7 +20,7 @@ from marey.checks.stretch import Arm, both_arms
 from marey.motion.feet import runs
 from marey.selector.gaits import stays
 from marey.selector.grades import SIDES, best, least, most, of_side, share, some
-from marey.selector.motion import SHORTEST, Array, Motion
+from marey.selector.motion import SHORTEST, UP, Array, Motion
 
 
 def _up(hand: Arm) -> float:
@@ -55,7 +55,7 @@ def wave(m: Motion, side: str) -> float:
 def _half_swings(m: Motion, k: int) -> int:
     """Return how often in a row a hand at the chest or over it swings by 7 cm or more, to and fro."""
     most_swings = 0
-    for a, b in runs(m.hands[:, k, 1] > -0.28):
+    for a, b in runs(m.hands[:, k, 1] > UP):
         way = m.hands[a:b, k] - smooth(m.hands[a:b, k], 0.5, m.fps)
         if len(way) < SHORTEST:
             continue

@@ -35,6 +35,8 @@ Bool = NDArray[np.bool_]
 
 SHORTEST = 8
 """Frames of the shortest motion that is matched."""
+UP = -0.28
+"""Metres over the shoulders from which on a hand is up: the height of the chest."""
 CHEST = HUMANML3D.index("spine3")
 OFF_FLOOR = 0.04
 """Metres over its standing height from which a foot is off the floor."""

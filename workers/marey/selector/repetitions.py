@@ -10,13 +10,11 @@ import numpy as np
 
 from marey.checks.kinematics import ANKLES, HEAD, WRISTS, smooth, swings, trunk_up, velocity
 from marey.motion.feet import runs
-from marey.selector.motion import OFF_FLOOR, Array, Motion
+from marey.selector.motion import OFF_FLOOR, UP, Array, Motion
 from marey.vocabulary.counts import STEPPING
 
 LOW = 0.35
 """Share of a rise up to which a repetition has not begun, and from which on it is over on the way back."""
-
-
 STANDS, LEAST_STEP = 0.6, 0.15
 """Speed under which a foot stands, m/s, and metres from a place of a foot to the next one."""
 
@@ -128,7 +126,7 @@ def _waves(m: Motion) -> list[Repetition]:
     lifting = np.abs(velocity(smooth(m.hands[..., 1], 0.15, m.fps)[..., None], m.fps))[..., 0]
 
     def of(k: int) -> Iterator[Repetition]:
-        for begin, end in runs((m.hands[:, k, 1] > -0.28) & (lifting[:, k] < 0.4)):
+        for begin, end in runs((m.hands[:, k, 1] > UP) & (lifting[:, k] < 0.4)):
             aside = m.hands[begin:end, k, 2]
             for each in _tops(aside - smooth(aside, 0.5, m.fps), 0.07):
                 yield Repetition(begin + each.begin, begin + each.end)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.courses import natural_course
+from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.motion.rotations import Array
 from marey.selector.matching import WAYS, wanted_of
@@ -31,13 +31,8 @@ def is_way(text: TextFeatures) -> bool:
 
 def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tuple[Float32, Float32]:
     """Return features (T, D) of two ways without the slow end of the first and the slow beginning of the second."""
-    end = len(before) - _slow(_speeds(before, layout)[::-1], layout.fps)
-    return before[:end], after[_slow(_speeds(after, layout), layout.fps) :]
-
-
-def _speeds(features: Float32, layout: FeatureLayout) -> Array:
-    """Return metres a second (T,) of a motion over the floor."""
-    return natural_course(layout.decode(features).astype(np.float64), layout.skeleton, layout.fps).speeds(layout.fps)
+    ends, begins = (course_of(features, layout).speeds(layout.fps) for features in (before, after))
+    return before[: len(before) - _slow(ends[::-1], layout.fps)], after[_slow(begins, layout.fps) :]
 
 
 def _slow(speeds: Array, fps: float) -> int:
