@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.retarget import two_bones
 from marey.motion.rotations import from_matrix, normalize, to_euler
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.bones import two_bones
 
 Array = NDArray[np.floating]
 FPS = 20.0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from marey.data.retarget import two_bones
+from marey.posing.bones import two_bones
 from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion
 from tests.support.bodies import FPS, LENGTH, Array, Body, walker

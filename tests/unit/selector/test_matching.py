@@ -40,7 +40,7 @@ def jumper(height: float, distance: float) -> Array:
 
 def lowered(heights: list[float]) -> Array:
     """A standing body of which the hips go through these heights, the feet in place."""
-    from marey.data.retarget import two_bones
+    from marey.posing.bones import two_bones
     from tests.support.bodies import LENGTH
 
     joints = Body(3.0).joints()

@@ -28,11 +28,11 @@ from marey.data.pack import SPLITS, JointsPack, PackClip
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from marey.data.retarget import resample_points
 from marey.data.soundness import is_broken
-from marey.data.splice import with_bones
 from marey.data.splits import Sourced, actions_of, splits_by_source
 from marey.data.spoken import sayings, spoken
 from marey.data.text_sequences import compose_texts, joined_texts
 from marey.motion.features import HUMANML3D_263
+from marey.posing.bones import with_bones
 
 Array = NDArray[np.floating]
 # The heading is smoothed over half a second: this removes the sway of a gait (1 Hz) but follows turns. Hips and

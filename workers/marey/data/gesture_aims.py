@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
-from marey.data.gesture_poses import LEFT, OTHER_SIDE, StandingBody, eased, envelope, stations
+from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, eased, envelope, stations
 
 Array = NDArray[np.floating]
 

@@ -7,7 +7,7 @@ import random
 import numpy as np
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, drawn_arm, respond
-from marey.data.gesture_poses import ARMS, StandingBody, swings, swung
+from marey.posing.standing import ARMS, StandingBody, swings, swung
 
 _WAVES = {
     "wave-high": {"upper": ((20, 100), (5, 60)), "fore": ((30, 90), (72, 88)), "swing": (14, 34)},

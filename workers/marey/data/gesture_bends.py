@@ -6,9 +6,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of
-from marey.data.gesture_poses import LEFT
 from marey.data.gesture_postures import STAND, HandPlace, Point, Posture
 from marey.data.gesture_sequels import TEMPOS, Sequel, both, near
+from marey.posing.standing import LEFT
 
 _SQUATS = {
     "squat-ahead": ((0.0, -0.04, 0.5), "shoulder", (0.4, -1.0, 0.0)),

@@ -7,8 +7,8 @@ import random
 from marey.data.gesture_blows import Blow, Point, strike
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near, on_guard
-from marey.data.gesture_poses import OTHER_SIDE, StandingBody
 from marey.data.gesture_stances import step
+from marey.posing.standing import OTHER_SIDE, StandingBody
 
 _STABS: dict[str, tuple[Point, Point, Point]] = {
     "stab-knife": ((0.16, -0.22, 0.22), (0.2, -0.24, -0.02), (0.04, -0.16, 0.52)),

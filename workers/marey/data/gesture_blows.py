@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES
-from marey.data.gesture_poses import LEFT, StandingBody
 from marey.data.gesture_stances import glide, settle, turn_hips
+from marey.posing.standing import LEFT, StandingBody
 
 Array = NDArray[np.floating]
 Point = Sequence[float]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of
 from marey.data.gesture_hops import jumps
-from marey.data.gesture_poses import StandingBody, envelope, stations
 from marey.data.part import FPS
+from marey.posing.standing import StandingBody, envelope, stations
 
 Array = NDArray[np.floating]
 

@@ -12,7 +12,7 @@ from marey.data.gesture_drawing import Gesture
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT
-from marey.data.splice import with_bones
+from marey.posing.bones import with_bones
 
 Array = NDArray[np.floating]
 

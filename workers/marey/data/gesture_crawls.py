@@ -6,9 +6,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import Sequel
+from marey.posing.standing import LEFT, RIGHT
 
 _PELVIS = 0.47
 """Metres of the hips over the floor: a thigh over a knee that lies on it."""

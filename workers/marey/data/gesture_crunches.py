@@ -9,10 +9,10 @@ from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_flights import standing_feet
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody
 from marey.data.gesture_posing import pose
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture, mirrored
 from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.standing import LEFT, RIGHT, StandingBody
 
 _GUARD = {
     "crunch-head": HandPlace((0.09, 0.14, 0.0), "trunk", (1.0, -0.1, 0.2)),

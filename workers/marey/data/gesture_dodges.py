@@ -6,9 +6,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Posture
 from marey.data.gesture_sequels import Sequel, both
+from marey.posing.standing import LEFT, RIGHT
 
 _GUARD = {
     LEFT: HandPlace((-0.06, 0.02, 0.32), "trunk", (0.5, -1.0, -0.1)),

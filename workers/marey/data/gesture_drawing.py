@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_poses import LEFT, RIGHT, StandingBody, direction, envelope
 from marey.data.part import Part
+from marey.posing.standing import LEFT, RIGHT, StandingBody, direction, envelope
 
 Array = NDArray[np.floating]
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_floor import SUPINE, on_back
-from marey.data.gesture_poses import StandingBody, direction, eased
 from marey.data.gesture_posing import pose
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import Sequel, both, near
 from marey.data.part import FPS
+from marey.posing.standing import StandingBody, direction, eased
 
 Array = NDArray[np.floating]
 

@@ -6,8 +6,8 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair
+from marey.posing.standing import LEFT, RIGHT
 
 _FORMS = {"back": 4, "front": 3, "knees": 4, "knees-side": 2, "side": 3, "sit": 2, "spin": 2}
 _TEMPOS = {"quick": (0.8, 0.95), "": (0.95, 1.2), "slow": (1.4, 2.0)}

@@ -6,9 +6,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import FLOOR_PACES, Sequel, both
+from marey.posing.standing import LEFT, RIGHT
 
 SUPINE = -85.0
 """Degrees by which the hips of a body on its back are tilted."""

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of, respond
-from marey.data.gesture_poses import ARMS, StandingBody
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
+from marey.posing.standing import ARMS, StandingBody
 
 Array = NDArray[np.floating]
 

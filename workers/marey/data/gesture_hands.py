@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, respond
-from marey.data.gesture_poses import StandingBody, direction, stations, swings
+from marey.posing.standing import StandingBody, direction, stations, swings
 
 Array = NDArray[np.floating]
 

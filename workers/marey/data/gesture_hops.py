@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_flights import StandingFoot, fly, on_feet
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Posture
 from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.standing import LEFT, RIGHT
 
 _LONGEST = 7.6
 """Seconds of all hops or jumps."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import SIDES
-from marey.data.gesture_poses import ARMS
 from marey.data.part import Part
+from marey.posing.standing import ARMS
 
 Array = NDArray[np.floating]
 

@@ -8,9 +8,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.standing import LEFT, RIGHT
 
 _LEG = 0.785
 """Metres from hip to ankle of a leg that is almost straight."""

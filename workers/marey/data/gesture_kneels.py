@@ -7,9 +7,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import FLOOR_PACES, Sequel, both
+from marey.posing.standing import LEFT, RIGHT
 
 _BACK = FootPlace((0.1, 0.15, -0.66), (0.0, -0.93, 0.35))
 _FLAT = FootPlace((0.1, 0.085, -0.66), (0.0, -0.3, -0.95))

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
-from marey.data.gesture_poses import ARMS, LEFT, LEGS, SIGN, StandingBody, eased
 from marey.data.gesture_postures import HandPlace, Posture
-from marey.data.limbs import BONE_LENGTHS, CARRIED
 from marey.data.part import FPS
-from marey.data.retarget import two_bones
 from marey.motion.rotations import cross, normalize
+from marey.posing.bones import two_bones
+from marey.posing.limbs import BONE_LENGTHS, CARRIED
+from marey.posing.standing import ARMS, LEFT, LEGS, SIGN, StandingBody, eased
 
 Array = NDArray[np.floating]
 

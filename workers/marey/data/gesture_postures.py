@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from marey.data.gesture_poses import LEFT, RIGHT
+from marey.posing.standing import LEFT, RIGHT
 
 Point = tuple[float, float, float]
 

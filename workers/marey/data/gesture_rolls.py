@@ -6,8 +6,8 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair, stood
+from marey.posing.standing import LEFT, RIGHT
 
 _TUCKED = pair(Limb((0.1, -0.36, 0.4), towards=(0.1, -0.6, 0.8)))
 _SHINS = pair(Limb((0.2, -0.3, 0.3), towards=(0.9, -0.3, 0.1)))

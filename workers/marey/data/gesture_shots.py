@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from marey.data.gesture_aims import GUNS, TWISTS
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
-from marey.data.gesture_poses import LEFT, OTHER_SIDE, StandingBody, stations
 from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS
+from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, stations
 
 Array = NDArray[np.floating]
 

@@ -7,8 +7,8 @@ import random
 import numpy as np
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_travel import gentle_bend, straight_gait
+from marey.posing.standing import StandingBody
 
 _PACES = (0.58, 0.9)
 _SPEEDS = (0.34, 1.0)  # m/s

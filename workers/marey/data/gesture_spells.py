@@ -6,9 +6,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.data.gesture_sequels import Sequel, near
+from marey.posing.standing import LEFT, RIGHT
 
 _OUT: Point = (0.8, -0.8, -0.3)
 _Hands = dict[str, HandPlace]

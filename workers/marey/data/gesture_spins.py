@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, StandingBody, eased
 from marey.data.gesture_steps import small_step_spin
 from marey.data.gesture_ways import about_vertical, posed, spine_yaw
-from marey.data.limbs import LEG_CHAINS, LEVEL
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
-from marey.data.splice import with_bones
 from marey.motion.rotations import from_rotvec, rotate
+from marey.posing.bones import with_bones
+from marey.posing.limbs import LEG_CHAINS, LEVEL
+from marey.posing.standing import LEFT, StandingBody, eased
 
 Array = NDArray[np.floating]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import smooth
 from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_idles import is_plain_idle, of_length
-from marey.data.gesture_poses import ARMS, LEFT, RIGHT, StandingBody, eased
 from marey.data.gesture_steps import Footstep, Manner, stepped
 from marey.data.part import FPS, Part
+from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody, eased
 
 Array = NDArray[np.floating]
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from marey.data.gesture_poses import LEFT, LEGS, StandingBody, eased
 from marey.data.part import FPS
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.standing import LEFT, LEGS, StandingBody, eased
 
 Array = NDArray[np.floating]
 

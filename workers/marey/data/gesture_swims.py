@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, StandingBody
 from marey.data.gesture_tumbling import BODY, WholeMotion, tumble
 from marey.data.part import FPS
+from marey.posing.standing import LEFT, StandingBody
 
 Array = NDArray[np.floating]
 

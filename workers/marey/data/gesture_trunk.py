@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
-from marey.data.gesture_poses import StandingBody, envelope, swings, tremble
+from marey.posing.standing import StandingBody, envelope, swings, tremble
 
 _SLIGHT, _DEEP = 36.0, 66.0
 """Degrees of a bow from the hips to the neck; the trunk as a whole tilts by three quarters of this."""

@@ -17,12 +17,12 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import ARMS, LEFT, LEGS, RIGHT, SIGN, StandingBody
 from marey.data.gesture_postures import Point
-from marey.data.limbs import BONE_LENGTHS, CARRIED, LEVEL
 from marey.data.part import FPS, GRAVITY
-from marey.data.retarget import two_bones
 from marey.motion.rotations import cross, from_rotvec, normalize, rotate
+from marey.posing.bones import two_bones
+from marey.posing.limbs import BONE_LENGTHS, CARRIED, LEVEL
+from marey.posing.standing import ARMS, LEFT, LEGS, RIGHT, SIGN, StandingBody
 
 Array = NDArray[np.floating]
 

@@ -7,9 +7,9 @@ import random
 import numpy as np
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_poses import StandingBody, direction, eased, envelope
 from marey.data.gesture_stances import settle, turn_hips
 from marey.data.part import FPS
+from marey.posing.standing import StandingBody, direction, eased, envelope
 
 _ARMS = {
     "twist-out": {"azimuth": (78, 96), "up": (-8, 8), "fore": (78, 96), "fore_up": (-6, 8)},

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
-from marey.data.gesture_poses import OTHER_SIDE, StandingBody, stations, swings
 from marey.data.part import FPS
+from marey.posing.standing import OTHER_SIDE, StandingBody, stations, swings
 
 Array = NDArray[np.floating]
 

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
-from marey.data.gesture_poses import eased
-from marey.data.limbs import CARRIED, LEG_CHAINS, PARENTS
 from marey.data.part import FPS, GRAVITY
-from marey.data.splice import knee_poles, with_bones
 from marey.motion.rotations import from_rotvec, rotate
+from marey.posing.bones import knee_poles, with_bones
+from marey.posing.limbs import CARRIED, LEG_CHAINS, PARENTS
+from marey.posing.standing import eased
 
 Array = NDArray[np.floating]
 

@@ -7,9 +7,9 @@ import random
 from dataclasses import replace
 
 from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_poses import LEFT, RIGHT
 from marey.data.gesture_postures import FootPlace, HandPlace, Posture
 from marey.data.gesture_sequels import Sequel
+from marey.posing.standing import LEFT, RIGHT
 
 _CARS = {
     "drive-car": {"seat": (0.4, 0.5), "lean": (-16, -6), "feet": (0.2, 0.3), "radius": (0.165, 0.19), "tilt": (20, 35)},

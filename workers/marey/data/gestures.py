@@ -49,7 +49,6 @@ from marey.data.gesture_kneels import kneel
 from marey.data.gesture_laughs import laugh
 from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
-from marey.data.gesture_poses import StandingBody
 from marey.data.gesture_pushes import push
 from marey.data.gesture_rolls import flip, roll
 from marey.data.gesture_seats import sit, sit_down, stand_up
@@ -71,6 +70,7 @@ from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
 from marey.data.spoken import spoken
+from marey.posing.standing import StandingBody
 
 Array = NDArray[np.floating]
 

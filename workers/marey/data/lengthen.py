@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.captions import seeded
-from marey.data.limbs import LEVEL
 from marey.data.part import FPS
 from marey.data.splice import join_clips, seam_costs, seam_features
 from marey.motion.support import RADII
+from marey.posing.limbs import LEVEL
 
 Array = NDArray[np.floating]
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
-from marey.data.limbs import ARM_CHAINS, BONE_LENGTHS, LEG_CHAINS
 from marey.data.rigs import CapturedRig
 from marey.motion.filters import smooth
 from marey.motion.io.bvh import BvhClip
@@ -22,15 +21,15 @@ from marey.motion.kinematics import global_rotations
 from marey.motion.rotations import cross, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.motion.units import METRES, Unit
+from marey.posing.bones import two_bones
+from marey.posing.limbs import ARM_CHAINS, BONE_LENGTHS, FPS, LEG_CHAINS
 
 Array = NDArray[np.floating]
-FPS = 20.0
 _UP = np.array([0.0, 1.0, 0.0])
 _REST: Array = HUMANML3D.offsets.astype(np.float64)
 _KNEE_PRIOR = 0.03  # metres of "forward" added to the source's knee direction; matters only for a stretched leg
 _SAME_WIDTH = 0.03  # metres; smaller differences in half the hip width are ignored
 _SWAY = 0.25  # seconds
-_MAX_REACH = 0.9995  # a fully stretched leg has no knee plane
 
 
 @dataclass(frozen=True)
@@ -256,19 +255,6 @@ def _knee_pole(leg: Array, forward: Array) -> Array:
     axis = normalize(leg[:, 2] - leg[:, 0])
     bend = leg[:, 1] - leg[:, 0]
     return bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None] + _KNEE_PRIOR * forward
-
-
-def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float]) -> tuple[Array, Array]:
-    """Solve the knee (T, 3) by the cosine rule, bent towards `pole`; move the ankle (T, 3) into reach if needed."""
-    upper, lower = lengths
-    line = ankle - hip
-    distance = np.linalg.norm(line, axis=-1, keepdims=True)
-    axis = line / distance
-    distance = np.clip(distance, abs(upper - lower) + 1e-3, (upper + lower) * _MAX_REACH)
-    pole = normalize(pole - axis * np.einsum("ti,ti->t", pole, axis)[:, None])
-    along = (distance**2 + upper**2 - lower**2) / (2 * distance)
-    aside = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
-    return hip + along * axis + aside * pole, hip + distance * axis
 
 
 def canonical(joints: Array) -> Array:

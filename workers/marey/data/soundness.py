@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.limbs import LEG_CHAINS
 from marey.motion.rotations import cross, normalize
+from marey.posing.limbs import LEG_CHAINS
 
 Array = NDArray[np.floating]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.limbs import BONE_LENGTHS, CARRIED, LEG_CHAINS, LEVEL, PARENTS
-from marey.data.retarget import two_bones
-from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
+from marey.motion.rotations import between, from_rotvec, normalize, rotate, to_rotvec
+from marey.posing.bones import directions_of, knee_poles, rebuilt
+from marey.posing.limbs import LEG_CHAINS, LEVEL
 
 Array = NDArray[np.floating]
 
@@ -78,7 +78,7 @@ def join_clips(first: Array, second: Array, fps: float) -> Array:
     second = place_after(first, second, fps)
     frames = min(round(BLEND_SECONDS * fps), len(second) - 1)
     tail = second[1:].copy()
-    tail[:frames] = _rebuild(*_blend(first, second, frames, fps))
+    tail[:frames] = rebuilt(*_blend(first, second, frames, fps))
     return np.concatenate([first, tail])
 
 
@@ -96,7 +96,7 @@ def _blend(first: Array, second: Array, frames: int, fps: float) -> tuple[Array,
     toes[..., 1] = np.maximum(
         toes[..., 1] + _lift(ends[0], ends[1], frames, fps), np.minimum(target[:, [10, 11], 1], 0)
     )
-    directions = turned(_directions(ends[0]), _directions(ends[1]), _directions(target))
+    directions = turned(directions_of(ends[0]), directions_of(ends[1]), directions_of(target))
     return root, directions, toes, turned(knee_poles(ends[0]), knee_poles(ends[1]), knee_poles(target))
 
 
@@ -127,46 +127,6 @@ def _lift(before: Array, after: Array, frames: int, fps: float) -> Array:
         if offset > _STEP_FROM and (_stands(before[:, toe], fps) or _stands(after[:, toe], fps)):
             out[:, side] = min(0.12, 0.04 + 0.3 * offset) * bump
     return out
-
-
-def _directions(joints: Array) -> Array:
-    """(n, 22, 3) unit vectors from each joint's parent."""
-    return normalize(joints - joints[:, PARENTS]).astype(np.float64)
-
-
-def knee_poles(joints: Array) -> Array:
-    """Unit vectors (T, 2, 3) from the line between hip and ankle to the knee, with a little forward added."""
-    left = joints[:, 1] - joints[:, 2]
-    forward = normalize(cross(left, np.broadcast_to([0.0, 1.0, 0.0], left.shape)))
-    out = []
-    for hip, knee, ankle, _ in LEG_CHAINS:
-        axis = normalize(joints[:, ankle] - joints[:, hip])
-        bend = joints[:, knee] - joints[:, hip]
-        bend = bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None]
-        out.append(bend + 0.03 * forward)
-    return normalize(np.stack(out, axis=1)).astype(np.float64)
-
-
-def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array:
-    """Joints (n, 22, 3) with bones of the skeleton's lengths, from what `_blend` returns."""
-    joints = np.empty((len(root), 22, 3))
-    joints[:, 0] = root
-    for j in CARRIED[1:]:
-        joints[:, j] = joints[:, PARENTS[j]] + BONE_LENGTHS[j] * directions[:, j]
-    for side, (hip, knee, ankle, toe) in enumerate(LEG_CHAINS):
-        foot = BONE_LENGTHS[toe] * directions[:, toe]
-        wanted = toes[:, side] - foot
-        joints[:, knee], joints[:, ankle] = two_bones(
-            joints[:, hip], wanted, poles[:, side], (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
-        )
-        joints[:, toe] = joints[:, ankle] + foot
-    return joints
-
-
-def with_bones(joints: Array) -> Array:
-    """Restore the skeleton's bone lengths in poses (T, 22, 3), metres: bones keep their directions, the pelvis and the
-    toes their places, as far as a leg reaches; the knees are solved."""
-    return _rebuild(joints[:, 0], _directions(joints), joints[:, [10, 11]], knee_poles(joints))
 
 
 # -- where to cut --------------------------------------------------------------------------------------------------

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.limbs import ARM_CHAINS, BONE_LENGTHS, CARRIED, LEG_CHAINS
-from marey.data.part import FPS
-from marey.data.splice import with_bones
 from marey.motion.filters import smootherstep
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.bones import with_bones
+from marey.posing.limbs import ARM_CHAINS, BONE_LENGTHS, CARRIED, FPS, LEG_CHAINS
 
 Array = NDArray[np.floating]
 
