@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
-from marey.text.action_reader import SURE_OF_SEVERAL, ReadAction, action_reader
+from marey.text.action_reader import STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
@@ -32,6 +32,7 @@ from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
 from marey.text.words import EDGE_PUNCTUATION
+from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+SEATED: Mapping[str, str] = {"sit-down": "sit", "sit": "sit", "sit-floor": "sit-floor", "kneel": "kneel"}
+"""What goes on while a gesture is made behind an action off the feet."""
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
 
 
@@ -237,21 +240,56 @@ class TextPipeline:
         texts = [without_rise(text) for text in texts]
         if not self._reads_actions:
             return [_Reading.of(text, only_action(text)) for text in texts]
-        reader = action_reader()
-        read = [reader.read(text, vector) for text, vector in zip(texts, self.pooled(texts), strict=True)]
-        return list(map(self._reading, texts, read))
+        bare = [BarePrompt.of(text) for text in texts]
+        self.pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
+        return [self._borne(each) or self._reading(as_written(text)) for each, text in zip(bare, texts, strict=True)]
 
-    def _reading(self, text: str, read: ReadAction) -> _Reading:
-        rests = way_to_rest(text, read.action)
+    def _reading(self, bare: BarePrompt) -> _Reading:
+        read = self._read_action(bare.text)
+        rests = way_to_rest(bare.prompt, read.action)
         sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
-        if self.spec.movements and not sure and (movements := self._movements_in(text, read.action)):
-            return _Reading(text, movements)
-        return _Reading.of(text, read.action)
+        if self.spec.movements and not sure and (movements := self._movements_in(bare, read.action)):
+            return _Reading(bare.prompt, movements)
+        return _Reading.of(bare.prompt, read.action)
 
-    def _movements_in(self, text: str, action: str | None) -> tuple[ReadMovement, ...]:
+    def _borne(self, bare: BarePrompt) -> _Reading | None:
+        """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
+        that cannot be shown beside its actions."""
+        if not bare.stated:
+            return None
+        if self.spec.movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
+            return _Reading(bare.prompt, movements)
+        stands = not bare.text or (self._read_action(bare.text).action is None and not named_actions(bare.text))
+        if stands:
+            return _Reading.of(bare.prompt, STANDING) if bare.fits(STANDING) else None
+        reading = self._reading(bare)
+        shown = [each.action for each in reading.movements] or [self._read_action(bare.text).action]
+        return reading if any(action is not None and bare.fits(action) for action in shown) else None
+
+    def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
+        """Return the movements of the parts of a prompt, some of which are gestures; those of a seated body are made on
+        the seat. Parts that ask for no action are left out."""
+        found: list[ReadMovement] = []
+        for part in parts:
+            bare = BarePrompt.of(part)
+            if bare.stated and not bare.text:
+                before = found[-1].action if found else None
+                found.append(ReadMovement(part, SEATED.get(before or "", STANDING)))
+                continue
+            reading = self._borne(bare) or self._reading(as_written(part))
+            text = bare.text if bare.stated else part
+            action = self._read_action(text).action
+            asked = action is not None or named_actions(text)
+            found += reading.movements or ([ReadMovement(part, action)] if asked else [])
+        return tuple(found) if len(found) > 1 else ()
+
+    def _read_action(self, text: str) -> ReadAction:
+        return action_reader().read(text, self.pooled([text])[0])
+
+    def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
         with self._lock:
-            encoding = self.encoder.encode(text)
-        return sequence_reader().read(text, encoding, self.pooled, action)
+            encoding = self.encoder.encode(bare.text)
+        return sequence_reader().read(bare, encoding, self.pooled, action)
 
     @property
     def _reads_actions(self) -> bool:

@@ -12,13 +12,14 @@ from functools import lru_cache
 
 from marey.text.action_reader import STANDING
 from marey.text.clause_normalization import DEFAULT_SUBJECT
+from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
-VERSION = 4
+VERSION = 5
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
@@ -77,17 +78,19 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
-    a subject gets one (`with_subject`), words that mislead are replaced (`PLAINER`), and those that have the head turn
-    left out.
+    a subject gets one (`with_subject`), words that mislead are replaced (`PLAINER`), and those that have the head turn,
+    or ask for a bearing that fits the action, are left out: both are drawn.
 
     Args:
         prompt: as `check_prompt` returns it.
         action: id of the one action that it asks for; None = several, none, or in doubt.
     """
-    bare = without_gaze(prompt)  # the head moves alone: of "looks left" models turn the whole body
+    borne = BarePrompt.of(prompt)
+    said = borne.text if action is not None and borne.fits(action) else prompt
+    bare = without_gaze(said)  # the head moves alone: of "looks left" models turn the whole body
     if action is None:
         return bare or prompt
-    if action == NODDING and bare != prompt and not _NOD.search(prompt):
+    if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
     if not bare:

@@ -24,13 +24,14 @@ from marey.text.action_reader import OUTSIDE, STANDING, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
+from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 3
+VERSION = 4
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
 """Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
@@ -136,7 +137,7 @@ class SequenceReader(Reader):
 
     def read(
         self,
-        prompt: str,
+        bare: BarePrompt,
         encoding: Encoding,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
         action: str | None = None,
@@ -149,14 +150,14 @@ class SequenceReader(Reader):
         Prompts that say what is not done are not split.
 
         Args:
-            prompt: as `check_prompt` returns it.
-            encoding: of the prompt as it is written.
+            bare: the prompt, and the text of it that is read.
+            encoding: of that text.
             pooled: returns the sentence vectors (W,) of texts.
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
-        if way := way_to_rest(prompt, action):
+        if way := way_to_rest(bare.prompt, action):
             return ReadMovement(way, action), _rest()
-        groups = in_order(_with_origins(self._clauses(prompt, encoding, pooled)))
+        groups = in_order(_with_origins(self._clauses(bare, encoding, pooled)))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
@@ -165,14 +166,15 @@ class SequenceReader(Reader):
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
         found = list(_risen_from_there(map(_movement, groups)))
-        if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(prompt):
+        if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(bare.prompt):
             found[-1] = _rest()
         return tuple(found)
 
     def _clauses(
-        self, prompt: str, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
+        self, bare: BarePrompt, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
     ) -> list[ReadClause]:
         """Return the likeliest clauses of a prompt, as they are written."""
+        prompt = bare.text
         begins, at_once = self.beginnings(encoding.tokens)
         places = [place for place in _word_starts(prompt, encoding.offsets) if begins[place] > LEAST_CUT]
         places = sorted(sorted(places, key=lambda place: -begins[place])[:MOST_CUTS])
@@ -189,7 +191,7 @@ class SequenceReader(Reader):
         for low, high in itertools.pairwise(cuts):
             best = int(shares[low, high].argmax())
             together = low > 0 and bool(at_once[places[low - 1]])
-            text = prompt[edges[low] : edges[high]].strip()
+            text = bare.written(edges[low], edges[high]).strip()
             found.append(ReadClause(self.classes[best], float(shares[low, high][best]), text, together))
         return found
 

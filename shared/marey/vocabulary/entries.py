@@ -103,7 +103,8 @@ class Vocabulary:
     def said_first(self, text: str) -> str | None:
         """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
         text = text.lower()
-        return next((name for words, name in self._first_words.items() if text.startswith(words)), None)
+        said = ((name, text.removeprefix(words)) for words, name in self._first_words.items() if text.startswith(words))
+        return next((name for name, rest in said if not rest.startswith(("and ", "then "))), None)
 
     @cached_property
     def _first_words(self) -> dict[str, str]:

@@ -33,6 +33,7 @@ from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
+from marey.text.features import TextFeatures
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
@@ -94,9 +95,7 @@ class _Wish:
         if request.kept or request.free or request.recording is not None:
             return cls()
         text = request.text
-        steps = wanted_of(text.actions or (text.rewritten,))
-        single = _one_action(steps or ())
-        action = load_vocabulary().said_first(text.rewritten) or single
+        steps, action = wanted_of(text.actions or (text.rewritten,)), action_of(text)
         prompt, gaze = text.prompt, stated_gaze(text.prompt)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
@@ -119,6 +118,12 @@ class _Wish:
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
+
+
+def action_of(text: TextFeatures) -> str:
+    """Return the id of the only action that a text asks for; empty if there are several or none."""
+    steps = wanted_of(text.actions or (text.rewritten,))
+    return load_vocabulary().said_first(text.rewritten) or _one_action(steps or ())
 
 
 def _one_action(steps: Sequence[Step]) -> str:

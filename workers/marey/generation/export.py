@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from marey.generation.asked import changes_of
+from marey.generation.bearing import borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
@@ -74,20 +76,31 @@ def finish(
     body = body or standard_body(generator.layout.skeleton)
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
+    layout, features = generator.layout, generated.features
+    spans = borne_spans(request, layout.fps, len(features))
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
-    manifest = {**provenance, CLEANED: clean, "body": body.describe()}
-    clip = finish_motion(generated.features, generator.layout, body=body, fps=fps, clean=clean, manifest=manifest)
-    return judged(with_gaze(clip), request)
+    manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)
+    finished = partial(finish_motion, layout=layout, body=body, fps=fps, clean=clean, manifest=manifest)
+    clip = with_gaze(finished(borne(generated, layout, spans)))
+    return judged(clip, request, as_made=finished(features) if spans else clip)
 
 
-def judged(clip: MotionClip, request: Request) -> MotionClip:
-    """Return a clip with the record of its quality, for the prompts of its request, in its manifest."""
+def judged(clip: MotionClip, request: Request, *, as_made: MotionClip | None = None) -> MotionClip:
+    """Return a clip with the record of its quality, for the prompts of its request, in its manifest.
+
+    Args:
+        clip: the finished motion.
+        request: for it.
+        as_made: the same without bearings, by which actions are matched: a hand that salutes is no longer idle. None =
+            the clip itself.
+    """
+    as_made = as_made or clip
     if request.timeline is not None:
-        clip = with_rows(clip, request.timeline)
+        clip = with_rows(clip, request.timeline, as_made)
     quality = quality_of(clip, expected_by_prompts(_prompts(request)))
     if quality is None:
         return clip
-    quality = quality.with_match(_match(clip, request))
+    quality = quality.with_match(least_match(clip) if request.timeline is not None else _match(as_made, request))
     if posture_jumps(clip):
         quality = quality.with_posture_jump()
     return replace(clip, manifest={**clip.manifest, QUALITY: quality.model_dump(mode="json")})
@@ -103,11 +116,8 @@ def _prompts(request: Request) -> list[str]:
 def _match(clip: MotionClip, request: Request) -> PromptMatch:
     """Match a clip with its prompt, by its words or else by its meaning.
 
-    The match of a timeline is that of the row that shows its prompt least; recordings of streams, which hold several
-    prompts, have none.
+    Recordings of streams, which hold several prompts, have none.
     """
-    if request.timeline is not None:
-        return least_match(clip)
     if request.recording is not None:
         return PromptMatch()
     return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)

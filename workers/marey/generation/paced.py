@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.selector.matching import WAYS
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.paces import Pace, stated_pace
 
 Float32 = NDArray[np.float32]
@@ -68,7 +69,7 @@ class AskedPace:
     def of(cls, prompt: str, action: str) -> AskedPace:
         """Read the pace of a prompt; none of actions that have their own."""
         has_own = action in FALLING or (action in WAYS and action not in WAY_SPEEDS)
-        return cls("" if has_own else stated_pace(prompt), action)
+        return cls("" if has_own else stated_pace(prompt) or _pace_of_bearing(prompt, action), action)
 
     @property
     def of_way(self) -> bool:
@@ -95,3 +96,11 @@ class AskedPace:
         wanted = {"slow": min(speed, speeds_of.slow), "fast": max(speed, speeds_of.fast)}
         low, high = speeds_of.played
         return min(max(wanted.get(self.pace, max(speed, speeds_of.least)) / speed, low), high) if speed else 1.0
+
+
+def _pace_of_bearing(prompt: str, action: str) -> Pace:
+    """Return the pace of a walk or run that the bearing of its body brings with it: slow of a tired one."""
+    if action not in WAY_SPEEDS:
+        return ""
+    paces: list[Pace] = [each.bearing.pace for each in stated_bearings(prompt) if each.bearing.pace]
+    return paces[0] if paces else ""

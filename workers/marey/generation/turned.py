@@ -52,7 +52,7 @@ def turned_features(features: Float32, layout: FeatureLayout, turn: Turn, side: 
     headings = _headings(natural.headings, math.radians(sign * wanted), layout.fps, even=turn.even)
     if headings is None:
         return None
-    return encode_all(layout, _along(joints, layout, natural, natural.facing(headings))), made
+    return encode_all(layout, bent_along(joints, layout, natural, natural.facing(headings))), made
 
 
 def _headings(headings: Array, wanted: float, fps: float, *, even: bool) -> Array | None:
@@ -74,7 +74,7 @@ def _headings(headings: Array, wanted: float, fps: float, *, even: bool) -> Arra
     return headings[0] + share * turns + missing * added
 
 
-def _along(joints: Array, layout: FeatureLayout, natural: Course, wanted: Course) -> Array:
+def bent_along(joints: Array, layout: FeatureLayout, natural: Course, wanted: Course) -> Array:
     """Return joints (T, J, 3) of a motion bent to another course than its own."""
     skeleton, fps = layout.skeleton, layout.fps
     pose = solve_pose(bone_fit(skeleton).fit(joints), skeleton, fps=fps, measure=False)

@@ -33,7 +33,7 @@ LEGS: dict[str, tuple[int, int, int, int]] = dict(zip((LEFT, RIGHT), LEG_CHAINS,
 _LEG_JOINTS = {joint for leg in LEG_CHAINS for joint in leg}
 _ANKLES, _TOES = [7, 8], [10, 11]
 _SPINE = (3, 6, 9)
-_NECK = 12
+NECK = 12
 _COLLAR_LIFT = np.radians(22.0)  # lift of the shoulder if the arm points straight up
 _LIFT_FROM, _LIFT_TO = np.radians(-20.0), np.radians(80.0)
 _VIA = {"upper": (35.0, -25.0), "fore": (20.0, 25.0)}  # an arm rises in front of the body with a bent elbow
@@ -220,7 +220,7 @@ class StandingBody:
         self.turn(0, "left", _PELVIS_SHARE * degrees, besides=(1, 2))
         self.joints[:, CARRIED] += (hips - self.joints[:, [1, 2]]).mean(1, keepdims=True)
         self.lean((1 - _PELVIS_SHARE) * degrees, "left")
-        self.turn(_NECK, "left", head * degrees)
+        self.turn(NECK, "left", head * degrees)
         for _, shoulder, _, _ in ARMS.values():
             self.turn(shoulder, "left", -arms_hang * degrees)
         sine = np.sin(np.radians(degrees))[:, None, None]

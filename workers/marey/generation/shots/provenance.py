@@ -63,14 +63,19 @@ def _scope(request: Request, timeline: Sequence[TimedText], lists: ActionLists) 
     return scope_of_rows([match_scope(row.text.prompt, lists) for row in timeline]).as_json()
 
 
-def with_rows(clip: MotionClip, timeline: Sequence[TimedText]) -> MotionClip:
-    """Return the clip of a timeline with the first frame of each prompt, and the match of each row, in its manifest."""
+def with_rows(clip: MotionClip, timeline: Sequence[TimedText], as_made: MotionClip) -> MotionClip:
+    """Return the clip of a timeline with the first frame of each prompt, and the match of each row, in its manifest.
+
+    Args:
+        clip: the finished motion.
+        timeline: its rows.
+        as_made: the same without bearings, by which rows are matched.
+    """
     record: Mapping[str, Any] = clip.manifest[KEY]
     prompts = [[round(row.start * clip.fps), row.text.prompt] for row in timeline]
     spans = record["transitions"]
-    rows = [
-        {**row, "match": _match(clip, timed, spans).value} for row, timed in zip(record["rows"], timeline, strict=True)
-    ]
+    matches = [_match(as_made, timed, spans).value for timed in timeline]
+    rows = [{**row, "match": value} for row, value in zip(record["rows"], matches, strict=True)]
     transitions = [{**span, "rise": rise} for span, rise in zip(spans, rises_of(clip, spans), strict=True)]
     told = {**record, "rows": rows, "transitions": transitions}
     return replace(clip, manifest={**clip.manifest, "prompts": prompts, KEY: told})

@@ -1,0 +1,357 @@
+"""The words of a prompt that say how the body bears itself, and the prompt without them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from marey.vocabulary.bearings import Side, StatedBearing, bearing_words, each_once
+from marey.vocabulary.inflection import gerund, third_person, verb_forms
+from marey.vocabulary.word_lists import load_word_lists
+
+_WALK = "walk"
+_PERSON = "person"
+_ALL = r"a|an|the|my|his|her|this|that|one|some"
+_MACROS = {
+    "WITH ": r"(?:with|keeping|keeps|keep|holding|holds|having|has) ",
+    "OPT ": r"(?:(?:with|keeping|keeps|keep|holding|holds|having|has) )?",
+    "HIS ": r"(?:(?:his|her|their|its|the|a|an|both|one|my|your) (?:of (?:his|her|their) )?(?:own )?)?"
+    r"(?:left |right )?",
+}
+_VERY = r"(?:(?:very|really|so|rather|quite|extremely|slightly|somewhat|too|visibly|clearly|obviously) )*"
+_BE = r"(?:(?:who|that|which) )?(?:is|are|was|were|looks?|feels?|seems?|being|looking|feeling) "
+_JOINT = re.compile(
+    r"(?:^|(?<=\W))(?:(?:and|then|while|as|but|first|who|that|with)\s+)*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$",
+    re.IGNORECASE,
+)
+"""Words that join these to what comes before."""
+_JOINED = re.compile(r"^\s*[,;]?\s*(?:(?:and|then|while|as|who|before)\s+)*(?:(?:he|she|they|it)\s+)?", re.IGNORECASE)
+"""Words that join what comes behind these."""
+_LIKE = re.compile(
+    r"\b(?:(?:just |much )?(?:like|as(?: if| though)?(?: (?:he|she|it|they) (?:is|was|are|were))?)"
+    r"|(?:in|with) the (?:manner|style|way) of"
+    r"|(?:imitat|pretend|impersonat)(?:e|es|ing)(?: to be)?|acts?(?:ing)? like) $"
+)
+_DENIED = re.compile(
+    r"\b(?:(?:without|not|never|no|n't|don't|doesn't)\s+(?:(?!and\b|then\b)\w+\s+){0,2}"
+    r"|(?:stops?|avoids?|instead of)\s+"
+    r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)\s+)?)$"
+)
+_AT_ONCE = re.compile(r"\b(?:while|as|still|whilst)\W*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$", re.IGNORECASE)
+_AT_ONCE_AFTER = re.compile(r"^\W*(?:while|as|whilst|during|when)\b", re.IGNORECASE)
+_UNTIDY = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"\s+(?=[\s,.;!?])",
+        r",\s*(?=[,.;])",
+        r"^[\s,;.]+(?:and\s+)?",
+        r"[\s,;]+(?:(?:and|while|with|as)\s*)?(?=[.!?]*$)",
+        r"(?<=\b[Aa])n(?= [^aeiouAEIOU])",
+    )
+)
+"""Spaces and commas that stand twice or at the ends, words that join nothing, and "an" before a consonant."""
+_SUBJECT = re.compile(rf"\b(?:(?:{_ALL}) (?:(?!(?:{_ALL}) )[\w,-]+ ){{0,4}}|who )$")
+_NO_ACTION = frozenset(
+    [
+        "a",
+        "an",
+        "the",
+        "is",
+        "are",
+        "and",
+        "who",
+        "then",
+        "as",
+        "while",
+        "to",
+        "in",
+        "at",
+        "with",
+        "of",
+        "want",
+        "need",
+        "one",
+        "where",
+        "me",
+        "my",
+        "make",
+        "show",
+        "create",
+        "generate",
+        "animate",
+        "animation",
+        "clip",
+        "please",
+        "can",
+        "have",
+    ]
+)
+_ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
+_NOUN_PHRASE = re.compile(r"(?:\b(?:a|an|the|some) (?:\w+ )?)?$")
+_MANNER = re.compile(
+    r" (?:walk|shuffle|gait|style|run|idle|pose|movement|way)\b(?! (?:toward|forward|a|the|in|on|over))"
+)
+_ACTS = re.compile(
+    r"$|[,.;!]| (?!bars?\b)(?:\w+(?:s|ing|ed|ly)|who|that|in|with|on|at|from|and|comes?|goes?|walk|run|stand)\b"
+)
+_SIDE = re.compile(r"\b(left|right)\b")
+_HEALTHY = re.compile(r"\bfavou?ring\b|\bgood\b")
+"""Words of the leg that does not hurt."""
+_PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
+_GAIT = re.compile(r"(\w+)(.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class _Words:
+    """Words of a prompt that ask for a bearing, and those that stand in their place."""
+
+    start: int
+    end: int
+    stated: StatedBearing
+    instead: str = ""
+
+
+@dataclass(frozen=True)
+class BarePrompt:
+    """A prompt without the words that ask for a bearing.
+
+    Attributes:
+        prompt: as a user typed it.
+        text: "a man walks" of "an old man shambles"; empty if the prompt asks for nothing else.
+        places: where in the prompt each character of the text comes from.
+        stated: the bearings, each once, in their order.
+    """
+
+    prompt: str
+    text: str
+    places: tuple[int, ...]
+    stated: tuple[StatedBearing, ...]
+
+    @classmethod
+    def of(cls, prompt: str) -> BarePrompt:
+        """Read a prompt."""
+        found = _found(prompt)
+        if not found:
+            return as_written(prompt)
+        return cls(prompt, *_without(prompt, found), each_once(each.stated for each in found))
+
+    def written(self, start: int, end: int) -> str:
+        """Return the words of the prompt of which these characters of the text are left."""
+        begin = 0 if start == 0 else self.places[start]
+        return self.prompt[begin:] if end >= len(self.text) else self.prompt[begin : self.places[end]]
+
+    def fits(self, action: str) -> bool:
+        """Return True if one of the bearings at least can be shown beside an action of the vocabulary."""
+        return any(each.bearing.fits(action) for each in self.stated)
+
+
+def as_written(prompt: str) -> BarePrompt:
+    """Return a prompt that is read with all its words."""
+    return BarePrompt(prompt, prompt, tuple(range(len(prompt))), ())
+
+
+def stated_bearings(prompt: str) -> tuple[StatedBearing, ...]:
+    """Return the bearings that a prompt asks for, each once, in their order.
+
+    Args:
+        prompt: as a user typed it.
+    """
+    return each_once(each.stated for each in _found(prompt))
+
+
+def parts_by_gestures(prompt: str) -> tuple[str, ...]:
+    """Return the parts of a prompt with gestures that come before or after what else is done.
+
+    "walks forward" and "salutes" of "walks forward and salutes"; none if there are no such gestures.
+    """
+    parts, at = list[str](), 0
+    for each in _found(prompt):
+        if not each.stated.bearing.gesture:
+            continue
+        before, behind = prompt[at : each.start], prompt[each.end :]
+        joined = _AT_ONCE.search(before) or _AT_ONCE_AFTER.match(behind)
+        if joined or not (parts or _says_more(before) or _says_more(behind)):
+            continue
+        begin = at + _joint(before)
+        if _says_more(BarePrompt.of(prompt[at:begin]).text):
+            parts.append(prompt[at:begin].strip(" ,;."))
+        parts.append(prompt[each.start if _says_more(before) else begin : each.end].strip(" ,;."))
+        at = each.end
+    rest = _JOINED.sub("", prompt[at:]).strip(" ,;.")
+    if parts and _says_more(rest):
+        parts.append(rest)
+    return tuple(parts) if len(parts) > 1 else ()
+
+
+def _joint(before: str) -> int:
+    """Return where the words begin that join what follows to these."""
+    joint = _JOINT.search(before)
+    return len(before) if joint is None else joint.start()
+
+
+def _without(prompt: str, found: Sequence[_Words]) -> tuple[str, tuple[int, ...]]:
+    """Return a prompt without words, and where each of its characters was."""
+    places, kept, at = list[int](), "", 0
+    for each in found:
+        if each.start < at:
+            continue
+        begin = each.start if each.instead else at + _joint(prompt[at : each.start])
+        kept, places = kept + prompt[at:begin], [*places, *range(at, begin)]
+        kept, places = kept + each.instead, [*places, *[each.start] * len(each.instead)]
+        at = each.end
+        joined = _JOINED.match(prompt[at:])
+        if joined is not None and not each.instead and not _says_more(kept):
+            length = len(kept.rstrip())
+            kept, places, at = f"{kept[:length]} ", [*places[:length], each.start], at + joined.end()
+    return _tidied(kept + prompt[at:], [*places, *range(at, len(prompt))])
+
+
+def _tidied(text: str, places: Sequence[int]) -> tuple[str, tuple[int, ...]]:
+    """Return a text without what is untidy, and where each of its characters was; empty if nothing is done in it."""
+    left = list(range(len(text)))
+    for pattern in _UNTIDY:
+        joined = "".join(text[k] for k in left)
+        gone = {k for found in pattern.finditer(joined) for k in range(found.start(), found.end())}
+        left = [k for n, k in enumerate(left) if n not in gone]
+    text, places = "".join(text[k] for k in left), tuple(places[k] for k in left)
+    return (text, places) if _says_more(text) else ("", ())
+
+
+def _says_more(text: str) -> bool:
+    """Return True if a text names more than who acts."""
+    lists = load_word_lists()
+    words = set(re.findall(r"[a-z']+", text.lower()))
+    return bool(words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION)
+
+
+def _found(prompt: str) -> list[_Words]:
+    """Return the words that ask for bearings in their order; none overlap."""
+    text = prompt.lower().replace("’", "'")
+    spans: list[_Words] = []
+    if len(text) != len(prompt):  # lower case of another length: no language that these words are of
+        return spans
+    for each in sorted(_matches(text), key=lambda words: (words.start, -words.end)):
+        if (not spans or each.start >= spans[-1].end) and not _DENIED.search(text[: each.start]):
+            spans.append(each)
+    return spans
+
+
+def _matches(text: str) -> Iterator[_Words]:
+    for name, kind, pattern in _patterns():
+        for match in pattern.finditer(text):
+            stated = StatedBearing(name, _side(match[0]), kind in ("adjectives", "beings", "people"))
+            if kind == "gaits":
+                yield from _gait(text, match, stated)
+            elif kind in ("beings", "people"):
+                yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
+            elif kind == "how" or _is_subject(text[: match.start()]):
+                yield _Words(*match.span(), stated)
+
+
+def _is_subject(before: str) -> bool:
+    """Return True if nothing is done in the words before those that begin to say who does it."""
+    return not _says_more(_SUBJECT.sub("", before))
+
+
+def _gait(text: str, match: re.Match[str], stated: StatedBearing) -> Iterator[_Words]:
+    """Yield the words of a verb that is read as walking; "a swaggering cowboy" is said of the person."""
+    if match["verb"].endswith("ing") and _person_ahead().match(text, match.end()):
+        yield _Words(*match.span(), StatedBearing(stated.name, stated.side, whole=True))
+    elif not _is_noun(text[: match.start()], match["verb"]):
+        yield _Words(*match.span(), stated, _walking()[match["verb"]])
+
+
+def _is_noun(before: str, verb: str) -> bool:
+    """Return True for "stagger" behind "a" or "a wild", not behind "a man"."""
+    article = _ARTICLE.search(before)
+    if article is None or article[1] is None:
+        return article is not None
+    return not verb.endswith("s") and article[1].strip() not in load_word_lists().people
+
+
+def _being(text: str, match: re.Match[str], stated: StatedBearing, instead: str) -> Iterator[_Words]:
+    """Yield the words of a being: who acts is read as another, what a person is like is left out."""
+    article = _NOUN_PHRASE.search(text[: match.start()])
+    begin = match.start() if article is None else article.start()
+    like, after = _LIKE.search(text[:begin]), text[match.end() :]
+    if like is not None:
+        yield _Words(like.start(), match.end(), stated)
+    elif _MANNER.match(after):
+        yield _Words(*match.span(), stated)
+    elif _ACTS.match(after) and _is_subject(text[:begin]):
+        yield _Words(*match.span(), stated, instead)
+
+
+def _side(words: str) -> Side:
+    side = _SIDE.search(words)
+    if side is None:
+        return ""
+    return "left" if (side[1] == "left") != bool(_HEALTHY.search(words)) else "right"
+
+
+@lru_cache(maxsize=1)
+def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
+    """Return the id of each bearing, and the kind and the pattern of its words."""
+    return [
+        (name, kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
+        for name, words in bearing_words()
+        for kind, entries in words.items()
+        for pattern in _patterns_of(kind, entries)
+    ]
+
+
+def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[str]:
+    either = "|".join(entries)
+    if kind == "how":
+        yield "|".join(map(_expanded, entries))
+    elif kind == "gaits":
+        for verb, tail in map(_verb_and_tail, entries):
+            yield rf"(?P<verb>{_longest_first(verb_forms(verb))}){tail}"
+    elif kind == "adjectives":
+        yield rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
+        yield rf"{_BE}{_VERY}(?:{either})(?: and)?"
+    else:
+        yield rf"(?:{either})s?"
+
+
+def _verb_and_tail(entry: str) -> tuple[str, str]:
+    found = _GAIT.match(entry)
+    assert found is not None, entry
+    return found[1], found[2]
+
+
+def _expanded(pattern: str) -> str:
+    """Return a pattern with the forms of its verbs and its macros."""
+    pattern = re.sub(r"<(\w+)>", lambda verb: f"(?:{_longest_first(verb_forms(verb[1]))})", pattern)
+    for name, words in _MACROS.items():
+        pattern = pattern.replace(name, words)
+    return pattern
+
+
+def _longest_first(words: frozenset[str]) -> str:
+    return "|".join(sorted(words, key=len, reverse=True))
+
+
+@lru_cache(maxsize=1)
+def _people() -> str:
+    lists = load_word_lists()
+    return _longest_first(lists.people - lists.body_parts - _PRONOUNS)
+
+
+@lru_cache(maxsize=1)
+def _person_ahead() -> re.Pattern[str]:
+    return re.compile(rf" (?:[\w-]+ )?(?:{_people()})\b")
+
+
+@lru_cache(maxsize=1)
+def _walking() -> Mapping[str, str]:
+    """Return the form of "walk" for each form of a verb that is read so."""
+    found: dict[str, str] = {}
+    for _, words in bearing_words():
+        for verb, _ in map(_verb_and_tail, words.get("gaits", ())):
+            forms = {third_person(verb): third_person(_WALK), verb: _WALK}
+            for form in verb_forms(verb):
+                found[form] = forms.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")
+    return found

@@ -1,0 +1,149 @@
+"""How a prompt has the body bear itself beside its action: "like a zombie", "sadly", "with arms crossed", "salutes".
+
+The words and poses are in `bearings.toml`; `marey.vocabulary.bearing_words` finds them in a prompt.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from marey.vocabulary.paces import Pace
+
+Gait = Literal["limp", "stagger", ""]
+Side = Literal["left", "right", ""]
+Vector = tuple[float, float, float]
+
+UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep"})
+"""Actions in which the body is upright on its feet, and its arms swing or hang."""
+ARMS_FREE = frozenset({"sit", "sit-floor", "kneel"})
+"""Other actions in which the arms do nothing."""
+WORDS = ("how", "gaits", "adjectives", "beings", "people")
+"""Fields of a table of `bearings.toml` that hold words."""
+
+
+@dataclass(frozen=True)
+class ArmPose:
+    """Where an arm is.
+
+    Attributes:
+        at: what `hand` is measured from; empty = the hand follows from `upper` and `fore`.
+        hand: of the wrist, outward, up and forward of it, metres.
+        upper, fore: directions of upper arm and forearm, outward, up and forward; None = as it is.
+        elbow: where it points.
+        share: 0 to 1, of the way from where the motion has the arm.
+        shake: metres by which the hand moves to and fro.
+        hz: how often it does so in a second.
+    """
+
+    at: str = ""
+    hand: Vector | None = None
+    upper: Vector | None = None
+    fore: Vector | None = None
+    elbow: Vector = (0.7, -1.0, -0.3)
+    share: float = 1.0
+    shake: Vector = (0.0, 0.0, 0.0)
+    hz: float = 0.0
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """One bearing; `bearings.toml` explains the numbers.
+
+    Attributes:
+        id: its name.
+        gesture: done once, by itself or beside another action.
+        arms: by `left` and `right`, those that it moves.
+    """
+
+    id: str
+    gesture: bool = False
+    trunk: float = 0.0
+    head: float = 0.0
+    tilt: float = 0.0
+    shrug: float = 0.0
+    sink: float = 0.0
+    swing: float = 1.0
+    roll: float = 0.0
+    roll_hz: float = 0.0
+    heave: float = 0.0
+    heave_hz: float = 0.0
+    gait: Gait = ""
+    pace: Pace = ""
+    raise_s: float = 0.5
+    hold_s: tuple[float, float] = (1.0, 2.0)
+    arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
+
+    def fits(self, action: str) -> bool:
+        """Return True if a body can bear itself so in an action of the vocabulary.
+
+        It stands or goes, or its arms are free and the bearing moves no more than these, trunk and head.
+        """
+        return action in UPRIGHT or (action in ARMS_FREE and not (self.sink or self.gait or self.roll))
+
+
+@dataclass(frozen=True)
+class StatedBearing:
+    """A bearing that a prompt asks for.
+
+    Attributes:
+        name: its id.
+        side: the one that the prompt names, of the arm that acts or the leg that hurts; empty if it names none.
+        whole: it is said of the person, and holds for all that the person does.
+    """
+
+    name: str
+    side: Side = ""
+    whole: bool = False
+
+    @property
+    def bearing(self) -> Bearing:
+        """The bearing itself."""
+        return load_bearings()[self.name]
+
+
+def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:
+    """Return each bearing once; one that is said of the person anywhere is said of the person."""
+    found: dict[str, StatedBearing] = {}
+    for each in stated:
+        known = found.get(each.name, each)
+        found[each.name] = StatedBearing(each.name, known.side or each.side, known.whole or each.whole)
+    return tuple(found.values())
+
+
+@lru_cache(maxsize=1)
+def load_bearings() -> Mapping[str, Bearing]:
+    """Return the bearings that this version ships, by id."""
+    return {name: _bearing(name, values) for name, values in bearing_table().items()}
+
+
+@lru_cache(maxsize=1)
+def bearing_words() -> Sequence[tuple[str, Mapping[str, Sequence[str]]]]:
+    """Return the words of each bearing, by its id and the field that holds them."""
+    return [
+        (name, {each: values[each] for each in WORDS if each in values}) for name, values in bearing_table().items()
+    ]
+
+
+@lru_cache(maxsize=1)
+def bearing_table() -> Mapping[str, Any]:
+    """Return `bearings.toml`."""
+    return tomllib.loads(Path(__file__).with_name("bearings.toml").read_text("utf-8"))
+
+
+def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
+    arms = cast("Mapping[str, Any]", values.get("arms", {}))
+    sides = {side: arms.get(side) or arms.get("both") for side in ("left", "right")}
+    poses = {side: ArmPose(**_tuples(pose)) for side, pose in sides.items() if pose is not None}
+    own = {key: value for key, value in values.items() if key != "arms" and key not in WORDS}
+    return Bearing(name, arms=poses, **_tuples(own))
+
+
+def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: tuple(cast("list[Any]", value)) if isinstance(value, list) else value for name, value in values.items()
+    }

@@ -1,0 +1,98 @@
+"""Gaits that a network does not know: limps and staggers, drawn on walks.
+
+A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
+slower. Frames are played at other times, so standing feet stay.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import smooth
+from marey.generation.turned import bent_along
+from marey.motion.courses import natural_course
+from marey.motion.features import FeatureLayout
+from marey.posing.standing import LEFT, RIGHT, StandingBody
+
+Array = NDArray[np.floating]
+
+ANKLES = {LEFT: 7, RIGHT: 8}
+STEP = 0.015
+"""Metres a frame by which a standing foot falls behind the other in a walk, at least."""
+HURRIES, LINGERS = 0.55, 0.22
+"""By how much the time of a limp runs faster over the leg that hurts, and slower over the other."""
+DIP, ASIDE, AHEAD = 0.045, 9.0, 7.0
+"""Metres by which the hips sink over the leg that hurts, and degrees by which the trunk leans to it, and forward."""
+WEAVES, WEAVES_HZ = 17.0, (0.28, 0.38)
+"""Degrees by which a staggering body leaves its way to each side, and how often a second."""
+UNEVEN, UNEVEN_HZ = 0.28, 0.55
+"""By how much its time runs faster and slower, and how often a second."""
+WANDERS = 0.05
+"""Metres by which its hips go to the sides of its feet."""
+
+
+def limping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` limp.
+
+    Args:
+        joints: metres.
+        layout: of the motion, for its rate.
+        begin, end: first frame, and the one after the last.
+        side: of the leg that hurts; any but `left` and `right` = either.
+        rng: chooses it.
+    """
+    hurt = side if side in ANKLES else str(rng.choice(list(ANKLES)))
+    over = _stands(joints, hurt, layout.fps)
+    other = _stands(joints, RIGHT if hurt == LEFT else LEFT, layout.fps)
+    inside = _inside(len(joints), begin, end, layout.fps)
+    dips = inside * smooth(over, 0.06, layout.fps)
+    rate = 1.0 + inside * (HURRIES * over - LINGERS * other)
+    body = StandingBody(joints)
+    body.shift(-DIP * dips)
+    body.lean((1.0 if hurt == RIGHT else -1.0) * ASIDE * dips, "forward")
+    body.lean(AHEAD * dips, "left")
+    return _retimed(body.solved(), smooth(rate, 0.06, layout.fps), begin, end)
+
+
+def staggering(
+    joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator
+) -> Array:
+    """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` stagger; see `limping`."""
+    del side  # a body staggers to both
+    inside, time = _inside(len(joints), begin, end, layout.fps), np.arange(len(joints)) / layout.fps
+    hz, phase = rng.uniform(*WEAVES_HZ), rng.uniform(0, 2 * np.pi)
+    natural = natural_course(joints, layout.skeleton, layout.fps)
+    weaves = np.radians(WEAVES) * inside * np.sin(2 * np.pi * hz * time + phase)
+    woven = bent_along(joints, layout, natural, natural.facing(natural.headings + weaves))
+    body = StandingBody(woven)
+    body.shift(np.zeros(len(time)), left=WANDERS * inside * np.sin(2 * np.pi * 1.3 * hz * time + phase))
+    rate = 1.0 + UNEVEN * inside * np.sin(2 * np.pi * UNEVEN_HZ * time + rng.uniform(0, 2 * np.pi))
+    return _retimed(body.solved(), rate, begin, end)
+
+
+def _inside(frames: int, begin: int, end: int, fps: float) -> Array:
+    inside = np.zeros(frames)
+    inside[begin:end] = 1.0
+    return np.clip(smooth(inside, 0.15, fps), 0.0, 1.0)
+
+
+def _stands(joints: Array, side: str, fps: float) -> Array:
+    """Return 0 to 1 (T,): how much the body goes over a foot, which falls behind the other as it does."""
+    body = StandingBody(joints)
+    this, other = ANKLES[side], ANKLES[RIGHT if side == LEFT else LEFT]
+    apart = body.local(joints[:, this] - joints[:, other], LEFT)[:, 2]
+    falls = -np.gradient(smooth(apart, 0.05, fps))
+    return np.clip(falls / max(float(np.percentile(np.abs(falls), 80)), STEP), 0.0, 1.0)
+
+
+def _retimed(joints: Array, rate: Array, begin: int, end: int) -> Array:
+    """Return joints (T, J, 3) whose time runs at `rate` (T,) from `begin` to `end`, which stay where they are."""
+    part = slice(begin, end)
+    times = np.concatenate([[0.0], np.cumsum(0.5 * (rate[part][1:] + rate[part][:-1]))])
+    times *= (len(times) - 1) / times[-1]
+    low = np.minimum(times.astype(int), len(times) - 2)
+    share = (times - low)[:, None, None]
+    moved = joints.copy()
+    moved[part] = (1 - share) * joints[part][low] + share * joints[part][low + 1]
+    return moved
