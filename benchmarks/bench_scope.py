@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.bundles import find_bundle
-from marey.checks.scope_prompts import IN_SCOPE, Matcher, ScopeRate, ScopeSet, scope_prompts, scope_rates
+from marey.checks.scope_prompts import DRAWN, IN_SCOPE, Matcher, ScopeRate, ScopeSet, scope_prompts, scope_rates
 from marey.text import meaning
 from marey.text.loading import load_encoder
 from marey.text.meaning import MeaningJudge
@@ -36,7 +36,7 @@ class Vectors:
 def shares(rates: Sequence[ScopeRate]) -> tuple[float, float]:
     """Return the percentage of in-scope prompts called unknown, and of others flagged."""
     inside = [rate for rate in rates if rate.group == IN_SCOPE]
-    outside = [rate for rate in rates if rate.group != IN_SCOPE]
+    outside = [rate for rate in rates if rate.group not in (IN_SCOPE, DRAWN)]
     right, total = (sum(getattr(rate, name) for rate in outside) for name in ("right", "prompts"))
     return 100 * (1 - inside[0].share), 100 * right / total
 

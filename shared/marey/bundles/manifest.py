@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -182,6 +183,14 @@ class BundleManifest(_Frozen):
             raise ValueError("two files have names that differ in case alone")
         if reserved := [name for name in self.files if name.casefold() in RESERVED]:
             raise ValueError(f"{reserved[0]} cannot be a file with a hash")
+        return self
+
+    @model_validator(mode="after")
+    def _with_bearings(self) -> Self:
+        """Say in the lists of actions whether bearings are drawn: where prompts are read behind their plain action."""
+        if self.actions is not None:
+            drawn = self.text is not None and self.text.plain_action
+            object.__setattr__(self, "actions", replace(self.actions, drawn=drawn))
         return self
 
     @property

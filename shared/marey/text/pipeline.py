@@ -34,6 +34,7 @@ from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_res
 from marey.text.words import EDGE_PUNCTUATION
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.gazes import without_gaze
 
 if TYPE_CHECKING:
     from marey.text.spelling import Speller

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from marey.vocabulary.bearings import Side, StatedBearing, bearing_words, each_once
@@ -88,6 +88,8 @@ _NO_ACTION = frozenset(
         "have",
     ]
 )
+_DOER = re.compile(r"\w(?:ist|er|or|ian)s?$")
+"""Endings of nouns that name people by what they do: "a violinist"."""
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
 _NOUN_PHRASE = re.compile(r"(?:\b(?:a|an|the|some) (?:\w+ )?)?$")
 _MANNER = re.compile(
@@ -223,7 +225,8 @@ def _says_more(text: str) -> bool:
     """Return True if a text names more than who acts."""
     lists = load_word_lists()
     words = set(re.findall(r"[a-z']+", text.lower()))
-    return bool(words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION)
+    said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
+    return len(said) > 1 or any(not _DOER.search(word) for word in said)
 
 
 def _found(prompt: str) -> list[_Words]:
@@ -241,7 +244,8 @@ def _found(prompt: str) -> list[_Words]:
 def _matches(text: str) -> Iterator[_Words]:
     for name, kind, pattern in _patterns():
         for match in pattern.finditer(text):
-            stated = StatedBearing(name, _side(match[0]), kind in ("adjectives", "beings", "people"))
+            whole = kind in ("adjectives", "beings", "people")
+            stated = StatedBearing(name, _side(match[0]), whole, match[0])
             if kind == "gaits":
                 yield from _gait(text, match, stated)
             elif kind in ("beings", "people"):
@@ -258,7 +262,7 @@ def _is_subject(before: str) -> bool:
 def _gait(text: str, match: re.Match[str], stated: StatedBearing) -> Iterator[_Words]:
     """Yield the words of a verb that is read as walking; "a swaggering cowboy" is said of the person."""
     if match["verb"].endswith("ing") and _person_ahead().match(text, match.end()):
-        yield _Words(*match.span(), StatedBearing(stated.name, stated.side, whole=True))
+        yield _Words(*match.span(), replace(stated, whole=True))
     elif not _is_noun(text[: match.start()], match["verb"]):
         yield _Words(*match.span(), stated, _walking()[match["verb"]])
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -20,7 +20,7 @@ Vector = tuple[float, float, float]
 
 UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep"})
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
-ARMS_FREE = frozenset({"sit", "sit-floor", "kneel"})
+ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
 WORDS = ("how", "gaits", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
@@ -94,11 +94,13 @@ class StatedBearing:
         name: its id.
         side: the one that the prompt names, of the arm that acts or the leg that hurts; empty if it names none.
         whole: it is said of the person, and holds for all that the person does.
+        words: that ask for it.
     """
 
     name: str
     side: Side = ""
     whole: bool = False
+    words: str = field(default="", compare=False)
 
     @property
     def bearing(self) -> Bearing:
@@ -111,7 +113,7 @@ def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:
     found: dict[str, StatedBearing] = {}
     for each in stated:
         known = found.get(each.name, each)
-        found[each.name] = StatedBearing(each.name, known.side or each.side, known.whole or each.whole)
+        found[each.name] = replace(known, side=known.side or each.side, whole=known.whole or each.whole)
     return tuple(found.values())
 
 

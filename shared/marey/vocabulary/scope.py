@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
+from pydantic import Field
+
+from marey.vocabulary.bearing_words import BarePrompt, as_written
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.entries import Vocabulary, load_vocabulary
 from marey.vocabulary.flags import Flag, Flagger
@@ -34,6 +37,8 @@ Left = Literal["noun", "verb"]
 `verb`: a person does something in a verb that is in no list."""
 
 VERSION = 1
+STANDING = "idle"
+"""What a body does that makes a gesture, or is said to bear itself in some way, and nothing else."""
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
 KEPT_READINGS = 1024
@@ -53,11 +58,14 @@ class ActionLists:
         supported: at least 80 % adherence.
         single_take: supported, learned from fewer than four sources.
         tried: trained on, below 80 %.
+        drawn: bearings (`marey.vocabulary.bearings`) are drawn on the bundle's motions. The `text` of a manifest says
+            so, not its lists.
     """
 
     supported: tuple[str, ...]
     single_take: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
+    drawn: Annotated[bool, Field(exclude=True)] = False
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -74,9 +82,9 @@ class NamedAction:
     """One action that a prompt names.
 
     Attributes:
-        text: the words for it, as the prompt has them.
+        text: the words for it, as the prompt has them; of a gait such as "limps", as they are read: "walks".
         verdict: see `Verdict`.
-        action: id of the action in the vocabulary; None = in no entry.
+        action: id of the action in the vocabulary; None = in no entry, or a gesture of `bearings.toml`, which is known.
         read_as: id of the supported action that a `close` one is read as.
     """
 
@@ -195,6 +203,25 @@ class ScopeMatcher:
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
+        bare = BarePrompt.of(prompt) if lists.drawn else as_written(prompt)
+        return (self._borne(bare, lists) if bare.stated else None) or self._match(prompt, lists)
+
+    def _borne(self, bare: BarePrompt, lists: ActionLists) -> Scope | None:
+        """Return the scope of a prompt whose bearings are drawn: that of its other words, and the gestures, which every
+        bundle knows; None if no action that it names can be done with such a bearing, or it says who acts alone."""
+        rest = self._match(bare.text, lists) if bare.text else None
+        named = {each.action for each in rest.actions if each.action} if rest else set[str]()
+        if not any(map(bare.fits, named or {STANDING})) or (not named and all(each.whole for each in bare.stated)):
+            return None
+        alone = [each for each in bare.stated if each.bearing.gesture or not rest]
+        drawn = tuple(NamedAction(each.words[:MAX_TEXT], "known") for each in alone)
+        others = rest.actions if rest and (named or not drawn) else ()
+        flags: tuple[Flag, ...] = tuple(
+            flag for flag in self._match(bare.prompt, lists).flags if flag != "no-action" or not (named or drawn)
+        )
+        return Scope((*others, *drawn), flags, left=rest.left if rest and named else None)
+
+    def _match(self, prompt: str, lists: ActionLists) -> Scope:
         read = self._read(prompt)
         if not read.phrases:
             return Scope((_nothing(prompt),), read.flags, left=read.left)
@@ -306,7 +333,7 @@ def _unique(named: Iterable[NamedAction]) -> Iterator[NamedAction]:
 @lru_cache(maxsize=1)
 def every_action() -> ActionLists:
     """Return the lists of a bundle that supports all actions: what a prompt names, whatever a model knows."""
-    return ActionLists(supported=tuple(load_vocabulary().actions))
+    return ActionLists(supported=tuple(load_vocabulary().actions), drawn=True)
 
 
 @lru_cache(maxsize=1)

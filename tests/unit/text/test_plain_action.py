@@ -54,12 +54,12 @@ def test_who_walks_up_to_somebody_does_not_rise(prompt: str, read: str) -> None:
         ("A person bows twice", "bow", "A person bows twice"),  # plain as it is
         ("she bows and then waves", None, "she bows and then waves"),
         ("bows deeply", "bow", "a person bows deeply"),
-        ("walks fast", "walk", "a person walks quickly"),
+        ("walks fast", "walk", "a person walks forward, a person walks quickly"),
         ("runs fast", "run", "a person runs fast"),
         ("Slowly takes a bow", "bow", "a person bows, a person slowly takes a bow"),
         ("arms up", "raise-arm", "a person raises an arm, arms up"),
         ("guards the door", "block", "a person blocks an attack, a person guards the door"),
-        ("guards walk to the door", "walk", "a person walks, guards walk to the door"),
+        ("guards walk to the door", "walk", "a person walks forward, guards walk to the door"),
     ],
 )
 def test_it_comes_before_the_prompt(prompt: str, action: str | None, read: str) -> None:

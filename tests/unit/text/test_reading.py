@@ -16,6 +16,7 @@ from marey.referee.prompts import action_prompts, development_prompts, studio_pr
 from marey.referee.prompts import sequence_prompts as referee_sequences
 from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
 from marey.text.sequence_reader import CONTEXT, SequenceReader
+from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder
 
@@ -73,7 +74,7 @@ def test_a_reader_of_sequences_learns_its_texts(monkeypatch: pytest.MonkeyPatch)
     encoder = shared_encoder()
     classes, weights = sequence_training.train([*some, *several * 10], encoder, 0)
     reader = SequenceReader(classes, encoder.sha256, {name: part.astype(np.float16) for name, part in weights.items()})
-    read = [reader.read(text.text, encoder.encode(text.text), encoder.pooled) for text in several]
+    read = [reader.read(as_written(text.text), encoder.encode(text.text), encoder.pooled) for text in several]
     right = [
         {each.action for each in found} == {part.asks for part in text.parts}
         for found, text in zip(read, several, strict=True)

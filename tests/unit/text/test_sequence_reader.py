@@ -27,6 +27,7 @@ from marey.text.sequence_reader import (
     way_to_a_stop,
     without_joints,
 )
+from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder, shared_pipeline
 
@@ -39,7 +40,7 @@ def reading() -> TextPipeline:
 
 
 def read(prompt: str) -> tuple[ReadMovement, ...]:
-    return sequence_reader().read(prompt, shared_encoder().encode(prompt), shared_encoder().pooled)
+    return sequence_reader().read(as_written(prompt), shared_encoder().encode(prompt), shared_encoder().pooled)
 
 
 def test_it_knows_every_action_and_the_shipped_encoder() -> None:
@@ -117,7 +118,7 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) ->
     prompt = "she bows low, then strolls off"
     (features,) = reading.features([prompt])
     assert [each.prompt for each in features.movements] == ["she bows low", "strolls off"]
-    assert features.movements[1].rewritten == "a person walks, a person strolls off"
+    assert features.movements[1].rewritten == "a person walks forward, a person strolls off"
     assert features.rewritten == prompt
     (parsed,) = reading.explain([prompt])
     assert parsed.to_json()["movements"] == [each.rewritten for each in features.movements]
@@ -158,7 +159,7 @@ def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> Non
 def test_a_way_of_a_number_of_steps_comes_to_rest(reading: TextPipeline) -> None:
     steps, walk, stairs = reading.features(["takes three steps forward", "walks forward", "walks up three steps"])
     assert [each.rewritten for each in steps.movements] == [
-        "a person walks, a person takes three steps forward",
+        "a person walks forward, a person takes three steps forward",
         load_vocabulary().need(STANDING).plain_words,
     ]
     assert walk.movements == stairs.movements == ()

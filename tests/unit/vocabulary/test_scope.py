@@ -7,16 +7,15 @@ import pytest
 
 from marey.bundles import Bundle
 from marey.checks.scope_prompts import IN_SCOPE, ScopeRate, is_right, scope_prompts, scope_rates
-from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.report import warn_of
-from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.scope import ActionLists, every_action, match_scope
 from tests.support.marey import REPOSITORY
 
 FEW = ActionLists(
     supported=("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow"),
     tried=("kick", "punch", "slash", "dance"),
 )
-ALL = ActionLists(tuple(load_vocabulary().actions))
+ALL = every_action()
 DEVELOPMENT = scope_prompts("development")
 
 
@@ -30,9 +29,9 @@ def read_captions(folder: Path) -> list[str]:
     return texts
 
 
-def test_the_development_set_has_eight_classes() -> None:
+def test_the_development_set_has_nine_classes() -> None:
     assert len(DEVELOPMENT) >= 150
-    assert len({prompt.group for prompt in DEVELOPMENT}) == 8
+    assert len({prompt.group for prompt in DEVELOPMENT}) == 9
 
 
 @pytest.mark.parametrize("rate", scope_rates(DEVELOPMENT, ALL), ids=lambda rate: rate.group)
@@ -116,7 +115,7 @@ def test_a_prompt_out_of_scope_is_right_only_as_unknown() -> None:
         ("a person walks forward", "known", "walk", None),
         ("a man raises both his arms slowly", "known", "raise-arm", None),
         ("she sprints", "close", "sprint", "run"),
-        ("a person limps", "close", "walk", "walk"),
+        ("a person roams", "close", "walk", "walk"),
         ("he kicks", "tried", "kick", None),
         ("a person climbs a ladder", "unknown", "climb-ladder", None),
         ("a person juggles", "unknown", None, None),

@@ -1,4 +1,4 @@
-"""Prompts for measuring scope, in sets by different authors: eight classes, one of them in scope.
+"""Prompts for measuring scope, in sets by different authors: nine classes, two of them in scope.
 
 `development` is by the author of the words in `marey.vocabulary`, and so is `meaning`, for the limits of the encoder's
 verdict; `test` is by another author and is never used for choosing words or limits.
@@ -17,6 +17,7 @@ from marey.vocabulary.scope import ActionLists, Scope, match_scope
 ScopeSet = Literal["development", "meaning", "test"]
 IN_SCOPE = "in-scope"
 OBJECTS = "objects"
+DRAWN = "drawn"
 """Classes with rules of their own; the prompts of all others are out of scope."""
 Matcher = Callable[[str, ActionLists], Scope]
 """Judges a prompt: `match_scope`, or `marey.text.meaning.MeaningJudge.judge`."""
@@ -35,8 +36,8 @@ class ScopePrompt:
 class ScopeRate:
     """Counts of a class: prompts, and prompts with the right answer.
 
-    Right is: in scope not `unknown`; objects flagged as such; all others `unknown`, or, for plausible unknown actions,
-    not `known`.
+    Right is: in scope not `unknown`; gestures that are drawn `known`; objects flagged as such; all others `unknown`, or,
+    for plausible unknown actions, not `known`.
     """
 
     group: str
@@ -73,6 +74,8 @@ def is_right(prompt: ScopePrompt, scope: Scope) -> bool:
     """Return True if the scope of a prompt fits its class; see `ScopeRate`."""
     if prompt.group == IN_SCOPE:
         return scope.verdict != "unknown"
+    if prompt.group == DRAWN:
+        return scope.verdict == "known"
     if prompt.group == OBJECTS:
         return "objects" in scope.flags
     return scope.verdict == "unknown" or (prompt.group == "unknown-action" and scope.verdict != "known")

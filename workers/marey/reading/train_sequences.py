@@ -34,6 +34,7 @@ from marey.text.sequence_reader import (
     clause_inputs,
     without_joints,
 )
+from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 
 CUT_UNITS, CUT_EPOCHS, CUT_BATCH, CUT_DROPOUT = 160, 8, 128, 0.35
@@ -221,7 +222,7 @@ def main() -> None:
 def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
     """Return how many held-out sequences are read right, and how many other prompts are taken for some."""
     lines: list[str] = []
-    read = {text: reader.read(text, encoder.encode(text), encoder.pooled) for text, _ in sequence_prompts()}
+    read = {text: reader.read(as_written(text), encoder.encode(text), encoder.pooled) for text, _ in sequence_prompts()}
     right = sum([each.action for each in read[text]] == list(actions) for text, actions in sequence_prompts())
     lines.append(f"sequences: {right} of {len(read)} right\n")
     others = {
@@ -229,7 +230,7 @@ def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
         "outside": list(outside_prompts()),
     }
     for kind, prompts in others.items():
-        taken = sum(bool(reader.read(text, encoder.encode(text), encoder.pooled)) for text in prompts)
+        taken = sum(bool(reader.read(as_written(text), encoder.encode(text), encoder.pooled)) for text in prompts)
         lines.append(f"{kind}: {taken} of {len(prompts)} read as a sequence\n")
     return "".join(lines)
 

@@ -100,11 +100,11 @@ def _step(sentence: str) -> Step | None:
     if len(names) > 1:
         beside.add("idle")
     wanted = [name for name in names if name not in beside] or names
-    side = side_of(sentence)
+    prompt = sentence if first is None else sentence[len(actions[first].plain_words) :]  # "bows, bows" asks for one bow
+    side = side_of(prompt)
     if ON_THE_SPOT in wanted and any(name in WAYS for name in wanted) and side in ("left", "right"):
         wanted = [TURNING]
     counted = wanted[0] if len(wanted) == 1 and wanted[0] in REPETITIONS else None
-    prompt = sentence.partition(", ")[2] if first is not None else sentence  # "a person bows, bows" asks for one bow
     return (
         tuple(
             WantedAction(
