@@ -260,8 +260,8 @@ class TextPipeline:
             return None
         if self.spec.movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
             return _Reading(bare.prompt, movements)
-        stands = not bare.text or (self._read_action(bare.text).action is None and not named_actions(bare.text))
-        if stands:
+        acts = without_gaze(bare.text)
+        if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
             return _Reading.of(bare.prompt, STANDING) if bare.fits(STANDING) else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_action(bare.text).action]

@@ -36,8 +36,8 @@ class ScopePrompt:
 class ScopeRate:
     """Counts of a class: prompts, and prompts with the right answer.
 
-    Right is: in scope not `unknown`; gestures that are drawn `known`; objects flagged as such; all others `unknown`, or,
-    for plausible unknown actions, not `known`.
+    Right is: in scope not `unknown`; gestures that are drawn `known`; objects flagged as such; all others
+    `unknown`, or, for plausible unknown actions, not `known`.
     """
 
     group: str
