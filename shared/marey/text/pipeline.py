@@ -262,7 +262,8 @@ class TextPipeline:
             return _Reading(bare.prompt, movements)
         acts = without_gaze(bare.text)
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
-            return _Reading.of(bare.prompt, STANDING) if bare.fits(STANDING) else None
+            said_alone = not bare.text or not all(each.whole for each in bare.stated)
+            return _Reading.of(bare.prompt, STANDING) if said_alone and bare.fits(STANDING) else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_action(bare.text).action]
         return reading if any(action is not None and bare.fits(action) for action in shown) else None
