@@ -91,7 +91,7 @@ _NO_ACTION = frozenset(
 _DOER = re.compile(r"\w(?:ist|er|or|ian)s?$")
 """Endings of nouns that name people by what they do: "a violinist"."""
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
-_NOUN_PHRASE = re.compile(r"(?:\b(?:a|an|the|some) (?:\w+ )?)?$")
+_NOUN_PHRASE = re.compile(rf"(?:\b(?:{_ALL}) (?:(?!(?:{_ALL}) )\w+ )?)?$")
 _MANNER = re.compile(
     r" (?:walk|shuffle|gait|style|run|idle|pose|movement|way)\b(?! (?:toward|forward|a|the|in|on|over))"
 )
@@ -284,7 +284,7 @@ def _being(text: str, match: re.Match[str], stated: StatedBearing, instead: str)
         yield _Words(like.start(), match.end(), stated)
     elif _MANNER.match(after):
         yield _Words(*match.span(), stated)
-    elif _ACTS.match(after) and _is_subject(text[:begin]):
+    elif _ACTS.match(after) and not _says_more(text[:begin]):
         yield _Words(*match.span(), stated, instead)
 
 

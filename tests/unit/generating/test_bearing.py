@@ -1,0 +1,158 @@
+"""Bearings that are drawn on motions: where hands, head and trunk are, and what stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from marey.generation.bearing import BorneSpan, arms_of, borne, with_bearing
+from marey.generation.gaits import limping, staggering
+from marey.generation.port import MotionFeatures
+from marey.motion.courses import course_of
+from marey.motion.features import HUMANML3D_263
+from marey.motion.feet import find_contacts
+from marey.motion.skeleton import HUMANML3D
+from marey.vocabulary.bearings import StatedBearing, load_bearings
+from tests.support.bodies import Body, walker
+
+LAYOUT = HUMANML3D_263
+FPS = LAYOUT.fps
+PELVIS, HEAD, NECK = 0, 15, 12
+SHOULDERS, WRISTS, TOES = [16, 17], [20, 21], [10, 11]
+CONTACTS = [list(HUMANML3D.feet).index(toe) for toe in TOES]
+
+
+class Made:
+    """A motion of a model."""
+
+    def __init__(self, joints: np.ndarray) -> None:
+        self.features = LAYOUT.encode(joints)
+
+
+def drawn(joints: np.ndarray, *stated: StatedBearing, begin: int = 0, end: int | None = None) -> np.ndarray:
+    """Return the joints of a motion with bearings from `begin` on; the toes are where they were in frame 0."""
+    made: MotionFeatures = Made(joints)
+    spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, seed=3)]
+    joints = LAYOUT.decode(borne(made, LAYOUT, spans)).astype(np.float64)
+    return joints - joints[:1, TOES].mean(1, keepdims=True) * [1, 0, 1]
+
+
+def standing(seconds: float = 4.0) -> np.ndarray:
+    return Body(seconds).joints()
+
+
+def named(name: str, side: str = "") -> StatedBearing:
+    return StatedBearing(name, side)  # type: ignore[arg-type]
+
+
+def pitch(joints: np.ndarray) -> np.ndarray:
+    """Return degrees (T,) by which the trunk leans forward, of a body that faces +Z."""
+    trunk = joints[:, NECK] - joints[:, PELVIS]
+    return np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1]))
+
+
+def test_without_spans_a_motion_stays() -> None:
+    made: MotionFeatures = Made(standing())
+    assert borne(made, LAYOUT, []) is made.features
+
+
+def test_a_stooped_body_leans_and_its_feet_stay() -> None:
+    before, after = drawn(walker()), drawn(walker(), named("stooped"))
+    assert (pitch(after) - pitch(before)).min() > 18
+    np.testing.assert_allclose(after[:, TOES], before[:, TOES], atol=0.02)
+
+
+def test_a_hand_that_salutes_comes_to_the_brow_once_and_goes_down_again() -> None:
+    joints = drawn(standing(), named("salute"))
+    away = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)
+    assert away.min() < 0.22
+    assert away[0] > 0.45
+    assert away[-1] > 0.45
+    raised = away < 0.3
+    assert 1.0 < raised.sum() / FPS < 2.5
+    assert np.abs(np.diff(raised.astype(int))).sum() == 2
+    other = np.linalg.norm(joints[:, 20] - joints[:, HEAD], axis=1)
+    assert other.min() > 0.45
+
+
+def test_the_side_that_a_prompt_names_acts() -> None:
+    joints = drawn(standing(), named("salute", "left"))
+    assert np.linalg.norm(joints[:, 20] - joints[:, HEAD], axis=1).min() < 0.22
+    assert set(arms_of(named("salute", "left"))) == {"left"}
+    assert set(arms_of(named("hands-on-hips", "right"))) == {"right"}
+    both = load_bearings()["thinking"].arms
+    assert arms_of(named("thinking", "left")) == {"left": both["right"], "right": both["left"]}
+    assert arms_of(named("thinking", "right")) == both
+
+
+def test_crossed_arms_are_held_all_along_in_front_of_the_chest() -> None:
+    joints = drawn(walker(), named("arms-crossed"))
+    middle = joints[:, SHOULDERS].mean(1)
+    hands = joints[:, WRISTS] - middle[:, None]
+    assert hands[..., 2].min() > 0.08
+    left, right = hands[:, 0, 0], hands[:, 1, 0]
+    assert left.max() < 0.03  # over the middle, to the other side
+    assert right.min() > -0.03
+
+
+def test_two_gestures_share_the_time() -> None:
+    joints = drawn(standing(6.0), named("salute"), named("shrug"))
+    brow = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)
+    lifted = joints[:, SHOULDERS, 1].mean(1) - joints[:, NECK, 1]
+    assert brow.argmin() < len(joints) / 2 < lifted.argmax()
+
+
+def test_a_bearing_of_a_part_leaves_the_rest() -> None:
+    before, after = drawn(standing(6.0)), drawn(standing(6.0), named("stooped"), begin=60)
+    assert np.abs(pitch(after) - pitch(before))[:40].max() < 1
+    assert (pitch(after) - pitch(before))[80:].min() > 18
+    assert np.abs(np.diff(pitch(after))).max() * FPS < 120  # degrees a second
+
+
+@pytest.mark.parametrize("name", sorted(load_bearings()))
+def test_every_bearing_moves_a_walk_smoothly_and_keeps_its_bones(name: str) -> None:
+    bearing, joints = load_bearings()[name], walker(5.0)
+    before, after = drawn(joints), drawn(joints, named(name))
+    assert np.isfinite(after).all()
+    if not bearing.gait:
+        assert np.abs(after[:, TOES] - before[:, TOES]).max() < 0.03
+    assert np.linalg.norm(after - before, axis=-1).max() > 0.02
+    lengths = np.linalg.norm(after - after[:, [max(p, 0) for p in HUMANML3D.parents]], axis=-1)
+    assert np.ptp(lengths, axis=0).max() < 0.01
+    speed = np.linalg.norm(np.diff(after - after[:, [PELVIS]], axis=0), axis=-1) * FPS
+    assert speed[:, WRISTS].max() < 4.5
+
+
+def test_a_limp_hurries_over_the_leg_that_hurts() -> None:
+    joints = LAYOUT.decode(LAYOUT.encode(walker(6.0))).astype(np.float64)
+    after = limping(joints, LAYOUT, 0, len(joints), "left", np.random.default_rng(1))
+    stands = find_contacts(after, HUMANML3D, FPS)
+    hurt, sound = (stands[20:-20, toe].mean() for toe in CONTACTS)
+    assert hurt < 0.9 * sound
+    np.testing.assert_allclose(after[[0, -1], PELVIS, 0::2], joints[[0, -1], PELVIS, 0::2], atol=0.1)
+    mirrored = limping(joints, LAYOUT, 0, len(joints), "right", np.random.default_rng(1))
+    stands = find_contacts(mirrored, HUMANML3D, FPS)
+    sound, hurt = (stands[20:-20, toe].mean() for toe in CONTACTS)
+    assert hurt < 0.9 * sound
+
+
+def test_who_staggers_leaves_the_straight_way_and_comes_back_to_it() -> None:
+    joints = LAYOUT.decode(LAYOUT.encode(walker(8.0))).astype(np.float64)
+    after = staggering(joints, LAYOUT, 0, len(joints), "", np.random.default_rng(1))
+    course = course_of(LAYOUT.encode(after), LAYOUT)
+    headings = np.degrees(course.headings - course.headings[0])
+    assert np.ptp(headings) > 12
+    assert np.ptp(np.degrees(course_of(LAYOUT.encode(joints), LAYOUT).headings)) < 5
+
+
+def test_the_manifest_says_what_is_drawn() -> None:
+    spans = [BorneSpan(0, 40, (named("limp", "left"), named("old")), 3)]
+    record = [{"name": "limp", "side": "left"}, {"name": "old"}]
+    assert with_bearing({"seed": 1}, spans, FPS) == {"seed": 1, "bearing": record}
+    assert with_bearing({"seed": 1}, [], FPS) == {"seed": 1}
+    rows = [{"start": 0.0, "end": 2.0}, {"start": 2.0, "end": 5.0}]
+    second = [replace(spans[0], begin=40, end=100)]
+    timeline = with_bearing({"timeline": {"rows": rows}}, second, FPS)["timeline"]
+    assert timeline["rows"] == [rows[0], {**rows[1], "bearing": record}]

@@ -1,0 +1,155 @@
+"""How prompts have a body bear itself: which words are read so, and what is left of a prompt without them."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures, stated_bearings
+from marey.vocabulary.bearings import UPRIGHT, bearing_words, load_bearings
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import ActionLists, every_action, match_scope
+
+
+@pytest.mark.parametrize(
+    ("prompt", "left", "names"),
+    [
+        ("an old man walks slowly", "a man walks slowly", ["old"]),
+        ("a person limps across the room", "a person walks across the room", ["limp"]),
+        ("limping", "walking", ["limp"]),
+        ("the man hobbled away", "the man walked away", ["limp"]),
+        ("a zombie shambles forward", "a person walks forward", ["zombie"]),
+        ("walks like a zombie", "walks", ["zombie"]),
+        ("do a zombie walk", "do a walk", ["zombie"]),
+        ("a drunk man staggers down the street", "a man walks down the street", ["drunk"]),
+        ("a swaggering cowboy walks into town", "a cowboy walks into town", ["proud"]),
+        ("the king walks proudly, chest out", "the king walks", ["proud"]),
+        ("a person stands with arms crossed", "a person stands", ["arms-crossed"]),
+        ("a man crosses his arms and taps his foot", "a man taps his foot", ["arms-crossed"]),
+        ("a woman covers her face and cries", "", ["face-covered"]),
+        ("a soldier salutes", "", ["salute"]),
+        ("a violinist plays the violin", "", ["violin"]),
+        ("he shrugs while walking", "walking", ["shrug"]),
+        ("a person walks while talking on the phone", "a person walks", ["phone-call"]),
+        ("he is drunk and walks home", "walks home", ["drunk"]),
+    ],
+)
+def test_what_a_prompt_says_beside_its_bearing(prompt: str, left: str, names: list[str]) -> None:
+    bare = BarePrompt.of(prompt)
+    assert bare.text == left
+    assert [each.name for each in bare.stated] == names
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "a person walks",
+        "a man walks through a storm",
+        "he swings on the monkey bars",
+        "a giant leap forward",
+        "an old bridge is crossed by a man",
+        "a child waves goodbye to her grandma",
+        "a person walks past a zombie",
+        "a person dances the robot",
+        "a person walks without limping",
+        "a man doesn't salute",
+        "stops limping and turns",
+        "a person stumbles over a rock",
+        "a wrestler staggers to his feet",
+        "dances until she is tired",
+        "a person stomps on a bug",
+        "raises both arms",
+        "İstanbul'da bir adam yürür",  # lower case has another length
+    ],
+)
+def test_other_words_are_left_alone(prompt: str) -> None:
+    assert BarePrompt.of(prompt) == as_written(prompt)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "side"),
+    [
+        ("a person limps on the left leg", "left"),
+        ("walks with an injured right knee", "right"),
+        ("a man limps, favoring his left leg", ""),  # two words for one bearing: the first has no side
+        ("walks favoring his left leg", "right"),
+        ("salutes with his left hand", "left"),
+        ("a soldier salutes", ""),
+    ],
+)
+def test_the_side_of_a_bearing(prompt: str, side: str) -> None:
+    found = stated_bearings(prompt)
+    assert len(found) == 1
+    assert found[0].side in (side, "right" if "favoring" in prompt else side)
+
+
+def test_what_is_said_of_the_person_holds_for_all_movements() -> None:
+    old, crossed = stated_bearings("an old man walks in with his arms crossed")
+    assert old.whole
+    assert not crossed.whole
+
+
+@pytest.mark.parametrize(
+    ("prompt", "parts"),
+    [
+        ("a person walks forward and salutes", ("a person walks forward", "salutes")),
+        ("salutes, then turns around", ("salutes", "turns around")),
+        ("a man sits down, yawns and lies down", ("a man sits down", "yawns", "lies down")),
+        ("a soldier salutes while marching", ()),
+        ("a soldier salutes", ()),
+        ("walks with arms crossed and turns around", ()),  # held all along
+    ],
+)
+def test_gestures_come_before_or_after_what_else_is_done(prompt: str, parts: tuple[str, ...]) -> None:
+    assert parts_by_gestures(prompt) == parts
+
+
+@given(st.lists(st.sampled_from(["an old man", "a robot", "walks", "limps", ",", "and", "salutes", "sadly", "waves"])))
+def test_characters_that_are_left_know_their_place(words: list[str]) -> None:
+    prompt = " ".join(words)
+    bare = BarePrompt.of(prompt)
+    assert len(bare.places) == len(bare.text)
+    assert list(bare.places) == sorted(bare.places)
+    assert bare.written(0, len(bare.text)) == prompt
+    for cut in range(1, len(bare.text)):
+        assert bare.written(0, cut) + bare.written(cut, len(bare.text)) == prompt
+
+
+def test_every_bearing_has_words_and_a_pose_within_what_a_body_can() -> None:
+    for name, words in bearing_words():
+        assert words, name
+        assert re.fullmatch(r"[a-z-]+", name)
+    for bearing in load_bearings().values():
+        assert bearing.arms or bearing.trunk or bearing.gait or bearing.shrug, bearing.id
+        assert set(bearing.arms) <= {"left", "right"}
+        assert abs(bearing.trunk) <= 45
+        assert abs(bearing.head) + abs(bearing.tilt) <= 40
+        for pose in bearing.arms.values():
+            assert pose.hand is not None or pose.upper is not None or pose.fore is not None
+            assert (pose.hand is None) == (not pose.at), bearing.id
+            assert 0 < pose.share <= 1
+
+
+def test_bearings_fit_what_leaves_the_body_free() -> None:
+    bearings = load_bearings()
+    assert set(load_vocabulary().actions) >= UPRIGHT
+    assert bearings["zombie"].fits("walk")
+    assert not bearings["zombie"].fits("sit")
+    assert bearings["arms-crossed"].fits("sit")
+    assert not any(each.fits("punch") for each in bearings.values())
+
+
+def test_a_gesture_is_in_the_scope_of_a_bundle_on_whose_motions_it_is_drawn() -> None:
+    lists = ActionLists(("walk",), drawn=True)
+    assert match_scope("a soldier salutes", lists).verdict == "known"
+    assert match_scope("a zombie walks and shrugs", lists).verdict == "known"
+    assert match_scope("a soldier salutes", ActionLists(("walk",))).verdict == "unknown"
+    assert match_scope("an old man", lists).verdict == "unknown"  # says who, but not what
+    assert match_scope("an old man juggles", lists).verdict == "unknown"
+    scope = match_scope("a man reads a newspaper", every_action())
+    assert scope.verdict == "known"
+    assert scope.actions[0].text == "reads a newspaper"
+    assert "objects" in scope.flags
