@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 SEATED: Mapping[str, str] = {"sit-down": "sit", "sit": "sit", "sit-floor": "sit-floor", "kneel": "kneel"}
-"""What goes on while a gesture is made behind an action off the feet."""
+"""Action that goes on while a gesture is made behind one off the feet."""
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
 
 

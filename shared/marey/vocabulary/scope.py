@@ -38,7 +38,7 @@ Left = Literal["noun", "verb"]
 
 VERSION = 1
 STANDING = "idle"
-"""What a body does that makes a gesture, or is said to bear itself in some way, and nothing else."""
+"""Action of a body that makes a gesture, or is said to bear itself in some way, and does nothing else."""
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
 KEPT_READINGS = 1024

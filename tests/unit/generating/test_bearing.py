@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from marey.generation.bearing import BorneSpan, arms_of, borne, with_bearing
+from marey.bundles import Bundle
+from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, with_bearing
+from marey.generation.export import finish
 from marey.generation.gaits import limping, staggering
-from marey.generation.port import MotionFeatures
+from marey.generation.port import MotionFeatures, Request
+from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.motion.courses import course_of
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import find_contacts
 from marey.motion.skeleton import HUMANML3D
 from marey.vocabulary.bearings import StatedBearing, load_bearings
 from tests.support.bodies import Body, walker
+from tests.unit.generating.test_timelines import load, text_of
 
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
@@ -24,7 +30,7 @@ SHOULDERS, WRISTS, TOES = [16, 17], [20, 21], [10, 11]
 CONTACTS = [list(HUMANML3D.feet).index(toe) for toe in TOES]
 
 
-class Made:
+class OnceMade:
     """A motion of a model."""
 
     def __init__(self, joints: np.ndarray) -> None:
@@ -33,7 +39,7 @@ class Made:
 
 def drawn(joints: np.ndarray, *stated: StatedBearing, begin: int = 0, end: int | None = None) -> np.ndarray:
     """Return the joints of a motion with bearings from `begin` on; the toes are where they were in frame 0."""
-    made: MotionFeatures = Made(joints)
+    made: MotionFeatures = OnceMade(joints)
     spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, seed=3)]
     joints = LAYOUT.decode(borne(made, LAYOUT, spans)).astype(np.float64)
     return joints - joints[:1, TOES].mean(1, keepdims=True) * [1, 0, 1]
@@ -54,7 +60,7 @@ def pitch(joints: np.ndarray) -> np.ndarray:
 
 
 def test_without_spans_a_motion_stays() -> None:
-    made: MotionFeatures = Made(standing())
+    made: MotionFeatures = OnceMade(standing())
     assert borne(made, LAYOUT, []) is made.features
 
 
@@ -156,3 +162,63 @@ def test_the_manifest_says_what_is_drawn() -> None:
     second = [replace(spans[0], begin=40, end=100)]
     timeline = with_bearing({"timeline": {"rows": rows}}, second, FPS)["timeline"]
     assert timeline["rows"] == [rows[0], {**rows[1], "bearing": record}]
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A generator whose bundle reads prompts behind their plain action."""
+    made = load("hgm3", tmp_path_factory.mktemp("models"))
+    manifest = made.bundle.manifest
+    text = manifest.text.model_copy(update={"plain_action": True, "movements": True})
+    made.bundle = Bundle(made.bundle.path, manifest.model_copy(update={"text": text}))
+    return made
+
+
+def asked(generator: Any, prompt: str, rewritten: str) -> Request:
+    return Request(replace(text_of(prompt, generator.limits.text_width), rewritten=rewritten), 3, frames=80)
+
+
+def test_a_finished_motion_has_the_bearing_of_its_prompt_and_says_so(generator: Any) -> None:
+    request = asked(generator, "a tired soldier salutes", "a person stands upright")
+    (made,) = generate_any(generator, [request])
+    assert made is not None
+    clip = finish(generator, request, made, generator.settings({}))
+    assert clip.manifest["bearing"] == [{"name": "tired"}, {"name": "salute"}]
+    plain = finish(generator, asked(generator, "a person stands", "a person stands"), made, generator.settings({}))
+    assert "bearing" not in plain.manifest
+    assert np.abs(clip.joints - plain.joints).max() > 0.2
+    quality, without = (each.manifest["quality"]["match"] for each in (clip, plain))
+    assert quality == without  # the motion as it was made
+
+
+def test_a_bearing_that_does_not_fit_the_action_is_not_drawn(generator: Any) -> None:
+    request = asked(generator, "a tired soldier punches", "a person punches, a tired soldier punches")
+    assert borne_spans(request, FPS, 80) == []
+    assert borne_spans(replace(request, free=True), FPS, 80) == []
+
+
+def test_a_bundle_that_reads_prompts_as_they_are_has_none(generator: Any) -> None:
+    request = asked(generator, "a soldier salutes", "a person stands upright")
+    (made,) = generate_any(generator, [request])
+    manifest = generator.bundle.manifest
+    text = manifest.text.model_copy(update={"plain_action": False, "movements": False})
+    other = copy(generator)
+    other.bundle = Bundle(generator.bundle.path, manifest.model_copy(update={"text": text}))
+    assert made is not None
+    assert "bearing" not in finish(other, request, made, generator.settings({})).manifest
+
+
+def test_what_is_said_of_the_person_holds_for_every_row(generator: Any) -> None:
+    width = generator.limits.text_width
+    rows = (
+        replace(text_of("an old man walks in with his arms crossed", width), rewritten="a person walks forward"),
+        replace(text_of("salutes", width), rewritten="a person stands upright"),
+        replace(text_of("and bows", width), rewritten="a person bows"),
+    )
+    whole = replace(text_of("an old man walks in with his arms crossed, salutes and bows", width), movements=rows)
+    request = resolve_request(generator, Request(whole, 3))
+    (made,) = generate_any(generator, [request])
+    assert made is not None
+    clip = finish(generator, request, made, generator.settings({}))
+    drawn = [[each["name"] for each in row.get("bearing", ())] for row in clip.manifest["timeline"]["rows"]]
+    assert drawn == [["old", "arms-crossed"], ["old", "salute"], []]

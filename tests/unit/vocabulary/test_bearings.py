@@ -12,6 +12,7 @@ from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gest
 from marey.vocabulary.bearings import UPRIGHT, bearing_words, load_bearings
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, every_action, match_scope
+from tests.support.marey import REPOSITORY
 
 
 @pytest.mark.parametrize(
@@ -153,3 +154,15 @@ def test_a_gesture_is_in_the_scope_of_a_bundle_on_whose_motions_it_is_drawn() ->
     assert scope.verdict == "known"
     assert scope.actions[0].text == "reads a newspaper"
     assert "objects" in scope.flags
+
+
+def test_the_documentation_lists_every_bearing() -> None:
+    page = (REPOSITORY / "docs" / "how-to" / "bearings.md").read_text()
+    table = page.partition("| bearing |")[2].partition("\n\n")[0]
+    rows = [row for row in table.splitlines() if row.startswith("| `")]
+    assert sorted(name for row in rows for name in re.findall(r"`([a-z-]+)`", row)) == sorted(load_bearings())
+    for row in rows:
+        names = set(re.findall(r"`([a-z-]+)`", row))
+        for example in re.findall(r'"([^"]+)"', row):
+            texts = (example, f"{example} walks", f"a man walks {example}")
+            assert any(names & {each.name for each in stated_bearings(text)} for text in texts), example

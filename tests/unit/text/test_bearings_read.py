@@ -1,0 +1,61 @@
+"""Prompts that have a body bear itself in some way, as the pipeline reads them."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.text.pipeline import TextPipeline
+from marey.vocabulary.entries import load_vocabulary
+from tests.support.texts import shared_pipeline
+
+STANDS = load_vocabulary().need("idle").plain_words
+
+
+@pytest.fixture(scope="module")
+def reading() -> TextPipeline:
+    pipeline = shared_pipeline()
+    spec = pipeline.spec.model_copy(update={"plain_action": True, "movements": True})
+    return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("a sad woman walks with her head hanging", "a person walks forward, a woman walks"),
+        ("a soldier salutes", STANDS),
+        ("a man crosses his arms and looks left", STANDS),
+        ("a person sits and thinks with his hand on his chin", "a person sits on a chair, a person sits"),
+        ("a tired boxer throws a punch", "a person strikes with the fist, a tired boxer throws a punch"),  # not drawn
+        ("an old chair falls over", "an old chair falls over"),
+    ],
+)
+def test_the_model_reads_what_is_not_drawn(reading: TextPipeline, prompt: str, read: str) -> None:
+    assert reading.features([prompt])[0].rewritten == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "movements"),
+    [
+        (
+            "an old man walks to a bench and sits down",
+            [
+                ("an old man walks to a bench", "a person walks forward, a man walks to a bench"),
+                ("sits down", "a person sits down"),
+            ],
+        ),
+        ("a person walks forward and salutes", [("a person walks forward", None), ("salutes", STANDS)]),
+        ("a man sits down and yawns", [("a man sits down", None), ("yawns", "a person sits on a chair")]),
+    ],
+)
+def test_movements_keep_their_words_and_are_read_without_their_bearing(
+    reading: TextPipeline, prompt: str, movements: list[tuple[str, str | None]]
+) -> None:
+    found = reading.features([prompt])[0].movements
+    assert [each.prompt for each in found] == [text for text, _ in movements]
+    for each, (_, read) in zip(found, movements, strict=True):
+        assert read is None or each.rewritten == read
+
+
+def test_a_bundle_without_plain_actions_reads_prompts_as_they_are() -> None:
+    prompt = "a soldier salutes"
+    assert shared_pipeline().features([prompt])[0].rewritten == prompt
