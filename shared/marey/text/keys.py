@@ -12,6 +12,7 @@ from marey.text.action_reader import reader_sha256
 from marey.text.plain_action import VERSION as PLAIN_ACTION_VERSION
 from marey.text.sequence_reader import VERSION as SEQUENCE_VERSION
 from marey.text.sequence_reader import sequence_reader_sha256
+from marey.vocabulary.bearings import bearings_sha256
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import VERSION, ActionLists
 
@@ -51,7 +52,8 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
         [spec.max_actions, spec.max_specifics, spec.in_order],
     ]
     if spec.plain_action:
-        parts.append(["plain_action", PLAIN_ACTION_VERSION, load_vocabulary().sha256, reader_sha256()])
+        words = [load_vocabulary().sha256, bearings_sha256()]
+        parts.append(["plain_action", PLAIN_ACTION_VERSION, *words, reader_sha256()])
     if spec.movements:
         parts.append(["movements", SEQUENCE_VERSION, load_vocabulary().sha256, sequence_reader_sha256()])
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
@@ -80,6 +82,7 @@ def scope_key(prompt: str, bundle: str, lists: ActionLists, *, in_rows: bool = F
     """
     actions = [lists.supported, lists.single_take, lists.tried]
     parts = [VERSION, MEANING_VERSION, load_vocabulary().sha256, bundle, actions, prompt]
+    parts += [bearings_sha256()] if lists.drawn else []
     parts += ["rows"] if in_rows else ["edit"] if of_edit else []
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 

@@ -12,11 +12,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast
 
+from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
 Gait = Literal["limp", "stagger", ""]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
+
+_FILE = Path(__file__).with_name("bearings.toml")
 
 UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep"})
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
@@ -134,7 +137,13 @@ def bearing_words() -> Sequence[tuple[str, Mapping[str, Sequence[str]]]]:
 @lru_cache(maxsize=1)
 def bearing_table() -> Mapping[str, Any]:
     """Return `bearings.toml`."""
-    return tomllib.loads(Path(__file__).with_name("bearings.toml").read_text("utf-8"))
+    return tomllib.loads(_FILE.read_text("utf-8"))
+
+
+@lru_cache(maxsize=1)
+def bearings_sha256() -> str:
+    """Return the hash of `bearings.toml`."""
+    return sha256_of(_FILE)
 
 
 def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
