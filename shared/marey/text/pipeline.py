@@ -54,11 +54,13 @@ class _Reading:
         worded: the text that the model reads.
         movements: those that it asks for, if there are several, one after the other.
         plain: its one action in plain words; empty if it asks for several or none, or in doubt.
+        drawn: words of the prompt are left out that ask for a bearing.
     """
 
     worded: str
     movements: tuple[ReadMovement, ...] = ()
     plain: str = ""
+    drawn: bool = False
 
     @classmethod
     def of(cls, text: str, action: str | None) -> _Reading:
@@ -142,20 +144,23 @@ class TextPipeline:
             ParsedPrompt(
                 prompt,
                 graph,
-                self._rewrite_reason(prompt, rewrite, reading.worded, graph),
+                self._rewrite_reason(prompt, rewrite, reading, graph),
                 self._warnings(graph),
                 tuple(each.worded for each in reading.movements),
             )
             for prompt, rewrite, reading, graph in zip(checked, rewritten, readings, graphs, strict=True)
         ]
 
-    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, worded: str, graph: SemanticGraph) -> str | None:
+    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, reading: _Reading, graph: SemanticGraph) -> str | None:
         """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
         if rewrite.text != prompt:
             reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
         if rewrite.refused is not None:
             reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {rewrite.refused}")
+        if reading.drawn:
+            reasons.append("manners and gestures are drawn on the motion, and not read")
+        worded = reading.worded
         if worded == with_subject(rewrite.text) != rewrite.text:
             reasons.append("the verb gets its subject, as captions have one")
         elif worded != rewrite.text:
@@ -243,7 +248,7 @@ class TextPipeline:
             return [_Reading.of(text, only_action(text)) for text in texts]
         bare = [BarePrompt.of(text) for text in texts]
         self.pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
-        return [self._borne(each) or self._reading(as_written(text)) for each, text in zip(bare, texts, strict=True)]
+        return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
 
     def _reading(self, bare: BarePrompt) -> _Reading:
         read = self._read_action(bare.text)
@@ -259,14 +264,16 @@ class TextPipeline:
         if not bare.stated:
             return None
         if self.spec.movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
-            return _Reading(bare.prompt, movements)
+            return _Reading(bare.prompt, movements, drawn=True)
         acts = without_gaze(bare.text)
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
             said_alone = not bare.text or not all(each.whole for each in bare.stated)
-            return _Reading.of(bare.prompt, STANDING) if said_alone and bare.fits(STANDING) else None
+            stands = replace(_Reading.of(bare.prompt, STANDING), drawn=True)
+            return stands if said_alone and bare.fits(STANDING) else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_action(bare.text).action]
-        return reading if any(action is not None and bare.fits(action) for action in shown) else None
+        fits = any(action is not None and bare.fits(action) for action in shown)
+        return replace(reading, drawn=True) if fits else None
 
     def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
         """Return the movements of the parts of a prompt, some of which are gestures; those of a seated body are made on

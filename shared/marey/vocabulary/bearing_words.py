@@ -11,6 +11,8 @@ from marey.vocabulary.bearings import Side, StatedBearing, bearing_words, each_o
 from marey.vocabulary.inflection import gerund, third_person, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
+KEPT_READINGS = 1024
+"""Prompts whose words are kept as read: reader, scope and manifest ask for the same ones."""
 _WALK = "walk"
 _PERSON = "person"
 _ALL = r"a|an|the|my|his|her|this|that|one|some"
@@ -229,16 +231,17 @@ def _says_more(text: str) -> bool:
     return len(said) > 1 or any(not _DOER.search(word) for word in said)
 
 
-def _found(prompt: str) -> list[_Words]:
+@lru_cache(maxsize=KEPT_READINGS)
+def _found(prompt: str) -> tuple[_Words, ...]:
     """Return the words that ask for bearings in their order; none overlap."""
     text = prompt.lower().replace("’", "'")
     spans: list[_Words] = []
     if len(text) != len(prompt):  # lower case of another length: no language that these words are of
-        return spans
+        return ()
     for each in sorted(_matches(text), key=lambda words: (words.start, -words.end)):
         if (not spans or each.start >= spans[-1].end) and not _DENIED.search(text[: each.start]):
             spans.append(each)
-    return spans
+    return tuple(spans)
 
 
 def _matches(text: str) -> Iterator[_Words]:

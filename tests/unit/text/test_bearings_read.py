@@ -59,3 +59,10 @@ def test_movements_keep_their_words_and_are_read_without_their_bearing(
 def test_a_bundle_without_plain_actions_reads_prompts_as_they_are() -> None:
     prompt = "a soldier salutes"
     assert shared_pipeline().features([prompt])[0].rewritten == prompt
+
+
+def test_it_says_that_words_are_drawn(reading: TextPipeline) -> None:
+    drawn, sequence, plain = reading.explain(["a soldier salutes", "he walks forward and salutes", "a man bows"])
+    assert drawn.to_json()["rewrite_reason"].startswith("manners and gestures are drawn")
+    assert "drawn" in sequence.to_json()["rewrite_reason"]
+    assert "drawn" not in (plain.to_json().get("rewrite_reason") or "")
