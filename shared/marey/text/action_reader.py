@@ -31,6 +31,8 @@ AGREED = 0.2
 """Probability from which on it is believed that a prompt asks for the only action that its words name."""
 LOST = 0.35
 """Probability under which who stands or waits by the words does so: "a guard stands at the gate" is no fighter."""
+RISING = frozenset({"stand-up", "get-up"})
+"""Actions whose words say that one who does not stand does so at the end."""
 SEVERAL, OUTSIDE = "several actions", "no action of the vocabulary"
 """Classes behind the actions."""
 
@@ -85,6 +87,11 @@ class ActionReader(Reader):
         name, probability = self.classes[best], float(shares[best] / shares.sum())
         if named == {STANDING} and probability < LOST:
             name, probability = STANDING, AGREED
+        one = next(iter(named)) if len(named) == 1 else None
+        if one in RISING and name == STANDING:  # "stands up slowly"
+            name, probability = one, AGREED
+        if one is not None and name == SEVERAL and probability < SURE_OF_SEVERAL and not _JOINTS.search(prompt.lower()):
+            name, probability = one, AGREED  # "he walks off"
         least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if named == {name} else SURE
         return ReadAction(name, probability, least)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
-from marey.text.action_reader import STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import AGREED, STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-SEATED: Mapping[str, str] = {"sit-down": "sit", "sit": "sit", "sit-floor": "sit-floor", "kneel": "kneel"}
-"""Action that goes on while a gesture is made behind one off the feet."""
+STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
+"""Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
 
 
@@ -251,7 +251,7 @@ class TextPipeline:
         return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
 
     def _reading(self, bare: BarePrompt) -> _Reading:
-        read = self._read_action(bare.text)
+        read = self._read_bare(bare)
         rests = way_to_rest(bare.prompt, read.action)
         sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
         if self.spec.movements and not sure and (movements := self._movements_in(bare, read.action)):
@@ -271,19 +271,23 @@ class TextPipeline:
             stands = replace(_Reading.of(bare.prompt, STANDING), drawn=True)
             return stands if said_alone and bare.fits(STANDING) else None
         reading = self._reading(bare)
-        shown = [each.action for each in reading.movements] or [self._read_action(bare.text).action]
+        shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
         fits = any(action is not None and bare.fits(action) for action in shown)
         return replace(reading, drawn=True) if fits else None
 
     def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
-        """Return the movements of the parts of a prompt, some of which are gestures; those of a seated body are made on
-        the seat. Parts that ask for no action are left out."""
+        """Return the movements of the parts of a prompt, some of which are gestures.
+
+        Those of a body that sits or stands are made in the same movement. Parts that ask for no action are left out.
+        """
         found: list[ReadMovement] = []
         for part in parts:
             bare = BarePrompt.of(part)
-            if bare.stated and not bare.text:
-                before = found[-1].action if found else None
-                found.append(ReadMovement(part, SEATED.get(before or "", STANDING)))
+            if found and found[-1].action in STAYING and not without_gaze(bare.text):
+                found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
+                continue
+            if not without_gaze(bare.text):
+                found.append(ReadMovement(part, STANDING))
                 continue
             reading = self._borne(bare) or self._reading(as_written(part))
             text = bare.text if bare.stated else part
@@ -294,6 +298,13 @@ class TextPipeline:
 
     def _read_action(self, text: str) -> ReadAction:
         return action_reader().read(text, self.pooled([text])[0])
+
+    def _read_bare(self, bare: BarePrompt) -> ReadAction:
+        """Read what is left of a prompt; in doubt, as the only action that its words name, if it can be borne so."""
+        read = self._read_action(bare.text)
+        named = named_actions(bare.text) if read.action is None and bare.stated else set[str]()
+        (only,) = named if len(named) == 1 else ("",)
+        return ReadAction(only, AGREED, AGREED) if only and bare.fits(only) else read
 
     def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
         with self._lock:

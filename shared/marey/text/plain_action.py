@@ -35,6 +35,12 @@ _UP_TO = re.compile(
     (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
+_DOWN = re.compile(
+    r"""\bdown(?=\ (?:the|a|an|his|her|their|this|that)\ (?:[\w-]+\ ){0,2}
+    (?:road|street|hall|hallway|corridor|aisle|path|catwalk|runway|alley|lane|sidewalk|pavement|avenue|track|beach
+    |boardwalk|river|shore|trail|block|line|row|tunnel)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
 _NOD = re.compile(r"\bnod", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z]+")
 
@@ -69,9 +75,9 @@ def _third_persons() -> frozenset[str]:
 
 def without_rise(prompt: str) -> str:
     """Return a prompt in which who goes up to a place or a person goes there: "walks up to the door" as "walks to the
-    door". Of "up", models read a climb.
+    door", and "down the street" as "along the street". Of "up" and "down", models read a climb.
     """
-    return _UP_TO.sub(r"\g<way> to", prompt)
+    return _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
 
 
 def with_plain_action(prompt: str, action: str | None) -> str:

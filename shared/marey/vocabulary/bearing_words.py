@@ -39,9 +39,10 @@ _LIKE = re.compile(
 _DENIED = re.compile(
     r"\b(?:(?:without|not|never|no|n't|don't|doesn't)\s+(?:(?!and\b|then\b)\w+\s+){0,2}"
     r"|(?:stops?|avoids?|instead of)\s+"
-    r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)\s+)?)$"
+    r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)\s+)?(?:(?:is|are)\s+)?)$"
 )
 _AT_ONCE = re.compile(r"\b(?:while|as|still|whilst)\W*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$", re.IGNORECASE)
+_AND = re.compile(r"\b(?:and|then)\b\W*(?:(?:he|she|they|it)\s+)?$", re.IGNORECASE)
 _AT_ONCE_AFTER = re.compile(r"^\W*(?:while|as|whilst|during|when)\b", re.IGNORECASE)
 _UNTIDY = tuple(
     re.compile(pattern)
@@ -104,6 +105,36 @@ _SIDE = re.compile(r"\b(left|right)\b")
 _HEALTHY = re.compile(r"\bfavou?ring\b|\bgood\b")
 """Words of the leg that does not hurt."""
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
+_BRINGING = frozenset(
+    [
+        "cross",
+        "fold",
+        "put",
+        "place",
+        "set",
+        "cover",
+        "hide",
+        "bury",
+        "clasp",
+        "press",
+        "answer",
+        "raise",
+        "spread",
+        "stretch",
+        "extend",
+        "stick",
+        "shove",
+        "stuff",
+        "play",
+        "strum",
+        "swear",
+        "pledge",
+        "burst",
+    ]
+)
+"""Verbs by which arms come to where they are held: what is told before and after is done before and after."""
+_GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
+"""Nouns of ways before which an adjective is one of the person: "sad walk"."""
 _GAIT = re.compile(r"(\w+)(.*)", re.DOTALL)
 
 
@@ -115,6 +146,18 @@ class _Words:
     end: int
     stated: StatedBearing
     instead: str = ""
+
+    @property
+    def is_gerund(self) -> bool:
+        """True if they begin with a verb in -ing."""
+        return self.stated.words.partition(" ")[0].endswith("ing")
+
+    @property
+    def is_event(self) -> bool:
+        """True if something is done in them: "salutes", "crosses his arms"; not "with his arms crossed"."""
+        bearing, first = self.stated.bearing, self.stated.words.partition(" ")[0]
+        arms = bool(bearing.arms) and not (bearing.pace or bearing.gait or bearing.roll)
+        return not self.instead and not self.stated.whole and (bearing.gesture or (arms and first in _event_verbs()))
 
 
 @dataclass(frozen=True)
@@ -148,7 +191,7 @@ class BarePrompt:
 
     def fits(self, action: str) -> bool:
         """Return True if one of the bearings at least can be shown beside an action of the vocabulary."""
-        return any(each.bearing.fits(action) for each in self.stated)
+        return any(each.shown_in(action) for each in self.stated)
 
 
 def as_written(prompt: str) -> BarePrompt:
@@ -170,23 +213,39 @@ def parts_by_gestures(prompt: str) -> tuple[str, ...]:
 
     "walks forward" and "salutes" of "walks forward and salutes"; none if there are no such gestures.
     """
-    parts, at = list[str](), 0
+    parts, at, last = list[str](), 0, ""
     for each in _found(prompt):
-        if not each.stated.bearing.gesture:
-            continue
         before, behind = prompt[at : each.start], prompt[each.end :]
-        joined = _AT_ONCE.search(before) or _AT_ONCE_AFTER.match(behind)
-        if joined or not (parts or _says_more(before) or _says_more(behind)):
+        if not each.is_event or _AT_ONCE.search(before) or _AT_ONCE_AFTER.match(behind):
             continue
-        begin = at + _joint(before)
-        if _says_more(BarePrompt.of(prompt[at:begin]).text):
-            parts.append(prompt[at:begin].strip(" ,;."))
-        parts.append(prompt[each.start if _says_more(before) else begin : each.end].strip(" ,;."))
-        at = each.end
+        acts = _acts(before)
+        if not (parts or acts or _acts(behind)) or (acts and each.is_gerund and not _AND.search(before)):
+            continue
+        if acts:
+            parts.append(prompt[at : at + _joint(before)].strip(" ,;."))
+        if acts or each.stated.name != last:
+            parts.append(prompt[each.start if acts else at : each.end].strip(" ,;."))
+        at, last = each.end, each.stated.name
     rest = _JOINED.sub("", prompt[at:]).strip(" ,;.")
-    if parts and _says_more(rest):
+    if parts and _acts(rest):
         parts.append(rest)
-    return tuple(parts) if len(parts) > 1 else ()
+    return (*parts[:1], *map(without_joint, parts[1:])) if len(parts) > 1 else ()
+
+
+@lru_cache(maxsize=1)
+def _event_verbs() -> frozenset[str]:
+    """Return the forms of the verbs by which arms are brought to where they are held."""
+    return frozenset(form for verb in _BRINGING for form in verb_forms(verb))
+
+
+def without_joint(part: str) -> str:
+    """Return a part of a prompt without the words that join it to the one before: "salutes" of "and then salutes"."""
+    return _JOINED.sub("", part) or part
+
+
+def _acts(text: str) -> bool:
+    """Return True if something else is done in a text than bearing oneself in some way."""
+    return _says_more(BarePrompt.of(text.strip(" ,;.")).text)
 
 
 def _joint(before: str) -> int:
@@ -238,7 +297,7 @@ def _found(prompt: str) -> tuple[_Words, ...]:
     spans: list[_Words] = []
     if len(text) != len(prompt):  # lower case of another length: no language that these words are of
         return ()
-    for each in sorted(_matches(text), key=lambda words: (words.start, -words.end)):
+    for each in sorted(_matches(text), key=lambda words: (words.start, -words.end, not words.instead)):
         if (not spans or each.start >= spans[-1].end) and not _DENIED.search(text[: each.start]):
             spans.append(each)
     return tuple(spans)
@@ -305,22 +364,25 @@ def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
         (name, kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
         for name, words in bearing_words()
         for kind, entries in words.items()
-        for pattern in _patterns_of(kind, entries)
+        for kind, pattern in _patterns_of(kind, entries)
     ]
 
 
-def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[str]:
+def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield kind and pattern; adjectives of a movement are of the kind `how`: "sad walk", "walks home tired"."""
     either = "|".join(entries)
     if kind == "how":
-        yield "|".join(map(_expanded, entries))
+        yield kind, "|".join(map(_expanded, entries))
     elif kind == "gaits":
         for verb, tail in map(_verb_and_tail, entries):
-            yield rf"(?P<verb>{_longest_first(verb_forms(verb))}){tail}"
+            yield kind, rf"(?P<verb>{_longest_first(verb_forms(verb))}){tail}"
     elif kind == "adjectives":
-        yield rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
-        yield rf"{_BE}{_VERY}(?:{either})(?: and)?"
+        yield kind, rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
+        yield kind, rf"{_BE}{_VERY}(?:{either})(?: and)?"
+        yield "how", rf"(?:{either})(?= (?:{_GAITS})\b)"
+        yield "how", rf"(?<!\ba )(?<!\ban )(?<!\bthe )(?:{either})(?=$|[.,;!])"
     else:
-        yield rf"(?:{either})s?"
+        yield kind, rf"(?:{either})s?"
 
 
 def _verb_and_tail(entry: str) -> tuple[str, str]:

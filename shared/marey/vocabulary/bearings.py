@@ -25,6 +25,12 @@ UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
 ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
+ARMS_BUSY = frozenset(
+    {"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "laugh", "carry", "sneak", "climb-stairs"}
+)
+"""Actions in which trunk and head are free."""
+Shown = Literal["body", "upper", "trunk", ""]
+"""Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
 WORDS = ("how", "gaits", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
@@ -81,12 +87,10 @@ class Bearing:
     hold_s: tuple[float, float] = (1.0, 2.0)
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
 
-    def fits(self, action: str) -> bool:
-        """Return True if a body can bear itself so in an action of the vocabulary.
-
-        It stands or goes, or its arms are free and the bearing moves no more than these, trunk and head.
-        """
-        return action in UPRIGHT or (action in ARMS_FREE and not (self.sink or self.gait or self.roll))
+    @property
+    def is_manner(self) -> bool:
+        """True if it is a way to move, of which a body has one at a time."""
+        return bool(self.pace or self.gait or self.roll or self.swing != 1.0)
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,19 @@ class StatedBearing:
     def bearing(self) -> Bearing:
         """The bearing itself."""
         return load_bearings()[self.name]
+
+    def shown_in(self, action: str) -> Shown:
+        """Return how much of it can be drawn on an action of the vocabulary.
+
+        Beside what the arms do it is only what is said of the person.
+        """
+        bearing = self.bearing
+        if action in UPRIGHT:
+            return "body"
+        leans = bearing.trunk or bearing.head
+        if action in ARMS_FREE:
+            return "upper" if leans or bearing.arms or bearing.shrug else ""
+        return "trunk" if action in ARMS_BUSY and self.whole and leans and not bearing.gesture else ""
 
 
 def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:

@@ -208,10 +208,11 @@ class ScopeMatcher:
 
     def _borne(self, bare: BarePrompt, lists: ActionLists) -> Scope | None:
         """Return the scope of a prompt whose bearings are drawn: that of its other words, and the gestures, which every
-        bundle knows; None if no action that it names can be done with such a bearing, or it says who acts alone."""
+        bundle knows; None if no action that it names can be done with such a bearing, or nothing is done in it."""
         rest = self._match(bare.text, lists) if bare.text else None
         named = {each.action for each in rest.actions if each.action} if rest else set[str]()
-        if not any(map(bare.fits, named or {STANDING})) or (not named and all(each.whole for each in bare.stated)):
+        does = [each for each in bare.stated if not each.whole and (each.bearing.gesture or each.bearing.arms)]
+        if not any(map(bare.fits, named or {STANDING})) or not (named or does):
             return None
         alone = [each for each in bare.stated if each.bearing.gesture or not rest]
         drawn = tuple(NamedAction(each.words[:MAX_TEXT], "known") for each in alone)

@@ -40,7 +40,7 @@ class OnceMade:
 def drawn(joints: np.ndarray, *stated: StatedBearing, begin: int = 0, end: int | None = None) -> np.ndarray:
     """Return the joints of a motion with bearings from `begin` on; the toes are where they were in frame 0."""
     made: MotionFeatures = OnceMade(joints)
-    spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, seed=3)]
+    spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, action="walk", seed=3)]
     joints = LAYOUT.decode(borne(made, LAYOUT, spans)).astype(np.float64)
     return joints - joints[:1, TOES].mean(1, keepdims=True) * [1, 0, 1]
 
@@ -154,7 +154,7 @@ def test_who_staggers_leaves_the_straight_way_and_comes_back_to_it() -> None:
 
 
 def test_the_manifest_says_what_is_drawn() -> None:
-    spans = [BorneSpan(0, 40, (named("limp", "left"), named("old")), 3)]
+    spans = [BorneSpan(0, 40, (named("limp", "left"), named("old")), "walk", 3)]
     record = [{"name": "limp", "side": "left"}, {"name": "old"}]
     assert with_bearing({"seed": 1}, spans, FPS) == {"seed": 1, "bearing": record}
     assert with_bearing({"seed": 1}, [], FPS) == {"seed": 1}

@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures, stated_bearings
-from marey.vocabulary.bearings import UPRIGHT, bearing_words, load_bearings
+from marey.vocabulary.bearings import (
+    ARMS_BUSY,
+    ARMS_FREE,
+    UPRIGHT,
+    StatedBearing,
+    bearing_words,
+    load_bearings,
+)
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, every_action, match_scope
 from tests.support.marey import REPOSITORY
@@ -135,12 +142,13 @@ def test_every_bearing_has_words_and_a_pose_within_what_a_body_can() -> None:
 
 
 def test_bearings_fit_what_leaves_the_body_free() -> None:
-    bearings = load_bearings()
-    assert set(load_vocabulary().actions) >= UPRIGHT
-    assert bearings["zombie"].fits("walk")
-    assert not bearings["zombie"].fits("sit")
-    assert bearings["arms-crossed"].fits("sit")
-    assert not any(each.fits("punch") for each in bearings.values())
+    assert set(load_vocabulary().actions) >= UPRIGHT | ARMS_FREE | ARMS_BUSY
+    assert not UPRIGHT & ARMS_FREE
+    zombie, person = StatedBearing("zombie"), StatedBearing("old", whole=True)
+    assert [zombie.shown_in(action) for action in ("walk", "sit", "wave", "punch")] == ["body", "upper", "", ""]
+    assert [person.shown_in(action) for action in ("walk", "sit", "wave", "punch")] == ["body", "upper", "trunk", ""]
+    assert StatedBearing("salute").shown_in("sit") == "upper"
+    assert StatedBearing("salute", whole=True).shown_in("wave") == ""
 
 
 def test_a_gesture_is_in_the_scope_of_a_bundle_on_whose_motions_it_is_drawn() -> None:

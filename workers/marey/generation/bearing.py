@@ -24,7 +24,6 @@ from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope
-from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import ArmPose, Bearing, StatedBearing, load_bearings
 
@@ -41,6 +40,10 @@ BEGINS_S, FALL = 0.4, 1.15
 """Seconds before a gesture, at least, and how many times as long as it rises it takes to come down."""
 UPPER_STEPS = 0.02
 """Metres a frame by which the feet pass each other in a walk that rolls in full."""
+MOVES_FIRST, LATE = frozenset({"sit-down", "stand-up", "sit-floor", "kneel"}), 0.5
+"""Actions that are done before a gesture, and the share of the motion that they take."""
+SEATED_SHARE = 0.7
+"""Share of the lean of a standing trunk that one has that does not lean from the hips."""
 SHORTEST = 10
 """Frames of the shortest motion on which anything is drawn."""
 
@@ -52,49 +55,76 @@ class BorneSpan:
     Attributes:
         begin, end: its first frame, and the one after its last.
         stated: in the order of the vocabulary.
+        action: id of the action, which leaves some parts of the body free for them.
         seed: decides sizes and times.
     """
 
     begin: int
     end: int
     stated: tuple[StatedBearing, ...]
+    action: str
     seed: int
 
     def record(self) -> list[dict[str, str]]:
         """Return what the manifest says."""
         return [{"name": each.name, **({"side": each.side} if each.side else {})} for each in self.stated]
 
+    @property
+    def gestures(self) -> list[StatedBearing]:
+        """Those that are done once."""
+        return [each for each in self.stated if each.bearing.gesture]
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """How much of a bearing there is, 0 to 1 (T,): on trunk and head, on the arms, and on hips and legs."""
+
+    trunk: Array
+    arms: Array
+    legs: Array
+
 
 def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
     """Return the parts of a motion whose prompts ask for bearings that fit their actions.
 
-    None in streams, and in motions around kept frames.
+    None in streams, and in motions around kept frames. What a sequence says of its person holds for all its movements,
+    and a manner or held arms of one movement for those after it, until another takes their place.
 
     Args:
-        request: of the motion; what a sequence says of its person holds for all its movements.
+        request: of the motion.
         fps: of the features.
         frames: of the features.
     """
     if request.kept or request.free or request.recording is not None:
         return []
     if request.timeline is None:
-        stated = _fitting(stated_bearings(request.text.prompt), request.text)
-        return [BorneSpan(0, frames, stated, request.seed)] if stated else []
+        action = action_of(request.text)
+        stated = _fitting(stated_bearings(request.text.prompt), action)
+        return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
     whole = [each for each in stated_bearings(request.text.prompt) if each.whole] if request.is_sequence else []
-    found = []
+    found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
-        stated = _fitting([*whole, *stated_bearings(row.text.prompt)], row.text)
+        action, own = action_of(row.text), stated_bearings(row.text.prompt)
+        kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
+        stated = _fitting([*whole, *kept, *own], action)
+        if request.is_sequence:
+            carried = [each for each in (*kept, *own) if each in stated and not each.bearing.gesture]
         if stated:
             end = min(round(row.end * fps), frames)
-            found.append(BorneSpan(round(row.start * fps), end, stated, request.seed + k))
+            found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k))
     return found
 
 
-def _fitting(stated: Sequence[StatedBearing], text: TextFeatures) -> tuple[StatedBearing, ...]:
-    """Return the bearings that the action of a prompt can have, each once, in the order of the vocabulary."""
-    action = action_of(text) if stated else ""
+def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
+    """Return True if a body that begins to bear itself in a new way ends an old one."""
+    both = new.bearing, old.bearing
+    return all(each.is_manner for each in both) or all(each.arms for each in both)
+
+
+def _fitting(stated: Sequence[StatedBearing], action: str) -> tuple[StatedBearing, ...]:
+    """Return the bearings that an action can have, each once, in the order of the vocabulary."""
     order = list(load_bearings())
-    once = {each.name: each for each in stated if action and each.bearing.fits(action)}
+    once = {each.name: each for each in stated if each.shown_in(action)}
     return tuple(sorted(once.values(), key=lambda each: order.index(each.name)))
 
 
@@ -113,7 +143,7 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
     for span in spans:
         rng = np.random.default_rng([span.seed, span.begin])
         for each in span.stated:
-            if each.bearing.gait:
+            if each.bearing.gait and each.shown_in(span.action) == "body":
                 draw = limping if each.bearing.gait == "limp" else staggering
                 joints = draw(joints, layout, span.begin, span.end, each.side, rng)
     body = StandingBody(joints)
@@ -124,28 +154,34 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
 
 def _drawn(
     spans: Sequence[BorneSpan], frames: int, fps: float
-) -> Iterator[tuple[StatedBearing, Array, np.random.Generator]]:
-    """Yield each bearing with how much of it there is, 0 to 1 (T,), in the order of the vocabulary."""
+) -> Iterator[tuple[StatedBearing, _Ways, np.random.Generator]]:
+    """Yield each bearing with how much of it there is, in the order of the vocabulary."""
     names = {each.name: each for span in spans for each in span.stated}
     for name in sorted(names, key=list(load_bearings()).index):
-        having = [span for span in spans if name in {each.name for each in span.stated}]
-        rng = np.random.default_rng([having[0].seed, having[0].begin, len(name)])
+        having = [(span, each) for span in spans for each in span.stated if each.name == name]
+        rng = np.random.default_rng([having[0][0].seed, having[0][0].begin, len(name)])
         if names[name].bearing.gesture:
-            for span in having:
-                gestures = [each for each in span.stated if each.bearing.gesture]
-                at = [each.name for each in gestures].index(name)
-                yield gestures[at], _once(span, at, len(gestures), frames, fps, rng), rng
+            for span, each in having:
+                way = _once(span, each, frames, fps, rng)
+                legs = way if each.shown_in(span.action) == "body" else np.zeros(frames)
+                yield each, _Ways(way, way, legs), rng
             continue
-        held = np.zeros(frames)
-        for span in having:
-            held[span.begin : span.end] = 1.0
-        yield names[name], np.clip(smooth(held, PASSES_S, fps), 0.0, 1.0), rng
+        held = {"body": np.zeros(frames), "upper": np.zeros(frames), "trunk": np.zeros(frames)}
+        for span, each in having:
+            held[each.shown_in(span.action) or "trunk"][span.begin : span.end] = 1.0
+        legs, arms, trunk = (
+            np.clip(smooth(mask, PASSES_S, fps), 0.0, 1.0)
+            for mask in (held["body"], held["body"] + held["upper"], held["body"] + held["upper"] + held["trunk"])
+        )
+        yield names[name], _Ways(trunk, arms, legs), rng
 
 
-def _once(span: BorneSpan, at: int, count: int, frames: int, fps: float, rng: np.random.Generator) -> Array:
-    """Return how much of a gesture there is, 0 to 1 (T,): it is made in its share of the span."""
-    bearing = [each.bearing for each in span.stated if each.bearing.gesture][at]
-    begin, end = (span.begin + (span.end - span.begin) * share / count for share in (at, at + 1))
+def _once(span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: np.random.Generator) -> Array:
+    """Return how much of a gesture there is, 0 to 1 (T,): it is made in its share of the span, of one who sits down or
+    stands up at the end of it."""
+    bearing, at, count = stated.bearing, span.gestures.index(stated), len(span.gestures)
+    first = span.begin + (LATE * (span.end - span.begin) if span.action in MOVES_FIRST else 0.0)
+    begin, end = (first + (span.end - first) * share / count for share in (at, at + 1))
     seconds, rise, hold = (end - begin) / fps, bearing.raise_s, rng.uniform(*bearing.hold_s)
     fast = min(1.0, seconds / (rise * (1 + FALL) + 0.6 * hold))
     rise = rise * fast
@@ -158,28 +194,29 @@ class _Drawing:
     """One bearing that is drawn on a body."""
 
     def __init__(
-        self, body: StandingBody, stated: StatedBearing, way: Array, fps: float, rng: np.random.Generator
+        self, body: StandingBody, stated: StatedBearing, ways: _Ways, fps: float, rng: np.random.Generator
     ) -> None:
-        self._body, self._way, self._rng = body, way, rng
+        self._body, self._ways, self._rng = body, ways, rng
         self._bearing: Bearing = stated.bearing
         self._arms = arms_of(stated)
-        self._time = np.arange(len(way)) / fps
+        self._time = np.arange(len(ways.trunk)) / fps
         self._fps = fps
-        self._size = float(rng.uniform(0.9, 1.1))
+        self._size, self._begins = float(rng.uniform(0.9, 1.1)), 0.0 if self._bearing.gesture else rng.uniform(0, 0.6)
 
     def draw(self) -> None:
         """Draw it: trunk first, arms last."""
-        bearing, way = self._bearing, self._way * self._size
-        body = self._body
+        bearing, body = self._bearing, self._body
+        way, legs = self._ways.trunk * self._size, self._ways.legs * self._size
         if bearing.sink:
-            body.shift(-bearing.sink * way)
+            body.shift(-bearing.sink * legs)
         if bearing.trunk:
-            body.bow(bearing.trunk * way, arms_hang=0.85, head=0.0)
+            body.bow(bearing.trunk * legs, arms_hang=0.85, head=0.0)
+            body.lean(SEATED_SHARE * bearing.trunk * (way - legs), "left")
         if bearing.heave:
             body.lean(bearing.heave * way * self._swung(bearing.heave_hz), "left")
         if bearing.roll:
             aside = self._swung(bearing.roll_hz) if bearing.roll_hz else self._steps()
-            body.lean(bearing.roll * way * aside, "forward")
+            body.lean(bearing.roll * legs * aside, "forward")
         if bearing.head:
             body.turn(NECK, "left", bearing.head * way)
         if bearing.tilt:
@@ -213,14 +250,14 @@ class _Drawing:
             here = body.local(normalize(body.joints[:, b] - body.joints[:, a]), side)
             calm = smooth(here, SWING_S, self._fps)
             bones.append(normalize(calm + self._bearing.swing * (here - calm)))
-        body.move_arm(side, self._way, *bones, lag=0.0, straight=True)
+        body.move_arm(side, self._ways.arms, *bones, lag=0.0, straight=True)
 
     def _move(self, side: str, pose: ArmPose) -> None:
         """Bring an arm to its pose."""
         body, (_, shoulder, elbow, wrist) = self._body, ARMS[side]
         if pose.hand is not None:
             place = self._place(side, pose.at)
-            swung = np.sin(2 * np.pi * pose.hz * self._time + self._rng.uniform(0, 0.6))[:, None]
+            swung = np.sin(2 * np.pi * pose.hz * self._since() + self._begins)[:, None]
             target = body.from_shoulder(side, place) + np.array(pose.hand) + swung * np.array(pose.shake)
             upper, fore = body.reach(side, target, pose.elbow)
         else:
@@ -230,7 +267,14 @@ class _Drawing:
                 else body.local(normalize(body.joints[:, b] - body.joints[:, a]), side)
                 for wanted, a, b in ((pose.upper, shoulder, elbow), (pose.fore, elbow, wrist))
             )
-        body.move_arm(side, pose.share * self._way, upper, fore, lag=0.0, straight=not self._bearing.gesture)
+        body.move_arm(side, pose.share * self._ways.arms, upper, fore, lag=0.0, straight=not self._bearing.gesture)
+
+    def _since(self) -> Array:
+        """Return seconds (T,): of a gesture since the hand came to its place, else since the beginning."""
+        if not self._bearing.gesture:
+            return self._time
+        there = self._ways.arms > 0.95 * self._ways.arms.max()
+        return np.maximum(self._time - self._time[int(there.argmax())], 0.0)
 
     def _place(self, side: str, at: str) -> Array:
         """Return the point (T, 3) that a hand's place is measured from."""

@@ -24,7 +24,7 @@ HURRIES, LINGERS = 0.55, 0.22
 """By how much the time of a limp runs faster over the leg that hurts, and slower over the other."""
 DIP, ASIDE, AHEAD = 0.045, 9.0, 7.0
 """Metres by which the hips sink over the leg that hurts, and degrees by which the trunk leans to it, and forward."""
-WEAVES, WEAVES_HZ = 17.0, (0.28, 0.38)
+WEAVES, WEAVES_HZ = 30.0, (0.2, 0.28)
 """Degrees by which a staggering body leaves its way to each side, and how often a second."""
 UNEVEN, UNEVEN_HZ = 0.28, 0.55
 """By how much its time runs faster and slower, and how often a second."""
