@@ -267,9 +267,10 @@ class TextPipeline:
             return _Reading(bare.prompt, movements, drawn=True)
         acts = without_gaze(bare.text)
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
-            said_alone = not bare.text or not all(each.whole for each in bare.stated)
-            stands = replace(_Reading.of(bare.prompt, STANDING), drawn=True)
-            return stands if said_alone and bare.fits(STANDING) else None
+            stands = not acts or not all(each.whole for each in bare.stated)
+            other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
+            stands = stands and (other is None or bare.fits(other))
+            return replace(_Reading.of(bare.prompt, STANDING), drawn=True) if stands else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
         fits = any(action is not None and bare.fits(action) for action in shown)

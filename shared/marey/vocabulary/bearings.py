@@ -26,7 +26,7 @@ UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "
 ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
 ARMS_BUSY = frozenset(
-    {"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "laugh", "carry", "sneak", "climb-stairs"}
+    {"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "carry", "sneak", "climb-stairs"}
 )
 """Actions in which trunk and head are free."""
 Shown = Literal["body", "upper", "trunk", ""]
