@@ -91,8 +91,8 @@ _NO_ACTION = frozenset(
         "have",
     ]
 )
-_DOER = re.compile(r"\w(?:ist|er|or|ian)s?$")
-"""Endings of nouns that name people by what they do: "a violinist"."""
+_DOER = re.compile(r"^\W*(?:an?|the|my|his|her|this) (?:\w+ )?\w+(?:ist|er|or|ian)s?\W*$")
+"""A noun that names a person by what they do: "a violinist"."""
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
 _NOUN_PHRASE = re.compile(rf"(?:\b(?:{_ALL}) (?:(?!(?:{_ALL}) )\w+ )?)?$")
 _MANNER = re.compile(
@@ -287,7 +287,7 @@ def _says_more(text: str) -> bool:
     lists = load_word_lists()
     words = set(re.findall(r"[a-z']+", text.lower()))
     said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
-    return len(said) > 1 or any(not _DOER.search(word) for word in said)
+    return len(said) > 1 or (bool(said) and not _DOER.search(text.lower()))
 
 
 @lru_cache(maxsize=KEPT_READINGS)

@@ -40,6 +40,7 @@ from tests.support.marey import REPOSITORY
         ("a woman covers her face and cries", "", ["face-covered"]),
         ("a soldier salutes", "", ["salute"]),
         ("a violinist plays the violin", "", ["violin"]),
+        ("cheer with arms in the air", "cheer", ["hands-up"]),
         ("he shrugs while walking", "walking", ["shrug"]),
         ("a person walks while talking on the phone", "a person walks", ["phone-call"]),
         ("he is drunk and walks home", "walks home", ["drunk"]),
