@@ -6,7 +6,7 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
-from marey.text.action_reader import AGREED, STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
@@ -27,46 +27,19 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.plain_action import only_action, with_plain_action, with_subject, without_rise
+from marey.text.plain_action import only_action, with_subject, without_rise
+from marey.text.readings import PromptReader, Reading
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
-from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
+from marey.text.sequence_reader import ReadMovement
 from marey.text.words import EDGE_PUNCTUATION
-from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.gazes import without_gaze
 
 if TYPE_CHECKING:
     from marey.text.spelling import Speller
 
 log = logging.getLogger(__name__)
 
-STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
-"""Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """The text that is read for a prompt, and its movements.
-
-    Attributes:
-        worded: the text that the model reads.
-        movements: those that it asks for, if there are several, one after the other.
-        plain: its one action in plain words; empty if it asks for several or none, or in doubt.
-        drawn: words of the prompt are left out that ask for a bearing.
-    """
-
-    worded: str
-    movements: tuple[ReadMovement, ...] = ()
-    plain: str = ""
-    drawn: bool = False
-
-    @classmethod
-    def of(cls, text: str, action: str | None) -> _Reading:
-        """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
-        plain = "" if action is None else load_vocabulary().need(action).plain_words
-        return cls(with_plain_action(text, action), plain=plain)
 
 
 class TextPipeline:
@@ -151,7 +124,7 @@ class TextPipeline:
             for prompt, rewrite, reading, graph in zip(checked, rewritten, readings, graphs, strict=True)
         ]
 
-    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, reading: _Reading, graph: SemanticGraph) -> str | None:
+    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, reading: Reading, graph: SemanticGraph) -> str | None:
         """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
         if rewrite.text != prompt:
@@ -239,85 +212,25 @@ class TextPipeline:
             for each, graph in zip(movements, graphs, strict=True)
         )
 
-    def _readings(self, texts: Sequence[str]) -> list[_Reading]:
+    def _readings(self, texts: Sequence[str]) -> list[Reading]:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
-            return [_Reading(text) for text in texts]
+            return [Reading(text) for text in texts]
         texts = [without_rise(text) for text in texts]
         if not self._reads_actions:
-            return [_Reading.of(text, only_action(text)) for text in texts]
-        bare = [BarePrompt.of(text) for text in texts]
-        self.pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
-        return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
+            return [Reading.of(text, only_action(text)) for text in texts]
+        return PromptReader(self.pooled, self._encoded, movements=self.spec.movements).read(texts)
 
-    def _reading(self, bare: BarePrompt) -> _Reading:
-        read = self._read_bare(bare)
-        rests = way_to_rest(bare.prompt, read.action)
-        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
-        if self.spec.movements and not sure and (movements := self._movements_in(bare, read.action)):
-            return _Reading(bare.prompt, movements)
-        return _Reading.of(bare.prompt, read.action)
-
-    def _borne(self, bare: BarePrompt) -> _Reading | None:
-        """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
-        that cannot be shown beside its actions."""
-        if not bare.stated:
-            return None
-        if self.spec.movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
-            return _Reading(bare.prompt, movements, drawn=True)
-        acts = without_gaze(bare.text)
-        if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
-            stands = not acts or not all(each.whole for each in bare.stated)
-            other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
-            stands = stands and (other is None or bare.fits(other))
-            return replace(_Reading.of(bare.prompt, STANDING), drawn=True) if stands else None
-        reading = self._reading(bare)
-        shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
-        fits = any(action is not None and bare.fits(action) for action in shown)
-        return replace(reading, drawn=True) if fits else None
-
-    def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
-        """Return the movements of the parts of a prompt, some of which are gestures.
-
-        Those of a body that sits or stands are made in the same movement. Parts that ask for no action are left out.
-        """
-        found: list[ReadMovement] = []
-        for part in parts:
-            bare = BarePrompt.of(part)
-            if found and found[-1].action in STAYING and not without_gaze(bare.text):
-                found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
-                continue
-            if not without_gaze(bare.text):
-                found.append(ReadMovement(part, STANDING))
-                continue
-            reading = self._borne(bare) or self._reading(as_written(part))
-            text = bare.text if bare.stated else part
-            action = self._read_action(text).action
-            asked = action is not None or named_actions(text)
-            found += reading.movements or ([ReadMovement(part, action)] if asked else [])
-        return tuple(found) if len(found) > 1 else ()
-
-    def _read_action(self, text: str) -> ReadAction:
-        return action_reader().read(text, self.pooled([text])[0])
-
-    def _read_bare(self, bare: BarePrompt) -> ReadAction:
-        """Read what is left of a prompt; in doubt, as the only action that its words name, if it can be borne so."""
-        read = self._read_action(bare.text)
-        named = named_actions(bare.text) if read.action is None and bare.stated else set[str]()
-        (only,) = named if len(named) == 1 else ("",)
-        return ReadAction(only, AGREED, AGREED) if only and bare.fits(only) else read
-
-    def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
+    def _encoded(self, text: str) -> Encoding:
         with self._lock:
-            encoding = self.encoder.encode(bare.text)
-        return sequence_reader().read(bare, encoding, self.pooled, action)
+            return self.encoder.encode(text)
 
     @property
     def _reads_actions(self) -> bool:
         """True if prompts are read by the vectors of this encoder."""
         return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
 
-    def _read(self, readings: Sequence[_Reading]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
+    def _read(self, readings: Sequence[Reading]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
         time.
 

@@ -1,0 +1,128 @@
+"""Readings of prompts for a model (ours): one action in plain words, or movements one after the other; without the words
+of what is drawn on the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from marey.text.action_reader import AGREED, STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.encoders import Encoding
+from marey.text.plain_action import with_plain_action
+from marey.text.reader_file import Float32
+from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
+from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.gazes import without_gaze
+
+STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
+"""Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The text that is read for a prompt, and its movements.
+
+    Attributes:
+        worded: the text that the model reads.
+        movements: those that it asks for, if there are several, one after the other.
+        plain: its one action in plain words; empty if it asks for several or none, or in doubt.
+        drawn: words of the prompt are left out that ask for a bearing.
+    """
+
+    worded: str
+    movements: tuple[ReadMovement, ...] = ()
+    plain: str = ""
+    drawn: bool = False
+
+    @classmethod
+    def of(cls, text: str, action: str | None) -> Reading:
+        """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
+        plain = "" if action is None else load_vocabulary().need(action).plain_words
+        return cls(with_plain_action(text, action), plain=plain)
+
+
+class PromptReader:
+    """Reads prompts by the trained readers."""
+
+    def __init__(
+        self,
+        pooled: Callable[[Sequence[str]], Sequence[Float32]],
+        encode: Callable[[str], Encoding],
+        *,
+        movements: bool,
+    ) -> None:
+        """Keep how texts are encoded.
+
+        Args:
+            pooled: returns the sentence vectors (W,) of texts, by the encoder of the readers.
+            encode: returns the encoding of a text.
+            movements: a prompt of several movements is read movement by movement.
+        """
+        self._pooled, self._encode, self._movements = pooled, encode, movements
+
+    def read(self, texts: Sequence[str]) -> list[Reading]:
+        """Return what each text asks for."""
+        bare = [BarePrompt.of(text) for text in texts]
+        self._pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
+        return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
+
+    def _reading(self, bare: BarePrompt) -> Reading:
+        read = self._read_bare(bare)
+        rests = way_to_rest(bare.prompt, read.action)
+        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
+        if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
+            return Reading(bare.prompt, movements)
+        return Reading.of(bare.prompt, read.action)
+
+    def _borne(self, bare: BarePrompt) -> Reading | None:
+        """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
+        that cannot be shown beside its actions."""
+        if not bare.stated:
+            return None
+        if self._movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
+            return Reading(bare.prompt, movements, drawn=True)
+        acts = without_gaze(bare.text)
+        if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
+            stands = not acts or not all(each.whole for each in bare.stated)
+            other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
+            stands = stands and (other is None or bare.fits(other))
+            return replace(Reading.of(bare.prompt, STANDING), drawn=True) if stands else None
+        reading = self._reading(bare)
+        shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
+        fits = any(action is not None and bare.fits(action) for action in shown)
+        return replace(reading, drawn=True) if fits else None
+
+    def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
+        """Return the movements of the parts of a prompt, some of which are gestures.
+
+        Those of a body that sits or stands are made in the same movement. Parts that ask for no action are left out.
+        """
+        found: list[ReadMovement] = []
+        for part in parts:
+            bare = BarePrompt.of(part)
+            if found and found[-1].action in STAYING and not without_gaze(bare.text):
+                found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
+                continue
+            if not without_gaze(bare.text):
+                found.append(ReadMovement(part, STANDING))
+                continue
+            reading = self._borne(bare) or self._reading(as_written(part))
+            text = bare.text if bare.stated else part
+            action = self._read_action(text).action
+            asked = action is not None or named_actions(text)
+            found += reading.movements or ([ReadMovement(part, action)] if asked else [])
+        return tuple(found) if len(found) > 1 else ()
+
+    def _read_action(self, text: str) -> ReadAction:
+        return action_reader().read(text, self._pooled([text])[0])
+
+    def _read_bare(self, bare: BarePrompt) -> ReadAction:
+        """Read what is left of a prompt; in doubt, as the only action that its words name, if it can be borne so."""
+        read = self._read_action(bare.text)
+        named = named_actions(bare.text) if read.action is None and bare.stated else set[str]()
+        (only,) = named if len(named) == 1 else ("",)
+        return ReadAction(only, AGREED, AGREED) if only and bare.fits(only) else read
+
+    def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
+        return sequence_reader().read(bare, self._encode(bare.text), self._pooled, action)
