@@ -1,5 +1,5 @@
-"""Readings of prompts for a model (ours): one action in plain words, or movements one after the other; without the words
-of what is drawn on the motion."""
+"""Readings of prompts for a model (ours): one action in plain words, or movements one after the other; without the
+words of what is drawn on the motion."""
 
 from __future__ import annotations
 
