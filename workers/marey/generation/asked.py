@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.fine import FINE, drawn_features
+from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
 from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
@@ -55,7 +56,9 @@ class AskedMotion:
             movement is drawn on what the network made (`marey.generation.fine`); `repetitions`, how often the
             network `made` and the prompt `asked` for the action; `turn`, degrees from the first frame to the last,
             positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
-            the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`).
+            the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`);
+            `grounded`, true where the body was let down to the floor; `flights`, by how many seconds its flights are
+            shorter than the network made them.
     """
 
     features: Float32 = field(repr=False)
@@ -180,6 +183,15 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         if other is not None:
             features, made = other
             changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
+    if wish.action in ON_FEET and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+        grounded = on_floor(features, layout)
+        if grounded is not None:
+            features, changes["grounded"] = grounded, True
+    if wish.action in JUMPS and fixed is None and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+        falls = fallen(features, layout)
+        if falls is not None and len(falls) >= SHORTEST:
+            changes["flights"] = round((len(features) - len(falls)) / layout.fps, 2)
+            features = falls
     features = _retimed(features, layout, wish, fixed, changes)
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 
