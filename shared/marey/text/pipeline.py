@@ -28,7 +28,7 @@ from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject, without_rise
-from marey.text.readings import PromptReader, Reading
+from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
@@ -124,7 +124,7 @@ class TextPipeline:
             for prompt, rewrite, reading, graph in zip(checked, rewritten, readings, graphs, strict=True)
         ]
 
-    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, reading: Reading, graph: SemanticGraph) -> str | None:
+    def _rewrite_reason(self, prompt: str, rewrite: Rewrite, reading: ReadPrompt, graph: SemanticGraph) -> str | None:
         """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
         if rewrite.text != prompt:
@@ -212,14 +212,14 @@ class TextPipeline:
             for each, graph in zip(movements, graphs, strict=True)
         )
 
-    def _readings(self, texts: Sequence[str]) -> list[Reading]:
+    def _readings(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
-            return [Reading(text) for text in texts]
+            return [ReadPrompt(text) for text in texts]
         texts = [without_rise(text) for text in texts]
         if not self._reads_actions:
-            return [Reading.of(text, only_action(text)) for text in texts]
-        return PromptReader(self.pooled, self._encoded, movements=self.spec.movements).read(texts)
+            return [ReadPrompt.of(text, only_action(text)) for text in texts]
+        return TrainedReaders(self.pooled, self._encoded, movements=self.spec.movements).read(texts)
 
     def _encoded(self, text: str) -> Encoding:
         with self._lock:
@@ -230,7 +230,7 @@ class TextPipeline:
         """True if prompts are read by the vectors of this encoder."""
         return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
 
-    def _read(self, readings: Sequence[Reading]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
+    def _read(self, readings: Sequence[ReadPrompt]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
         time.
 

@@ -20,7 +20,7 @@ STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadPrompt:
     """The text that is read for a prompt, and its movements.
 
     Attributes:
@@ -36,13 +36,13 @@ class Reading:
     drawn: bool = False
 
     @classmethod
-    def of(cls, text: str, action: str | None) -> Reading:
+    def of(cls, text: str, action: str | None) -> ReadPrompt:
         """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
         plain = "" if action is None else load_vocabulary().need(action).plain_words
         return cls(with_plain_action(text, action), plain=plain)
 
 
-class PromptReader:
+class TrainedReaders:
     """Reads prompts by the trained readers."""
 
     def __init__(
@@ -61,33 +61,33 @@ class PromptReader:
         """
         self._pooled, self._encode, self._movements = pooled, encode, movements
 
-    def read(self, texts: Sequence[str]) -> list[Reading]:
+    def read(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for."""
         bare = [BarePrompt.of(text) for text in texts]
         self._pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
         return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
 
-    def _reading(self, bare: BarePrompt) -> Reading:
+    def _reading(self, bare: BarePrompt) -> ReadPrompt:
         read = self._read_bare(bare)
         rests = way_to_rest(bare.prompt, read.action)
         sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
-            return Reading(bare.prompt, movements)
-        return Reading.of(bare.prompt, read.action)
+            return ReadPrompt(bare.prompt, movements)
+        return ReadPrompt.of(bare.prompt, read.action)
 
-    def _borne(self, bare: BarePrompt) -> Reading | None:
+    def _borne(self, bare: BarePrompt) -> ReadPrompt | None:
         """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
         that cannot be shown beside its actions."""
         if not bare.stated:
             return None
         if self._movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
-            return Reading(bare.prompt, movements, drawn=True)
+            return ReadPrompt(bare.prompt, movements, drawn=True)
         acts = without_gaze(bare.text)
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
             stands = not acts or not all(each.whole for each in bare.stated)
             other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
             stands = stands and (other is None or bare.fits(other))
-            return replace(Reading.of(bare.prompt, STANDING), drawn=True) if stands else None
+            return replace(ReadPrompt.of(bare.prompt, STANDING), drawn=True) if stands else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
         fits = any(action is not None and bare.fits(action) for action in shown)

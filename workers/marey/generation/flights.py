@@ -1,9 +1,9 @@
 """Bodies that come down: a floor that drifted away comes back, and flights last as long as their heights allow.
 
 A network lets bodies hang in the air: runs of which no foot comes nearer than 8 cm to the floor, and jumps of 34 cm,
-which last half a second, for 1.3 s. No flight of a person lasts a second, so within that a foot is brought to the floor; what
-is still in the air is played so that it lasts as long as a rise to its height and a fall from it, or a little longer. A
-motion that begins in the air begins as it lands.
+which last half a second, for 1.3 s. No flight of a person lasts a second, so within that a foot is brought to the
+floor; what is still in the air is played so that it lasts as long as a rise to its height and a fall from it, or a
+little longer. A motion that begins in the air begins as it lands.
 """
 
 from __future__ import annotations
