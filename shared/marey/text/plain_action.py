@@ -27,6 +27,8 @@ TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
 NODDING = "nod"
 """Read in "shakes his head"."""
+ALONE = frozenset({STANDING})
+"""Actions of which models read the plain words alone: of "a bored watchman stands at his post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _UP_TO = re.compile(
@@ -99,7 +101,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
-    if not bare:
+    if not bare or action in ALONE:
         return plain
     prompt = with_subject(bare)
     if action in PLAINER:
