@@ -101,9 +101,8 @@ class Vocabulary:
         return set(names).difference(*(self.actions[name].implies for name in names))
 
     def said_first(self, text: str) -> str | None:
-        """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does, or are
-        all of it."""
-        text = f"{text.lower().rstrip('.')}, "
+        """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
+        text = text.lower()
         said = ((name, text.removeprefix(words)) for words, name in self._first_words.items() if text.startswith(words))
         return next((name for name, rest in said if not rest.startswith(("and ", "then "))), None)
 

@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from marey.bundles import TextSpec
+from marey.selector.matching import wanted_of
 from marey.text.action_reader import action_reader
 from marey.text.encoders import Encoding
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
-from marey.text.plain_action import MOST_WORDS, only_action, with_plain_action, without_rise
+from marey.text.plain_action import ALONE, MOST_WORDS, only_action, with_plain_action, without_rise
 from marey.vocabulary.entries import Action, load_vocabulary
 from tests.support.texts import shared_pipeline
 
@@ -104,8 +105,13 @@ def test_an_action_is_said_once(prompt: str, read: str, pipeline: TextPipeline) 
 
 @pytest.mark.parametrize("action", load_vocabulary().actions.values(), ids=lambda action: action.id)
 def test_the_action_of_the_plain_words_is_told_from_them(action: Action) -> None:
-    assert load_vocabulary().said_first(with_plain_action("do it like this", action.id)) == action.id
+    read = with_plain_action("do it like this", action.id)
     assert load_vocabulary().said_first(action.plain_words) is None
+    if action.id in ALONE:
+        assert read == action.plain_words
+        assert [each.action for step in wanted_of([read]) or () for each in step] == [action.id]
+    else:
+        assert load_vocabulary().said_first(read) == action.id
 
 
 def test_a_bundle_says_whether_its_prompts_are_read_so(pipeline: TextPipeline) -> None:
