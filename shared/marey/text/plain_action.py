@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from marey.text.action_reader import STANDING
+from marey.text.action_reader import STANDING, named_actions
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.entries import load_vocabulary
@@ -28,7 +28,8 @@ TURNING = "turn"
 NODDING = "nod"
 """Read in "shakes his head"."""
 ALONE = frozenset({STANDING})
-"""Actions of which models read the plain words alone: of "a bored watchman stands at his post" they made a walk."""
+"""Actions of which models read the plain words alone, if the prompt names no other: of "a bored watchman stands at his
+post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _UP_TO = re.compile(
@@ -101,7 +102,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
-    if not bare or action in ALONE:
+    if not bare or (action in ALONE and named_actions(prompt) <= {action}):
         return plain
     prompt = with_subject(bare)
     if action in PLAINER:
