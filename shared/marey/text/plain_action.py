@@ -28,8 +28,9 @@ TURNING = "turn"
 NODDING = "nod"
 """Read in "shakes his head"."""
 ALONE = frozenset({STANDING})
-"""Actions of which models read the plain words alone, if the prompt names no other: of "a bored watchman stands at his
-post" they made a walk."""
+FEW_WORDS = 16
+"""Actions of which models read the plain words alone, if the prompt has few words and names no other: of "a bored watchman
+stands at his post" they made a walk. Long ones begin with standing, and go on in ways that no word names."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _UP_TO = re.compile(
@@ -102,7 +103,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
-    if not bare or (action in ALONE and named_actions(prompt) <= {action}):
+    if not bare or (action in ALONE and len(prompt.split()) <= FEW_WORDS and named_actions(prompt) <= {action}):
         return plain
     prompt = with_subject(bare)
     if action in PLAINER:

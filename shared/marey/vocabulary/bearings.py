@@ -25,9 +25,7 @@ UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
 ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
-ARMS_BUSY = frozenset(
-    {"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "carry", "sneak", "climb-stairs"}
-)
+ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "carry", "sneak"})
 """Actions in which trunk and head are free."""
 Shown = Literal["body", "upper", "trunk", ""]
 """Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
