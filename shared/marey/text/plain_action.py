@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from marey.text.action_reader import STANDING, named_actions
+from marey.text.action_reader import STANDING
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.entries import load_vocabulary
@@ -28,9 +28,8 @@ TURNING = "turn"
 NODDING = "nod"
 """Read in "shakes his head"."""
 ALONE = frozenset({STANDING})
-FEW_WORDS = 16
-"""Actions of which models read the plain words alone, if the prompt has few words and names no other: of "a bored watchman
-stands at his post" they made a walk. Long ones begin with standing, and go on in ways that no word names."""
+"""Actions of which models read the plain words alone, where they are read surely: of "a bored watchman stands at his
+post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _UP_TO = re.compile(
@@ -84,7 +83,7 @@ def without_rise(prompt: str) -> str:
     return _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
 
 
-def with_plain_action(prompt: str, action: str | None) -> str:
+def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) -> str:
     """Return a prompt behind its action in plain words: "a person bows, the waiter takes a bow".
 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
@@ -94,6 +93,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     Args:
         prompt: as `check_prompt` returns it.
         action: id of the one action that it asks for; None = several, none, or in doubt.
+        surely: there is no doubt at all.
     """
     borne = BarePrompt.of(prompt)
     said = borne.text if action is not None and borne.fits(action) else prompt
@@ -103,7 +103,7 @@ def with_plain_action(prompt: str, action: str | None) -> str:
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
-    if not bare or (action in ALONE and len(prompt.split()) <= FEW_WORDS and named_actions(prompt) <= {action}):
+    if not bare or (surely and action in ALONE):
         return plain
     prompt = with_subject(bare)
     if action in PLAINER:

@@ -15,6 +15,8 @@ from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gest
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 
+SURELY = 0.9
+"""Probability from which on there is no doubt about an action."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
@@ -36,10 +38,10 @@ class ReadPrompt:
     drawn: bool = False
 
     @classmethod
-    def of(cls, text: str, action: str | None) -> ReadPrompt:
+    def of(cls, text: str, action: str | None, *, surely: bool = False) -> ReadPrompt:
         """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
         plain = "" if action is None else load_vocabulary().need(action).plain_words
-        return cls(with_plain_action(text, action), plain=plain)
+        return cls(with_plain_action(text, action, surely=surely), plain=plain)
 
 
 class TrainedReaders:
@@ -73,7 +75,7 @@ class TrainedReaders:
         sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
             return ReadPrompt(bare.prompt, movements)
-        return ReadPrompt.of(bare.prompt, read.action)
+        return ReadPrompt.of(bare.prompt, read.action, surely=read.probability >= SURELY)
 
     def _borne(self, bare: BarePrompt) -> ReadPrompt | None:
         """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
@@ -87,7 +89,7 @@ class TrainedReaders:
             stands = not acts or not all(each.whole for each in bare.stated)
             other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
             stands = stands and (other is None or bare.fits(other))
-            return replace(ReadPrompt.of(bare.prompt, STANDING), drawn=True) if stands else None
+            return replace(ReadPrompt.of(bare.prompt, STANDING, surely=True), drawn=True) if stands else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
         fits = any(action is not None and bare.fits(action) for action in shown)
