@@ -12,6 +12,7 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     ValidationError,
+    field_serializer,
     field_validator,
     model_serializer,
     model_validator,
@@ -192,6 +193,12 @@ class BundleManifest(_Frozen):
             drawn = self.text is not None and self.text.plain_action
             object.__setattr__(self, "actions", replace(self.actions, drawn=drawn))
         return self
+
+    @field_serializer("actions", mode="wrap")
+    def _lists_alone(self, actions: ActionLists | None, handler: SerializerFunctionWrapHandler) -> Any:
+        """Leave out what is no part of the lists: `text` says whether bearings are drawn."""
+        values = handler(actions)
+        return values if values is None else {name: value for name, value in values.items() if name != "drawn"}
 
     @property
     def commercial(self) -> bool:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated, Any, Literal, get_args
-
-from pydantic import Field
+from typing import Any, Literal, get_args
 
 from marey.vocabulary.bearing_words import BarePrompt, as_written
 from marey.vocabulary.counts import stated_count
@@ -65,7 +63,7 @@ class ActionLists:
     supported: tuple[str, ...]
     single_take: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
-    drawn: Annotated[bool, Field(exclude=True)] = False
+    drawn: bool = False
 
     @property
     def known(self) -> tuple[str, ...]:
