@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 
@@ -20,6 +21,7 @@ def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], I
         build: makes all networks; their weights count.
         parts: yields the losses of the parts of a step, each of which is freed before the next.
     """
+    gc.collect()  # memory of earlier tests that is freed inside would count as less
     with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CPU], profile_memory=True) as profile:
         _train(build(), parts, nullcontext)
     events = profile.profiler.kineto_results.events()  # type: ignore[union-attr]
