@@ -187,7 +187,8 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         grounded = on_floor(features, layout)
         if grounded is not None:
             features, changes["grounded"] = grounded, True
-    if wish.action in JUMPS and fixed is None and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+    falls_too_slow = wish.action in JUMPS and wish.count is None and fixed is None  # what is counted stays as it is
+    if falls_too_slow and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
         falls = fallen(features, layout)
         if falls is not None and len(falls) >= SHORTEST:
             changes["flights"] = round((len(features) - len(falls)) / layout.fps, 2)
