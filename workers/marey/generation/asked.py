@@ -183,11 +183,12 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         if other is not None:
             features, made = other
             changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
-    if wish.action in ON_FEET and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+    counted = wish.count is not None  # its moments are found by the height of the feet
+    if wish.action in ON_FEET and not counted and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
         grounded = on_floor(features, layout)
         if grounded is not None:
             features, changes["grounded"] = grounded, True
-    falls_too_slow = wish.action in JUMPS and wish.count is None and fixed is None  # what is counted stays as it is
+    falls_too_slow = wish.action in JUMPS and not counted and fixed is None
     if falls_too_slow and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
         falls = fallen(features, layout)
         if falls is not None and len(falls) >= SHORTEST:
