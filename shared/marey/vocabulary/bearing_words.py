@@ -229,7 +229,7 @@ def parts_by_gestures(prompt: str) -> tuple[str, ...]:
     rest = _JOINED.sub("", prompt[at:]).strip(" ,;.")
     if parts and _acts(rest):
         parts.append(rest)
-    return (*parts[:1], *map(without_joint, parts[1:])) if len(parts) > 1 else ()
+    return (*parts[:1], *map(_without_joint, parts[1:])) if len(parts) > 1 else ()
 
 
 @lru_cache(maxsize=1)
@@ -238,7 +238,7 @@ def _event_verbs() -> frozenset[str]:
     return frozenset(form for verb in _BRINGING for form in verb_forms(verb))
 
 
-def without_joint(part: str) -> str:
+def _without_joint(part: str) -> str:
     """Return a part of a prompt without the words that join it to the one before: "salutes" of "and then salutes"."""
     return _JOINED.sub("", part) or part
 

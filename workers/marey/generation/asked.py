@@ -98,7 +98,8 @@ class _Wish:
         if request.kept or request.free or request.recording is not None:
             return cls()
         text = request.text
-        steps, action = wanted_of(text.actions or (text.rewritten,)), action_of(text)
+        steps = wanted_of(text.actions or (text.rewritten,))
+        action = _action_of(text, steps)
         prompt, gaze = text.prompt, stated_gaze(text.prompt)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
@@ -125,7 +126,10 @@ class _Wish:
 
 def action_of(text: TextFeatures) -> str:
     """Return the id of the only action that a text asks for; empty if there are several or none."""
-    steps = wanted_of(text.actions or (text.rewritten,))
+    return _action_of(text, wanted_of(text.actions or (text.rewritten,)))
+
+
+def _action_of(text: TextFeatures, steps: Sequence[Step] | None) -> str:
     return load_vocabulary().said_first(text.rewritten) or _one_action(steps or ())
 
 
@@ -167,29 +171,30 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
-    if wish.action in FINE and layout.skeleton.name == HUMANML3D.name and not _shows(features, layout, wish):
+    known = layout.skeleton.name == HUMANML3D.name
+    if wish.action in FINE and known and not _shows(features, layout, wish):
         drawn = drawn_features(features, layout, wish.action, wish.count, request.seed)
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
-    if wish.count is not None and layout.skeleton.name == HUMANML3D.name:
+    if wish.count is not None and known:
         as_often = stepped if wish.action in STEPPING else repeated
         often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
         if often is not None and often is not features and _fits(len(often), fixed, wish.pace.share, layout.fps):
             made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
             features = often
             changes["repetitions"] = {"made": made, "asked": wish.count}
-    if wish.turn is not None and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+    if wish.turn is not None and known and len(features) >= SHORTEST:
         other = turned_features(features, layout, wish.turn, wish.side)
         if other is not None:
             features, made = other
             changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
     counted = wish.count is not None  # its moments are found by the height of the feet
-    if wish.action in ON_FEET and not counted and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+    if wish.action in ON_FEET and not counted and known and len(features) >= SHORTEST:
         grounded = on_floor(features, layout)
         if grounded is not None:
             features, changes["grounded"] = grounded, True
     falls_too_slow = wish.action in JUMPS and not counted and fixed is None
-    if falls_too_slow and layout.skeleton.name == HUMANML3D.name and len(features) >= SHORTEST:
+    if falls_too_slow and known and len(features) >= SHORTEST:
         falls = fallen(features, layout)
         if falls is not None and len(falls) >= SHORTEST:
             changes["flights"] = round((len(features) - len(falls)) / layout.fps, 2)

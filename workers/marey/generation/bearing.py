@@ -279,14 +279,11 @@ class _Drawing:
     def _place(self, side: str, at: str) -> Array:
         """Return the point (T, 3) that a hand's place is measured from."""
         joints = self._body.joints
-        other = ARMS[OTHER_SIDE[side]]
         return {
             "chest": joints[:, [arm[1] for arm in ARMS.values()]].mean(1),
             "head": joints[:, HUMANML3D.index("head")],
             "hips": joints[:, 0],
             "shoulder": joints[:, ARMS[side][1]],
-            "other-elbow": joints[:, other[2]],
-            "other-hand": joints[:, other[3]],
         }[at]
 
 

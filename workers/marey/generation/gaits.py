@@ -13,7 +13,7 @@ from marey.checks.kinematics import smooth
 from marey.generation.turned import bent_along
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
-from marey.posing.standing import LEFT, RIGHT, StandingBody
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, StandingBody
 
 Array = NDArray[np.floating]
 
@@ -43,12 +43,11 @@ def limping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
         rng: chooses it.
     """
     hurt = side if side in ANKLES else str(rng.choice(list(ANKLES)))
-    over = _stands(joints, hurt, layout.fps)
-    other = _stands(joints, RIGHT if hurt == LEFT else LEFT, layout.fps)
+    body = StandingBody(joints)
+    over, other = (_stands(body, each, layout.fps) for each in (hurt, OTHER_SIDE[hurt]))
     inside = _inside(len(joints), begin, end, layout.fps)
     dips = inside * smooth(over, 0.06, layout.fps)
     rate = 1.0 + inside * (HURRIES * over - LINGERS * other)
-    body = StandingBody(joints)
     body.shift(-DIP * dips)
     body.lean((1.0 if hurt == RIGHT else -1.0) * ASIDE * dips, "forward")
     body.lean(AHEAD * dips, "left")
@@ -77,11 +76,10 @@ def _inside(frames: int, begin: int, end: int, fps: float) -> Array:
     return np.clip(smooth(inside, 0.15, fps), 0.0, 1.0)
 
 
-def _stands(joints: Array, side: str, fps: float) -> Array:
+def _stands(body: StandingBody, side: str, fps: float) -> Array:
     """Return 0 to 1 (T,): how much the body goes over a foot, which falls behind the other as it does."""
-    body = StandingBody(joints)
-    this, other = ANKLES[side], ANKLES[RIGHT if side == LEFT else LEFT]
-    apart = body.local(joints[:, this] - joints[:, other], LEFT)[:, 2]
+    this, other = ANKLES[side], ANKLES[OTHER_SIDE[side]]
+    apart = body.local(body.joints[:, this] - body.joints[:, other], LEFT)[:, 2]
     falls = -np.gradient(smooth(apart, 0.05, fps))
     return np.clip(falls / max(float(np.percentile(np.abs(falls), 80)), STEP), 0.0, 1.0)
 
