@@ -18,11 +18,9 @@ import numpy as np
 from marey.core.hashing import sha256_of
 from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("action_reader.safetensors")
-STANDING = "idle"
-"""Said beside other actions: "stands and waves"."""
 VECTOR_SCALE, WORD_SCALE = 10.0, 3.0
 """Factors of the sentence vector, whose length is 1, and of the marks of actions that the words name."""
 SURE, SURE_OF_SEVERAL = 0.5, 0.8

@@ -10,13 +10,12 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from marey.text.action_reader import STANDING
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
-from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
 VERSION = 5

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from marey.text.action_reader import AGREED, STANDING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import AGREED, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
@@ -14,6 +14,7 @@ from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_res
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
+from marey.vocabulary.scope import STANDING
 
 SURELY = 0.9
 """Probability from which on there is no doubt about an action."""

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.hashing import sha256_of
-from marey.text.action_reader import OUTSIDE, STANDING, named_actions
+from marey.text.action_reader import OUTSIDE, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
@@ -28,7 +28,7 @@ from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
-from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
 VERSION = 4

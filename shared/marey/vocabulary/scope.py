@@ -36,7 +36,7 @@ Left = Literal["noun", "verb"]
 
 VERSION = 1
 STANDING = "idle"
-"""Action of a body that makes a gesture, or is said to bear itself in some way, and does nothing else."""
+"""Action of a body that only makes a gesture; said beside other actions, too: "stands and waves"."""
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
 KEPT_READINGS = 1024

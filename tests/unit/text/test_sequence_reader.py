@@ -12,7 +12,7 @@ from marey.bundles import TextSpec
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
 from marey.referee.prompts import development_prompts
-from marey.text.action_reader import OUTSIDE, STANDING
+from marey.text.action_reader import OUTSIDE
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
@@ -29,6 +29,7 @@ from marey.text.sequence_reader import (
 )
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import STANDING
 from tests.support.texts import shared_encoder, shared_pipeline
 
 
