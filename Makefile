@@ -6,10 +6,10 @@ STAMP  := $(VENV)/.installed
 # A CPU build where pip finds one locally, else the index's own: outside the lock, never hashed.
 TORCH  := torch==2.13.0
 
-# A file of tests at a time, or a folder whose tests share a server (tests/conftest.py): it starts once. Three processes
+# A file of tests at a time, or a folder whose tests share a server (tests/conftest.py): it starts once. Four processes
 # on two cores, because many tests wait. In the order of the folders (acceptance, clients, …, unit): what takes long comes
 # first, and no process ends long before another.
-PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
+PARALLEL := -n 4 --dist loadfile --no-loadscope-reorder
 
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
@@ -44,8 +44,9 @@ test: $(STAMP) ## Lint, and everything but slow and gpu tests: under ten minutes
 test-all: $(STAMP) ## Lint, and every test
 	$(TOGETHER) lint pytest SELECT="-m ''"
 
+# One thread of numpy and torch a process: two that wait for each other take a third more of both cores.
 pytest: $(STAMP)
-	$(BIN)/pytest -q $(PARALLEL) $(SELECT)
+	OMP_NUM_THREADS=1 $(BIN)/pytest -q $(PARALLEL) $(SELECT)
 
 # Each in an environment of its own: they need other versions of numpy than Marey, and bpy exists for Python 3.11 alone.
 CLIENTS := out/clients

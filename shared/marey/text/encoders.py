@@ -82,8 +82,8 @@ class TextEncoder(Protocol):
         """One vector (W,) a text, which depends on that text alone, never on those beside it."""
         ...
 
-    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """Token states (T, W) a text, those of `encode`; they depend on that text alone as well."""
+    def encodings(self, texts: Sequence[str]) -> list[Encoding]:
+        """Encode several texts as `encode` does; each result depends on its text alone as well."""
         ...
 
 

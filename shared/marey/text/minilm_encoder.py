@@ -30,29 +30,34 @@ class MiniLMEncoder:
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 256 are left out."""
         ids, offsets = self._ids(text)
-        tokens: NDArray[np.float32] = self._model.states(ids)[-1].numpy()
-        mean = tokens.mean(axis=0)
-        norm = float(np.linalg.norm(mean))
-        return Encoding(mean / norm, tokens / norm, tuple(offsets))
+        return _encoding(self._model.states(ids)[-1].numpy(), offsets)
 
     @one_thread()
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """Encode texts, the tokens of many in one pass."""
-        means = [tokens.mean(axis=0) for tokens in self._last(texts)]
+        means = [tokens.mean(axis=0) for tokens in self._last([self._ids(text)[0] for text in texts])]
         return [mean / float(np.linalg.norm(mean)) for mean in means]
 
     @one_thread()
-    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """Token states of texts, many in one pass."""
-        return [tokens / float(np.linalg.norm(tokens.mean(axis=0))) for tokens in self._last(texts)]
+    def encodings(self, texts: Sequence[str]) -> list[Encoding]:
+        """Encode texts, the tokens of many in one pass."""
+        read = [self._ids(text) for text in texts]
+        found = self._last([ids for ids, _ in read])
+        return [_encoding(tokens, offsets) for tokens, (_, offsets) in zip(found, read, strict=True)]
 
-    def _last(self, texts: Sequence[str]) -> Iterator[NDArray[np.float32]]:
+    def _last(self, texts: Sequence[list[int]]) -> Iterator[NDArray[np.float32]]:
         for low in range(0, len(texts), MAX_TEXTS):
-            states = self._model.last([self._ids(text)[0] for text in texts[low : low + MAX_TEXTS]])
-            yield from (tokens.numpy() for tokens in states)
+            yield from (tokens.numpy() for tokens in self._model.last(texts[low : low + MAX_TEXTS]))
 
     def _ids(self, text: str) -> tuple[list[int], list[tuple[int, int]]]:
         encoded = self._model.tokenizer.encode(text)
         if len(encoded.ids) <= MAX_TOKENS:
             return encoded.ids, encoded.offsets
         return [*encoded.ids[: MAX_TOKENS - 1], encoded.ids[-1]], [*encoded.offsets[: MAX_TOKENS - 1], (0, 0)]
+
+
+def _encoding(tokens: NDArray[np.float32], offsets: Sequence[tuple[int, int]]) -> Encoding:
+    """Return the encoding of a text from its last token states (T, W)."""
+    mean = tokens.mean(axis=0)
+    norm = float(np.linalg.norm(mean))
+    return Encoding(mean / norm, tokens / norm, tuple(offsets))

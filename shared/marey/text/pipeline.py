@@ -7,6 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
+TOGETHER = 64
+"""Prompts whose texts are encoded together."""
 
 
 class TextPipeline:
@@ -191,22 +194,39 @@ class TextPipeline:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
         checked = [check_prompt(prompt, stored=True) for prompt in prompts]
-        rewritten = self._rewritten(checked)
+        made: list[TextFeatures] = []
+        for low in range(0, len(checked), TOGETHER):
+            made += self._features_of(checked[low : low + TOGETHER])
+        return made
+
+    def _features_of(self, prompts: Sequence[str]) -> list[TextFeatures]:
+        """Return the features of checked prompts, which are encoded together."""
+        rewritten = self._rewritten(prompts)
         readings = self._readings([each.text for each in rewritten])
         read = self._read(readings)
+        graphs = [self._graphs([each.worded for each in reading.movements]) for reading in readings]
+        self._encode_nodes([*(graph for graph, _ in read), *chain(*graphs)])
         return [
             replace(
                 self._features(prompt, graph, actions),
                 not_rewritten=rewrite.refused,
                 seconds=rewrite.seconds,
-                movements=self._movements(reading.movements),
+                movements=self._movements(reading.movements, movements),
             )
-            for prompt, rewrite, reading, (graph, actions) in zip(checked, rewritten, readings, read, strict=True)
+            for prompt, rewrite, reading, (graph, actions), movements in zip(
+                prompts, rewritten, readings, read, graphs, strict=True
+            )
         ]
 
-    def _movements(self, movements: Sequence[ReadMovement]) -> tuple[TextFeatures, ...]:
-        """Return the features of each movement of a sequence, which is one action."""
-        graphs = self._graphs([each.worded for each in movements])
+    def _encode_nodes(self, graphs: Sequence[SemanticGraph]) -> None:
+        """Encode the nodes of several graphs in a few passes, in a quarter of the time; `encode` finds them."""
+        if self.spec.node_features == "pooled" and len(graphs) > 1:
+            self.pooled([node.text for graph in graphs for node in graph.nodes])
+
+    def _movements(
+        self, movements: Sequence[ReadMovement], graphs: Sequence[SemanticGraph]
+    ) -> tuple[TextFeatures, ...]:
+        """Return the features of each movement of a sequence, which is one action, with its graph."""
         return tuple(
             replace(self._features(each.text, graph, (graph.text,)), seconds=each.seconds)
             for each, graph in zip(movements, graphs, strict=True)
@@ -221,9 +241,9 @@ class TextPipeline:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
         return TrainedReaders(self.pooled, self._encoded, movements=self.spec.movements).read(texts)
 
-    def _encoded(self, text: str) -> Encoding:
+    def _encoded(self, texts: Sequence[str]) -> list[Encoding]:
         with self._lock:
-            return self.encoder.encode(text)
+            return self.encoder.encodings(texts)
 
     @property
     def _reads_actions(self) -> bool:

@@ -51,7 +51,7 @@ class TrainedReaders:
     def __init__(
         self,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
-        encode: Callable[[str], Encoding],
+        encode: Callable[[Sequence[str]], Sequence[Encoding]],
         *,
         movements: bool,
     ) -> None:
@@ -59,24 +59,42 @@ class TrainedReaders:
 
         Args:
             pooled: returns the sentence vectors (W,) of texts, by the encoder of the readers.
-            encode: returns the encoding of a text.
+            encode: returns the encodings of texts.
             movements: a prompt of several movements is read movement by movement.
         """
         self._pooled, self._encode, self._movements = pooled, encode, movements
+        self._actions: dict[str, ReadAction] = {}
+        self._encodings: dict[str, Encoding] = {}
 
     def read(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for."""
         bare = [BarePrompt.of(text) for text in texts]
         self._pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
+        self._encode_together([each if each.text else as_written(each.prompt) for each in bare])
         return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
+
+    def _encode_together(self, bare: Sequence[BarePrompt]) -> None:
+        """Encode prompts that may ask for several movements, and all that may be one of these."""
+        if not self._movements or len(bare) < 2:
+            return
+        unsure = list(dict.fromkeys(each.text for each in bare if not self._is_surely_one(each, self._read_bare(each))))
+        self._encodings.update(zip(unsure, self._encode(unsure), strict=True))
+        self._pooled([clause for text in unsure for clause in sequence_reader().clauses(text, self._encodings[text])])
 
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
         read = self._read_bare(bare)
-        rests = way_to_rest(bare.prompt, read.action)
-        sure = read.action is not None and read.probability >= SURE_OF_SEVERAL and not rests
+        sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
             return ReadPrompt(bare.prompt, movements)
         return ReadPrompt.of(bare.prompt, read.action, surely=read.probability >= SURELY)
+
+    def _is_surely_one(self, bare: BarePrompt, read: ReadAction) -> bool:
+        """Return whether a prompt is not looked at for several movements."""
+        return (
+            read.action is not None
+            and read.probability >= SURE_OF_SEVERAL
+            and not way_to_rest(bare.prompt, read.action)
+        )
 
     def _borne(self, bare: BarePrompt) -> ReadPrompt | None:
         """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one
@@ -118,7 +136,9 @@ class TrainedReaders:
         return tuple(found) if len(found) > 1 else ()
 
     def _read_action(self, text: str) -> ReadAction:
-        return action_reader().read(text, self._pooled([text])[0])
+        if text not in self._actions:
+            self._actions[text] = action_reader().read(text, self._pooled([text])[0])
+        return self._actions[text]
 
     def _read_bare(self, bare: BarePrompt) -> ReadAction:
         """Read what is left of a prompt; in doubt, as the only action that its words name, if it can be borne so."""
@@ -128,4 +148,5 @@ class TrainedReaders:
         return ReadAction(only, AGREED, AGREED) if only and bare.fits(only) else read
 
     def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
-        return sequence_reader().read(bare, self._encode(bare.text), self._pooled, action)
+        encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
+        return sequence_reader().read(bare, encoding, self._pooled, action)

@@ -126,6 +126,25 @@ class ReadClause:
     at_once: bool = False
 
 
+@dataclass(frozen=True)
+class _Cuts:
+    """Places where a text may be cut into clauses.
+
+    Attributes:
+        edges: offsets of the characters at its ends and at the cuts (C + 2,).
+        spans: indices of two edges, for each part between any two.
+        texts: that part, without the words that join it.
+        begins: probability of each cut (C,).
+        at_once: that what begins there comes at the same time as what is before it (C,).
+    """
+
+    edges: list[int]
+    spans: list[tuple[int, int]]
+    texts: list[str]
+    begins: list[float]
+    at_once: list[bool]
+
+
 class SequenceReader(Reader):
     """Both networks. Their classes are the ids of the vocabulary's actions, `OUTSIDE` and `CONTEXT`."""
 
@@ -174,26 +193,34 @@ class SequenceReader(Reader):
         self, bare: BarePrompt, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
     ) -> list[ReadClause]:
         """Return the likeliest clauses of a prompt, as they are written."""
-        prompt = bare.text
-        begins, at_once = self.beginnings(encoding.tokens)
-        places = [place for place in _word_starts(prompt, encoding.offsets) if begins[place] > LEAST_CUT]
-        places = sorted(sorted(places, key=lambda place: -begins[place])[:MOST_CUTS])
-        edges = [0, *(encoding.offsets[place][0] for place in places), len(prompt)]
-        spans = list(itertools.combinations(range(len(edges)), 2))
-        texts = [without_joints(prompt[edges[low] : edges[high]]) for low, high in spans]
+        cuts = self._cuts(bare.text, encoding)
+        edges = cuts.edges
         rows = [
             clause_inputs(text, vector, encoding, (edges[low], edges[high]), self.classes)
-            for text, vector, (low, high) in zip(texts, pooled(texts), spans, strict=True)
+            for text, vector, (low, high) in zip(cuts.texts, pooled(cuts.texts), cuts.spans, strict=True)
         ]
-        shares = dict(zip(spans, self.actions(np.stack(rows)), strict=True))
-        cuts = _likeliest([float(begins[place]) for place in places], shares)
+        shares = dict(zip(cuts.spans, self.actions(np.stack(rows)), strict=True))
         found: list[ReadClause] = []
-        for low, high in itertools.pairwise(cuts):
+        for low, high in itertools.pairwise(_likeliest(cuts.begins, shares)):
             best = int(shares[low, high].argmax())
-            together = low > 0 and bool(at_once[places[low - 1]])
+            together = low > 0 and cuts.at_once[low - 1]
             text = bare.written(edges[low], edges[high]).strip()
             found.append(ReadClause(self.classes[best], float(shares[low, high][best]), text, together))
         return found
+
+    def clauses(self, text: str, encoding: Encoding) -> list[str]:
+        """Return all parts of a text that may be a clause of its own: those whose sentence vectors `read` asks for."""
+        return self._cuts(text, encoding).texts
+
+    def _cuts(self, text: str, encoding: Encoding) -> _Cuts:
+        """Return where a text may be cut, and what lies between."""
+        begins, at_once = self.beginnings(encoding.tokens)
+        places = [place for place in _word_starts(text, encoding.offsets) if begins[place] > LEAST_CUT]
+        places = sorted(sorted(places, key=lambda place: -begins[place])[:MOST_CUTS])
+        edges = [0, *(encoding.offsets[place][0] for place in places), len(text)]
+        spans = list(itertools.combinations(range(len(edges)), 2))
+        texts = [without_joints(text[edges[low] : edges[high]]) for low, high in spans]
+        return _Cuts(edges, spans, texts, [float(begins[at]) for at in places], [bool(at_once[at]) for at in places])
 
     def beginnings(self, states: Float32) -> tuple[Float32, NDArray[np.bool_]]:
         """Return the probability (T,) that a movement begins at each token, and whether (T,) it would come at the same

@@ -60,6 +60,6 @@ class StatesEncoder:
         """One by one: a product of other rows may round differently."""
         return [self.encode(text).pooled for text in texts]
 
-    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+    def encodings(self, texts: Sequence[str]) -> list[Encoding]:
         """One by one, as `pooled`."""
-        return [self.encode(text).tokens for text in texts]
+        return [self.encode(text) for text in texts]

@@ -16,7 +16,7 @@ def truncated_tokens(encoder: TextEncoder, texts: Sequence[str], limit: int) -> 
     A longer text is cut behind the last token that fits and encoded again, as tokenizers truncate: the end token
     follows, and no state has read what is left out.
     """
-    found = encoder.tokens(texts)
+    found = [encoding.tokens for encoding in encoder.encodings(texts)]
     return [
         states if len(states) <= limit else _cut(encoder, text, limit)
         for text, states in zip(texts, found, strict=True)

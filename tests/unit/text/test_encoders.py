@@ -233,9 +233,12 @@ def test_a_vector_does_not_depend_on_the_texts_beside_it(minilm: MiniLMEncoder) 
 
 def test_token_states_of_many_texts_are_those_of_each_alone(minilm: MiniLMEncoder) -> None:
     texts = [TEXT, "left", "a person bows", " ".join(["walk"] * 400)] * 12
-    together = minilm.tokens(texts)
+    together = minilm.encodings(texts)
     assert len(together) == len(texts)
-    for text, states in zip(texts[:4], together, strict=False):
-        np.testing.assert_allclose(states, minilm.encode(text).tokens, atol=2e-6)
-        np.testing.assert_allclose(states, minilm.tokens([text])[0], atol=2e-6)
-    assert minilm.tokens([]) == []
+    for text, encoding in zip(texts[:4], together, strict=False):
+        alone = minilm.encode(text)
+        np.testing.assert_allclose(encoding.tokens, alone.tokens, atol=2e-6)
+        np.testing.assert_allclose(encoding.pooled, alone.pooled, atol=2e-6)
+        np.testing.assert_allclose(encoding.tokens, minilm.encodings([text])[0].tokens, atol=2e-6)
+        assert encoding.offsets == alone.offsets
+    assert minilm.encodings([]) == []

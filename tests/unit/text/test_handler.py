@@ -88,7 +88,8 @@ def test_each_prompt_gets_its_features_under_its_key(handler: TextHandler) -> No
 
 def test_a_prompt_that_cannot_be_used_fails_alone_and_for_good(handler: TextHandler) -> None:
     claimed = (*items("a person walks"), *items("走", key="0" * 64), *items("someone bows"))
-    done, failed, last = handler.run(batch(claimed), FakeControl())
+    outcomes = {outcome.item: outcome for outcome in handler.run(batch(claimed), FakeControl())}
+    done, failed, last = (outcomes[item.id] for item in claimed)
     assert isinstance(done, TextDone)
     assert isinstance(last, TextDone)
     assert isinstance(failed, Failed)

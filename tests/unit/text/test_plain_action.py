@@ -153,8 +153,8 @@ def test_prompts_that_are_read_one_by_one_are_encoded_together(pipeline: TextPip
             asked.append(texts)
             return pipeline.encoder.pooled(texts)
 
-        def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-            return pipeline.encoder.tokens(texts)
+        def encodings(self, texts: Sequence[str]) -> list[Encoding]:
+            return pipeline.encoder.encodings(texts)
 
     spec = pipeline.spec.model_copy(update={"plain_action": True})
     watched = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=Watched())

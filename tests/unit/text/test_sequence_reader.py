@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -76,15 +77,35 @@ def test_a_movement_keeps_its_words_but_those_that_join_it() -> None:
 
 
 def test_three_of_four_development_prompts_are_read_right() -> None:
-    right = [[each.action for each in read(text)] == list(actions) for text, actions in sequence_prompts()]
+    prompts = sequence_prompts()[::2]
+    right = [[each.action for each in read(text)] == list(actions) for text, actions in prompts]
     assert np.mean(right) >= 0.7
 
 
 def test_few_other_prompts_are_split(reading: TextPipeline) -> None:
-    single = reading.features([prompt.text for prompt in development_prompts()][::4])
-    outside = reading.features(outside_prompts()[::2])
+    single = reading.features([prompt.text for prompt in development_prompts()][::8])
+    outside = reading.features(outside_prompts()[::4])
     assert np.mean([bool(each.movements) for each in single]) <= 0.1
     assert np.mean([bool(each.movements) for each in outside]) <= 0.15
+
+
+def test_prompts_beside_each_other_are_encoded_in_few_passes_and_as_if_alone(
+    reading: TextPipeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    passes: list[Sequence[str]] = []
+
+    def count(encode: Callable[[Sequence[str]], object]) -> Callable[[Sequence[str]], object]:
+        return lambda texts: passes.append(texts) or encode(texts)
+
+    fresh = TextPipeline(reading.spec, rewriter=reading.rewriter, labeller=reading.labeller, encoder=reading.encoder)
+    for name in ("pooled", "encodings"):
+        monkeypatch.setattr(reading.encoder, name, count(getattr(reading.encoder, name)))
+    prompts = [text for text, _ in sequence_prompts()[:12]]
+    together = fresh.features(prompts)
+    assert sum(bool(each.movements) for each in together) > 6
+    assert len(passes) < len(prompts)
+    alone = TextPipeline(fresh.spec, rewriter=fresh.rewriter, labeller=fresh.labeller, encoder=fresh.encoder)
+    assert [each.to_blob() for each in together] == [alone.features([text])[0].to_blob() for text in prompts]
 
 
 def clauses(*written: str) -> list[ReadClause]:

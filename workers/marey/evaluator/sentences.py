@@ -49,7 +49,7 @@ def spec_of(encoder: TextEncoder) -> TextSpec:
 
 def token_states(encoder: TextEncoder, sentences: Sequence[str]) -> list[Tensor]:
     """Return (S, W) float16 of each sentence."""
-    return [torch.from_numpy(states).half() for states in encoder.tokens(sentences)]
+    return [torch.from_numpy(encoding.tokens).half() for encoding in encoder.encodings(sentences)]
 
 
 def padded(states: Sequence[Tensor], device: torch.device) -> tuple[Tensor, Tensor]:

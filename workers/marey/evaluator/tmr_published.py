@@ -32,4 +32,4 @@ class PublishedTMREvaluator(TMREvaluator):
 
     def _states(self, sentences: Sequence[str]) -> list[Tensor]:
         """Return the states (S, W) float32 of each sentence: ours are trained on float16, the published ones not."""
-        return [torch.from_numpy(states) for states in self.encoder.tokens(sentences)]
+        return [torch.from_numpy(encoding.tokens) for encoding in self.encoder.encodings(sentences)]
