@@ -26,7 +26,8 @@ VECTOR_SCALE, WORD_SCALE = 10.0, 3.0
 SURE, SURE_OF_SEVERAL = 0.5, 0.8
 """Probabilities from which on a prompt asks for one action, and does so though its words name several."""
 AGREED = 0.2
-"""Probability from which on it is believed that a prompt asks for the only action that its words name."""
+"""Probability from which on it is believed that a prompt asks for the only action that its words name, and which is no
+other that is only close to it."""
 LOST = 0.35
 """Probability under which who stands or waits by the words does so: "a guard stands at the gate" is no fighter."""
 RISING = frozenset({"stand-up", "get-up"})
@@ -90,7 +91,8 @@ class ActionReader(Reader):
             name, probability = one, AGREED
         if one is not None and name == SEVERAL and probability < SURE_OF_SEVERAL and not _JOINTS.search(prompt.lower()):
             name, probability = one, AGREED  # "he walks off"
-        least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if named == {name} else SURE
+        agreed = named == {name} and name in named_actions(prompt, surely=True)
+        least = SURE_OF_SEVERAL if len(named) > 1 else AGREED if agreed else SURE
         return ReadAction(name, probability, least)
 
 
@@ -106,9 +108,11 @@ def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
     return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE])
 
 
-def named_actions(text: str) -> set[str]:
-    """Return the ids of the actions that the words of a text name."""
-    return {each.action for each in match_scope(text, every_action()).actions if each.action is not None}
+def named_actions(text: str, *, surely: bool = False) -> set[str]:
+    """Return the ids of the actions that the words of a text name; `surely`: without those that are only close to what
+    the words mean, such as "sweeps the floor" to a slash."""
+    found = match_scope(text, every_action()).actions
+    return {each.action for each in found if each.action is not None and (each.verdict == "known" or not surely)}
 
 
 @cache

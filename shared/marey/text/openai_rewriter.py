@@ -114,7 +114,9 @@ class OpenAIRewriter:
         return rewrite
 
     def prefetch(self, prompts: Sequence[str]) -> None:
-        """Request several prompts at once; `rewrite` then returns their answers and raises their errors."""
+        """Request several prompts at once; `rewrite` then returns their answers and raises their errors. Those whose
+        error waits to be raised are not asked again."""
+        failed = {prompt: self._failed_ahead[prompt] for prompt in prompts if prompt in self._failed_ahead}
         self._failed_ahead = {}
 
         def ask(prompt: str) -> tuple[str, NotRewritten | None]:
@@ -125,7 +127,7 @@ class OpenAIRewriter:
             return prompt, None
 
         with ThreadPoolExecutor(AT_ONCE) as pool:
-            asked = dict(pool.map(ask, dict.fromkeys(prompts)))
+            asked = failed | dict(pool.map(ask, (prompt for prompt in dict.fromkeys(prompts) if prompt not in failed)))
         self._failed_ahead = {prompt: error for prompt, error in asked.items() if error is not None}
 
     def _ask(self, prompt: str) -> str:

@@ -26,7 +26,7 @@ TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
 NODDING = "nod"
 """Read in "shakes his head"."""
-ALONE = frozenset({STANDING})
+ALONE = frozenset({STANDING, NODDING})
 """Actions of which models read the plain words alone, where they are read surely: of "a bored watchman stands at his
 post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}

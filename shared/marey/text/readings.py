@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from marey.text.action_reader import AGREED, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import AGREED, RISING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import ReadMovement, sequence_reader, way_to_rest
+from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_rest
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
@@ -89,12 +89,10 @@ class TrainedReaders:
         return ReadPrompt.of(bare.prompt, read.action, surely=read.probability >= SURELY)
 
     def _is_surely_one(self, bare: BarePrompt, read: ReadAction) -> bool:
-        """Return whether a prompt is not looked at for several movements."""
-        return (
-            read.action is not None
-            and read.probability >= SURE_OF_SEVERAL
-            and not way_to_rest(bare.prompt, read.action)
-        )
+        """Return True if a prompt is not looked at for several movements."""
+        if read.action is None or read.probability < SURE_OF_SEVERAL or way_to_rest(bare.prompt, read.action):
+            return False
+        return read.action not in RISING or not named_actions(bare.text) & WAYS  # "stands up and walks away"
 
     def _borne(self, bare: BarePrompt) -> ReadPrompt | None:
         """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one

@@ -78,6 +78,10 @@ WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
 REST_S = 2.0
 """Seconds of standing that a stop is read as."""
+_MANNER = re.compile(
+    r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
+)
+"""Words that say how something is done, though one of them names an action."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -176,7 +180,7 @@ class SequenceReader(Reader):
         """
         if way := way_to_rest(bare.prompt, action):
             return ReadMovement(way, action), _rest()
-        groups = in_order(_with_origins(self._clauses(bare, encoding, pooled)))
+        groups = in_order(_with_belongings(self._clauses(bare, encoding, pooled)))
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
@@ -348,11 +352,12 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
     )
 
 
-def _with_origins(clauses: Iterable[ReadClause]) -> list[ReadClause]:
-    """Return clauses; what comes behind "from" belongs to the one before: "gets up from | lying on the ground"."""
+def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
+    """Return clauses; what comes behind "from", or says how, belongs to the one before: "gets up from | lying on the
+    ground", "sneaks ahead | in a crouch"."""
     found: list[ReadClause] = []
     for clause in clauses:
-        if found and found[-1].text.lower().endswith(" from"):
+        if found and (found[-1].text.lower().endswith(" from") or _MANNER.match(clause.text)):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:
             found.append(clause)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
 from marey.generation.gazing import GAZE
@@ -21,7 +22,7 @@ from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
 from marey.generation.repetitions import repeated
 from marey.generation.stepped import frames_of_steps, stepped
-from marey.generation.turned import NEAR, turned_features
+from marey.generation.turned import NEAR, ended_turn, turned_features
 from marey.items.values import MAX_SECONDS
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
@@ -58,7 +59,7 @@ class AskedMotion:
             positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
             the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`);
             `grounded`, true where the body was let down to the floor; `flights`, by how many seconds its flights are
-            shorter than the network made them.
+            shorter than the network made them; `left_out`, how many seconds of its end came after the action.
     """
 
     features: Float32 = field(repr=False)
@@ -68,6 +69,10 @@ class AskedMotion:
 def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
     """Return what was changed in a motion, for the manifest."""
     return motion.changes if isinstance(motion, AskedMotion) else {}
+
+
+ON_THE_SPOT = "turn-around"
+"""Action that is a turn and nothing else."""
 
 
 @dataclass(frozen=True)
@@ -171,36 +176,76 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
-    known = layout.skeleton.name == HUMANML3D.name
-    if wish.action in FINE and known and not _shows(features, layout, wish):
-        drawn = drawn_features(features, layout, wish.action, wish.count, request.seed)
-        if drawn is not None:
-            features, changes["drawn"] = drawn, wish.action
-    if wish.count is not None and known:
-        as_often = stepped if wish.action in STEPPING else repeated
-        often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
-        if often is not None and often is not features and _fits(len(often), fixed, wish.pace.share, layout.fps):
-            made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
-            features = often
-            changes["repetitions"] = {"made": made, "asked": wish.count}
-    if wish.turn is not None and known and len(features) >= SHORTEST:
-        other = turned_features(features, layout, wish.turn, wish.side)
-        if other is not None:
-            features, made = other
-            changes["turn"] = {"made": round(made), "shown": round(_turn(features, layout))}
-    counted = wish.count is not None  # its moments are found by the height of the feet
-    if wish.action in ON_FEET and not counted and known and len(features) >= SHORTEST:
-        grounded = on_floor(features, layout)
-        if grounded is not None:
-            features, changes["grounded"] = grounded, True
-    falls_too_slow = wish.action in JUMPS and not counted and fixed is None
-    if falls_too_slow and known and len(features) >= SHORTEST:
+    if layout.skeleton.name == HUMANML3D.name:
+        if wish.action in FINE and not _shows(features, layout, wish):
+            drawn = drawn_features(features, layout, wish.action, wish.count, request.seed)
+            if drawn is not None:
+                features, changes["drawn"] = drawn, wish.action
+        for change in (_as_often, _turned, _on_floor, _ended):
+            if len(features) >= SHORTEST:
+                features = change(features, layout, wish, fixed, changes)
+    features = _retimed(features, layout, wish, fixed, changes)
+    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+
+
+def _as_often(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion with as many repetitions as are asked for; `changes` says so, as in all of these."""
+    if wish.count is None or "drawn" in changes:  # what is drawn is as often as asked for
+        return features
+    as_often = stepped if wish.action in STEPPING else repeated
+    often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)
+    if often is None or often is features or not _fits(len(often), fixed, wish.pace.share, layout.fps):
+        return features
+    made = len(_repetitions(layout.decode(features), layout.fps, wish.action))
+    changes["repetitions"] = {"made": made, "asked": wish.count}
+    return often
+
+
+def _turned(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion with the turn that is asked for."""
+    if wish.turn is None:
+        return features
+    made = _turn(features, layout)
+    first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action == ON_THE_SPOT else None
+    enough = features if first is None else first
+    bent = turned_features(enough, layout, wish.turn, wish.side)
+    if bent is not None:
+        enough, _ = bent
+    if enough is not features:
+        changes["turn"] = {"made": round(made), "shown": round(_turn(enough, layout))}
+    return enough
+
+
+def _on_floor(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion of a body that comes down to the floor; the moments of a counted one are found by the height of
+    the feet, which stays."""
+    if wish.count is not None:
+        return features
+    if wish.action in ON_FEET and (grounded := on_floor(features, layout)) is not None:
+        features, changes["grounded"] = grounded, True
+    if wish.action in JUMPS and fixed is None:
         falls = fallen(features, layout)
         if falls is not None and len(falls) >= SHORTEST:
             changes["flights"] = round((len(features) - len(falls)) / layout.fps, 2)
             features = falls
-    features = _retimed(features, layout, wish, fixed, changes)
-    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+    return features
+
+
+def _ended(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion without the beginning of what would come after its action."""
+    ends = ended(features, layout, wish.action) if fixed is None else None
+    if ends is None or len(ends) < SHORTEST:
+        return features
+    changes["left_out"] = round((len(features) - len(ends)) / layout.fps, 2)
+    return ends
 
 
 def _retimed(

@@ -18,7 +18,7 @@ from marey.generation.waving import waved, waves_well
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
-from marey.motion.rotations import Array, from_rotvec, rotate
+from marey.motion.rotations import Array, from_rotvec, length, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 
 Float32 = NDArray[np.float32]
@@ -28,6 +28,8 @@ Draw = Callable[[Array, float, int | None, np.random.Generator], Array | None]
 NOD_DEGREES, NOD_HZ = (11.0, 17.0), (1.3, 1.7)
 NODS, PAUSE_S = (3, 5), (0.6, 1.2)
 """Nods in a row, and seconds between two rows, where no number is asked for."""
+HELD_S = 0.8
+"""Standard deviation of the filter that leaves out the nods that a head makes already, seconds."""
 EDGE_S = 0.3
 """Seconds at both ends in which nothing is drawn."""
 SHAKE_HZ = (4.3, 5.2)
@@ -81,7 +83,9 @@ def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generato
     left_of = np.stack([forward[:, 2], np.zeros(frames), -forward[:, 0]], axis=1)
     moved = joints.copy()
     turn = from_rotvec(np.radians(down)[:, None] * left_of)
-    moved[:, head] = joints[:, neck] + rotate(turn, joints[:, head] - joints[:, neck])
+    held = smooth(joints[:, head] - joints[:, neck], HELD_S * fps)  # nods of the network's own would count, too
+    bone = length(joints[:, head] - joints[:, neck])[:, None]
+    moved[:, head] = joints[:, neck] + rotate(turn, bone * normalize(held))
     return moved
 
 

@@ -48,7 +48,7 @@ def fallen(features: Float32, layout: FeatureLayout) -> Float32 | None:
         layout: of the features.
     """
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
-    low = _lowest(joints)
+    low = lowest_foot(joints)
     flights = [span for span in runs(low > UP_M) if span[1] - span[0] >= LEAST_S * fps]
     begins = next((end for begin, end in flights if begin == 0), 0)
     if len(joints) - begins < SHORTEST_S * fps:
@@ -77,7 +77,7 @@ def on_floor(features: Float32, layout: FeatureLayout) -> Float32 | None:
     """
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
     reach = round(REACH_S * fps)
-    near = sliding_window_view(np.pad(_lowest(joints), reach, mode="edge"), 2 * reach + 1)
+    near = sliding_window_view(np.pad(lowest_foot(joints), reach, mode="edge"), 2 * reach + 1)
     drift = smooth(near.min(1), 0.5 * REACH_S, fps)
     if drift.max() < DRIFT_M:
         return None
@@ -85,6 +85,6 @@ def on_floor(features: Float32, layout: FeatureLayout) -> Float32 | None:
     return encode_all(layout, joints)
 
 
-def _lowest(joints: Array) -> Array:
+def lowest_foot(joints: Array) -> Array:
     """Return metres (T,) from the floor to the lowest point of the feet."""
     return np.minimum(joints[:, TOES, 1], joints[:, ANKLES, 1] - ANKLE_M).min(1)
