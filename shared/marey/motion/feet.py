@@ -11,7 +11,7 @@ thresholds here are in metres and seconds, so they hold at any frame rate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -39,6 +39,11 @@ class ContactRule:
 
 
 RULE = ContactRule()
+RUNNING = 1.8
+"""Metres a second from which on a body runs: its feet stand for a fifth of a second, and the frames before and after
+those, in which they move, lie close."""
+_ENTER, _LEAVE = 0.2, 0.4
+"""Shares of the speed of a running body below which a foot begins to stand, and stands."""
 LONG_SWING = 0.8  # seconds; in a longer swing the correction returns to zero in between
 RELEASE = 0.35  # seconds of that return
 FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint is inside the foot, so it stands at up to 3 cm
@@ -75,6 +80,15 @@ def clean_feet(
         _plant(joints, skeleton, (ankle, toe), stands[:, 2 * side : 2 * side + 2], fps)
     follow_feet(before, joints, stands[:, 1::2], skeleton, fps)
     return joints, stands
+
+
+def rule_for(joints: Array, fps: float) -> ContactRule:
+    """Return the thresholds for a motion (T, J, 3), metres: wider ones for a body that runs nearly all the time."""
+    if len(joints) < 2:
+        return RULE
+    speed = np.linalg.norm(np.diff(joints[:, 0, [0, 2]], axis=0), axis=-1) * fps
+    usual = float(np.quantile(speed, 0.25))
+    return RULE if usual < RUNNING else replace(RULE, enter_speed=_ENTER * usual, leave_speed=_LEAVE * usual)
 
 
 def need_feet(skeleton: Skeleton) -> None:

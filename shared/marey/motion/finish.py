@@ -14,8 +14,8 @@ from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.bones import bone_fit
 from marey.motion.clip import MotionClip
 from marey.motion.features import FeatureLayout, PosedLayout
-from marey.motion.feet import clean_feet, find_contacts, need_feet
-from marey.motion.hands import join_hands, wrist_distance
+from marey.motion.feet import clean_feet, find_contacts, need_feet, rule_for
+from marey.motion.hands import clear_arms, join_hands, wrist_distance
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import aim_bones, checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
@@ -40,14 +40,14 @@ def finish_motion(
     The pose is solved on the skeleton of the training data, which the model learned, and turned to rotations, unless
     the layout holds them; the body takes those, and its travel is scaled by the length of its legs. Feet are cleaned at
     the rate of the output, after resampling, so that they stand still there too; hands that meet are brought as near as
-    they were decoded; the second solution is exact.
+    they were decoded, and arms out of the body; the second solution is exact.
 
     Args:
         features: (Tf, D) as generated, not normalized.
         layout: layout of the features, with the skeleton of the training data.
         body: skeleton of the clip; None = `standard_body` of the layout's.
         fps: rate of the clip; the layout's own by default.
-        clean: lock the feet, and correct hands that meet.
+        clean: lock the feet, and correct hands that meet and arms inside the body.
         manifest: provenance, for the clip's npz.
 
     Raises:
@@ -66,8 +66,8 @@ def finish_motion(
         hands = interpolate(hands, times)
     joints = forward_kinematics(skeleton, rotations, root)
     if clean:
-        joints, contacts = clean_feet(joints, skeleton, rate)
-        joints = join_hands(joints, hands, skeleton)
+        joints, contacts = clean_feet(joints, skeleton, rate, rule=rule_for(joints, rate))
+        joints = clear_arms(join_hands(joints, hands, skeleton), skeleton, rate)
         if isinstance(layout, PosedLayout):
             rotations, root = aim_bones(joints, rotations, skeleton), joints[:, 0]
         else:

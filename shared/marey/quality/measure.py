@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.motion.capsules import CAPSULES, SIDES, segment_distance
 from marey.motion.feet import runs
 from marey.motion.resample import frame_times, interpolate
 from marey.motion.skeleton import HUMANML3D
@@ -33,13 +34,12 @@ SHORTEST = 4
 
 _J = {name: j for j, name in enumerate(HUMANML3D.joint_names)}
 _FEET = list(HUMANML3D.feet)
-_SIDES = ("L_", "R_")
-_LEGS = [[_J[f"{side}{part}"] for side in _SIDES] for part in ("hip", "knee", "ankle", "foot")]
+_LEGS = [[_J[f"{side}{part}"] for side in SIDES] for part in ("hip", "knee", "ankle", "foot")]
 
 # Farthest inner angles between bones, degrees: 0 = straight. Joint, joint before, joint after.
 _BENDS = (
-    *((f"{s}hip", f"{s}knee", f"{s}ankle", 155.0) for s in _SIDES),
-    *((f"{s}shoulder", f"{s}elbow", f"{s}wrist", 155.0) for s in _SIDES),
+    *((f"{s}hip", f"{s}knee", f"{s}ankle", 155.0) for s in SIDES),
+    *((f"{s}shoulder", f"{s}elbow", f"{s}wrist", 155.0) for s in SIDES),
     ("pelvis", "spine2", "spine3", 60.0),
     ("spine3", "neck", "head", 90.0),
 )
@@ -48,31 +48,24 @@ _BEND_LIMITS = np.array([limit for *_, limit in _BENDS])
 _KNEE_BACK = 10.0
 """Degrees that a knee may bend backwards."""
 
-# Capsules of the body: two joints and a radius in metres. Neighbours along the body always overlap and are left out.
-_CAPSULES = {
-    "trunk": ("pelvis", "spine3", 0.10),
-    "head": ("head", "head", 0.08),
-    **{f"{s}forearm": (f"{s}elbow", f"{s}wrist", 0.035) for s in _SIDES},
-    **{f"{s}thigh": (f"{s}hip", f"{s}knee", 0.06) for s in _SIDES},
-    **{f"{s}shin": (f"{s}knee", f"{s}ankle", 0.045) for s in _SIDES},
-}
+# Neighbours along the body always overlap and are left out.
 _PAIRS = (
     ("L_forearm", "R_forearm"),
     ("L_shin", "R_shin"),
     ("L_thigh", "R_shin"),
     ("L_shin", "R_thigh"),
-    *((f"{s}forearm", other) for s in _SIDES for other in ("trunk", "head", "L_thigh", "R_thigh", "L_shin", "R_shin")),
-    *((f"{s}shin", other) for s in _SIDES for other in ("trunk", "head")),
+    *((f"{s}forearm", other) for s in SIDES for other in ("trunk", "head", "L_thigh", "R_thigh", "L_shin", "R_shin")),
+    *((f"{s}shin", other) for s in SIDES for other in ("trunk", "head")),
 )
 
 
 def _ends(side: int) -> tuple[list[int], list[int]]:
-    capsules = [_CAPSULES[pair[side]] for pair in _PAIRS]
+    capsules = [CAPSULES[pair[side]] for pair in _PAIRS]
     return [_J[begin] for begin, _, _ in capsules], [_J[end] for _, end, _ in capsules]
 
 
 _FIRST, _SECOND = _ends(0), _ends(1)
-_REACH = np.array([_CAPSULES[a][2] + _CAPSULES[b][2] for a, b in _PAIRS])
+_REACH = np.array([CAPSULES[a][2] + CAPSULES[b][2] for a, b in _PAIRS])
 
 
 @dataclass(frozen=True)
@@ -187,18 +180,3 @@ def self_contact(joints: Array) -> float:
     """Return the deepest that two capsules of the body pass into each other, metres, 0 or more."""
     distance = segment_distance(*(joints[:, ends] for ends in (*_FIRST, *_SECOND)))
     return float(max(0.0, (_REACH - distance).max()))
-
-
-def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
-    """Return the distances between segments p1-q1 and p2-q2, each (..., 3); closed form (Ericson, Real-Time Collision
-    Detection, 5.1.9)."""
-    d1, d2, r = q1 - p1, q2 - p2, p1 - p2
-    a, e, f = ((x * y).sum(axis=-1) for x, y in ((d1, d1), (d2, d2), (d2, r)))
-    b, c = ((x * y).sum(axis=-1) for x, y in ((d1, d2), (d1, r)))
-    a, e = np.maximum(a, 1e-12), np.maximum(e, 1e-12)
-    denominator = a * e - b * b
-    s = np.where(denominator > 1e-12, np.clip((b * f - c * e) / np.maximum(denominator, 1e-12), 0, 1), 0.0)
-    t = (b * s + f) / e
-    s = np.where(t < 0, np.clip(-c / a, 0, 1), np.where(t > 1, np.clip((b - c) / a, 0, 1), s))
-    t = np.clip(t, 0, 1)
-    return np.linalg.norm(r + d1 * s[..., None] - d2 * t[..., None], axis=-1)

@@ -16,8 +16,8 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.scope import STANDING
 
-SURELY = 0.9
-"""Probability from which on there is no doubt about an action."""
+SURELY, SURELY_AGREED = 0.9, 0.4
+"""Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
@@ -86,7 +86,8 @@ class TrainedReaders:
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
             return ReadPrompt(bare.prompt, movements)
-        return ReadPrompt.of(bare.prompt, read.action, surely=read.probability >= SURELY)
+        surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
+        return ReadPrompt.of(bare.prompt, read.action, surely=surely)
 
     def _is_surely_one(self, bare: BarePrompt, read: ReadAction) -> bool:
         """Return True if a prompt is not looked at for several movements."""

@@ -25,6 +25,8 @@ UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
 ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
+ARMS_HELD = frozenset({"jump", "jump-forward", "hop", "squat", "crouch", "balance"})
+"""Actions beside which arms can be held, and nothing else of a bearing be drawn."""
 ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "carry", "sneak"})
 """Actions in which trunk and head are free."""
 Shown = Literal["body", "upper", "trunk", ""]
@@ -123,6 +125,8 @@ class StatedBearing:
         leans = bearing.trunk or bearing.head
         if action in ARMS_FREE:
             return "upper" if leans or bearing.arms or bearing.shrug else ""
+        if action in ARMS_HELD:
+            return "upper" if bearing.arms and not (leans or bearing.gesture or bearing.is_manner) else ""
         return "trunk" if action in ARMS_BUSY and self.whole and leans and not bearing.gesture else ""
 
 

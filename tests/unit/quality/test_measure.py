@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
+from marey.motion.capsules import segment_distance
 from marey.motion.resample import frame_times, interpolate
 from marey.quality.limits import Expected, assess, expected_by_prompts, expected_of
-from marey.quality.measure import measure, segment_distance
+from marey.quality.measure import measure
 from marey.quality.record import Flag, MotionQuality, read_quality
 from tests.support.bodies import FPS, Body, bower, raiser, runner, walker, waver
 

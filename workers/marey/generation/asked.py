@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
+from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
@@ -59,7 +60,8 @@ class AskedMotion:
             positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
             the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`);
             `grounded`, true where the body was let down to the floor; `flights`, by how many seconds its flights are
-            shorter than the network made them; `left_out`, how many seconds of its end came after the action.
+            shorter than the network made them; `left_out`, how many seconds of its end came after the action;
+            `footed`, true where a run was held back by the slide of its feet.
     """
 
     features: Float32 = field(repr=False)
@@ -227,6 +229,8 @@ def _on_floor(
     the feet, which stays."""
     if wish.count is not None:
         return features
+    if wish.action in RUNS and (held := footed(features, layout)) is not None:
+        features, changes["footed"] = held, True
     if wish.action in ON_FEET and (grounded := on_floor(features, layout)) is not None:
         features, changes["grounded"] = grounded, True
     if wish.action in JUMPS and fixed is None:

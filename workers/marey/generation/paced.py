@@ -48,6 +48,7 @@ WAY_SPEEDS: Mapping[str, WaySpeeds] = {
     "walk": WaySpeeds(0.8, 1.5, 0.0, (0.65, 1.45)),
     "walk-backward": WaySpeeds(0.6, 1.2, 0.0, (0.6, 1.45)),
     "run": WaySpeeds(2.4, 3.8, 2.2, (0.75, 1.35)),
+    "sprint": WaySpeeds(4.2, 5.0, 4.4, (0.8, 1.35)),
 }
 MOVING = 0.3
 """Speed of a body that goes somewhere, m/s."""

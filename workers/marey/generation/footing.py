@@ -1,0 +1,61 @@
+"""Runs that go as far as their feet carry them.
+
+The runs that a network learned from travel faster than their legs: the foot that is on the floor slides ahead at half a
+metre a second. The body is held back by the speed of that foot, in the way of `courses`: over the floor, all joints
+alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import TOES
+from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.feet import runs
+from marey.motion.filters import smooth
+
+Float32 = NDArray[np.float32]
+
+RUNS = frozenset({"run", "sprint"})
+"""Actions whose feet are looked at."""
+LOW_M = 0.05
+"""Metres over the floor up to which a toe carries the body."""
+PASSES_S = 0.15
+"""Standard deviation of the filter in which the correction of a step passes into that of the next, seconds."""
+STANDS = 0.3
+"""Quantile of the slides of a step that is that of the standing foot: it rolls off at its end."""
+LEAST, MOST = 0.1, 0.4
+"""Metres a second of the slide that is corrected, and share of the body's speed that it is held back by at most."""
+
+
+def footed(features: Float32, layout: FeatureLayout) -> Float32 | None:
+    """Return features (T, D) of a run that is held back by the slide of its feet; None if they hardly slide.
+
+    Args:
+        features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
+        layout: of the features.
+    """
+    joints, fps = layout.decode(features).astype(np.float64), layout.fps
+    frames = len(joints)
+    toes = joints[:, list(TOES)]
+    lowest = toes[..., 1].argmin(axis=1)
+    moves = np.gradient(toes[..., [0, 2]], axis=0) * fps
+    foot = moves[np.arange(frames), lowest]
+    body = np.stack([smooth(each[:, None], 0.5 * fps)[:, 0] for each in np.gradient(joints[:, 0, [0, 2]], axis=0).T]).T
+    body *= fps
+    speed = np.linalg.norm(body, axis=1)
+    ahead = body / np.maximum(speed, 1e-6)[:, None]
+    slides = (foot * ahead).sum(axis=1)
+    stands = runs(toes[..., 1].min(axis=1) < LOW_M)
+    if not stands:
+        return None
+    middles = [(begin + end - 1) / 2 for begin, end in stands]
+    slide = np.interp(
+        np.arange(frames), middles, [float(np.quantile(slides[begin:end], STANDS)) for begin, end in stands]
+    )
+    back = np.clip(smooth(slide[:, None], PASSES_S * fps)[:, 0], 0.0, MOST * speed)
+    if back.mean() < LEAST:
+        return None
+    joints[..., [0, 2]] -= np.cumsum(ahead * back[:, None] / fps, axis=0)[:, None]
+    return encode_all(layout, joints)
