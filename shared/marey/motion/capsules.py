@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from marey.motion.rotations import Array
 
 SIDES = ("L_", "R_")
 CAPSULES: Mapping[str, tuple[str, str, float]] = {

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import TOES
+from marey.motion.courses import gradient
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.feet import runs
 from marey.motion.filters import smooth
@@ -19,6 +20,8 @@ Float32 = NDArray[np.float32]
 
 RUNS = frozenset({"run", "sprint"})
 """Actions whose feet are looked at."""
+WAY_S = 0.5
+"""Standard deviation of the filter that leaves the way of the body, seconds."""
 LOW_M = 0.05
 """Metres over the floor up to which a toe carries the body."""
 PASSES_S = 0.15
@@ -40,10 +43,8 @@ def footed(features: Float32, layout: FeatureLayout) -> Float32 | None:
     frames = len(joints)
     toes = joints[:, list(TOES)]
     lowest = toes[..., 1].argmin(axis=1)
-    moves = np.gradient(toes[..., [0, 2]], axis=0) * fps
-    foot = moves[np.arange(frames), lowest]
-    body = np.stack([smooth(each[:, None], 0.5 * fps)[:, 0] for each in np.gradient(joints[:, 0, [0, 2]], axis=0).T]).T
-    body *= fps
+    foot = gradient(toes[..., [0, 2]])[np.arange(frames), lowest] * fps
+    body = smooth(gradient(joints[:, 0, [0, 2]]), WAY_S * fps) * fps
     speed = np.linalg.norm(body, axis=1)
     ahead = body / np.maximum(speed, 1e-6)[:, None]
     slides = (foot * ahead).sum(axis=1)

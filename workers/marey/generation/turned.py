@@ -90,9 +90,9 @@ def ended_turn(features: Float32, layout: FeatureLayout, turn: Turn) -> Float32 
 def _brought_to_rest(joints: Array, fps: float) -> Array:
     """Return joints (T', J, 3) whose last movement slows down, and that stand still afterwards."""
     slows, slowed, still = (round(seconds * fps) for seconds in (SLOWS_S, 2 * SLOWS_S, STILL_S))
-    passed = np.arange(1, slowed + 1) / slowed
-    last = len(joints) - 1
-    times = np.concatenate([np.arange(last - slows + 1), last - slows * (1 - passed) ** 2, np.full(still, float(last))])
+    passed = np.arange(1.0, slowed + 1) / slowed
+    last = float(len(joints) - 1)
+    times = np.concatenate([np.arange(last - slows + 1), last - slows * (1 - passed) ** 2, np.full(still, last)])
     return interpolate(joints, times)
 
 
