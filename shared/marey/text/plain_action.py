@@ -12,13 +12,14 @@ from functools import lru_cache
 
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
+from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
-VERSION = 5
+VERSION = 6
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
@@ -102,7 +103,7 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
     plain = load_vocabulary().need(action).plain_words
-    if not bare or (surely and action in ALONE):
+    if not bare or action in DRAWN_AS or (surely and action in ALONE):
         return plain
     prompt = with_subject(bare)
     if action in PLAINER:

@@ -25,13 +25,14 @@ from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.bearing_words import BarePrompt
+from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 4
+VERSION = 5
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
 """Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
@@ -76,6 +77,8 @@ _JOINING = re.compile(
 
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
+DRAWN_S = 1.8
+"""Seconds of an action that is drawn as a gesture, beside other actions."""
 REST_S = 2.0
 """Seconds of standing that a stop is read as."""
 _MANNER = re.compile(
@@ -373,14 +376,15 @@ def _risen_from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovemen
             action = "get-up"
         elif action == "get-up" and before in SEAT:
             action = "stand-up"
-        yield ReadMovement(movement.text, action)
+        yield replace(movement, action=action)
         before = action
 
 
 def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     text = without_joints(" ".join(clause.text for clause in group))
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
-    return ReadMovement(text, group[0].name if single else None)
+    action = group[0].name if single else None
+    return ReadMovement(text, action, DRAWN_S if action in DRAWN_AS else None)
 
 
 def _word_starts(prompt: str, offsets: Sequence[tuple[int, int]]) -> Iterator[int]:

@@ -21,7 +21,9 @@ Vector = tuple[float, float, float]
 
 _FILE = Path(__file__).with_name("bearings.toml")
 
-UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep"})
+DRAWN_AS: Mapping[str, str] = {"flinch": "flinch"}
+"""Actions that are drawn as a gesture on a body that stands, since no network shows them, and that gesture."""
+UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep", *DRAWN_AS})
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
 ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
 """Other actions in which the arms do nothing."""
@@ -66,6 +68,7 @@ class Bearing:
     Attributes:
         id: its name.
         gesture: done once, by itself or beside another action.
+        fall_s: seconds in which a gesture ends; 0 = a little longer than it takes to begin.
         arms: by `left` and `right`, those that it moves.
     """
 
@@ -84,6 +87,7 @@ class Bearing:
     gait: Gait = ""
     pace: Pace = ""
     raise_s: float = 0.5
+    fall_s: float = 0.0
     hold_s: tuple[float, float] = (1.0, 2.0)
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
 

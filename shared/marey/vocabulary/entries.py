@@ -101,8 +101,9 @@ class Vocabulary:
         return set(names).difference(*(self.actions[name].implies for name in names))
 
     def said_first(self, text: str) -> str | None:
-        """Return the id of the action whose plain words are put before a text, as `marey.text.plain_action` does."""
-        text = text.lower()
+        """Return the id of the action whose plain words a text is, or begins with, as `marey.text.plain_action` makes
+        it."""
+        text = f"{text.lower()}, "
         said = ((name, text.removeprefix(words)) for words, name in self._first_words.items() if text.startswith(words))
         return next((name for name, rest in said if not rest.startswith(("and ", "then "))), None)
 

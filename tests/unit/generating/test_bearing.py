@@ -19,7 +19,7 @@ from marey.motion.courses import course_of
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import find_contacts
 from marey.motion.skeleton import HUMANML3D
-from marey.vocabulary.bearings import StatedBearing, load_bearings
+from marey.vocabulary.bearings import DRAWN_AS, StatedBearing, load_bearings
 from tests.support.bodies import Body, walker
 from tests.unit.generating.test_timelines import load, text_of
 
@@ -128,7 +128,7 @@ def test_every_bearing_moves_a_walk_smoothly_and_keeps_its_bones(name: str) -> N
     lengths = np.linalg.norm(after - after[:, [max(p, 0) for p in HUMANML3D.parents]], axis=-1)
     assert np.ptp(lengths, axis=0).max() < 0.01
     speed = np.linalg.norm(np.diff(after - after[:, [PELVIS]], axis=0), axis=-1) * FPS
-    assert speed[:, WRISTS].max() < 4.5
+    assert speed[:, WRISTS].max() < (7 if name in DRAWN_AS.values() else 4.5)  # a blow is sudden
 
 
 def test_a_limp_hurries_over_the_leg_that_hurts() -> None:

@@ -73,6 +73,8 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
     return motion.changes if isinstance(motion, AskedMotion) else {}
 
 
+ALIKE = frozenset({"idle", "nod", "flinch"})
+"""Actions that networks make nearly alike from every seed: every other motion is the mirror image."""
 ON_THE_SPOT = "turn-around"
 """Action that is a turn and nothing else."""
 
@@ -175,7 +177,8 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     """Return the motion, changed where the wish is not fulfilled and can be."""
     features: Float32 = motion.features
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
-    if (wish.limb or wish.side) and _is_better_mirrored(features, layout, wish):
+    one_side = bool(wish.limb or wish.side)
+    if _is_better_mirrored(features, layout, wish) if one_side else wish.action in ALIKE and request.seed % 2:
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if layout.skeleton.name == HUMANML3D.name:

@@ -10,7 +10,7 @@ place by two-bone inverse kinematics, as in the made clips of the training data.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.bearings import ArmPose, Bearing, StatedBearing, load_bearings
+from marey.vocabulary.bearings import DRAWN_AS, ArmPose, Bearing, StatedBearing, load_bearings
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -36,8 +36,8 @@ PASSES_S = 0.25
 """Standard deviation of the filter by which a body passes into a bearing in the middle of a motion, seconds."""
 SWING_S = 0.5
 """The same of the filter that leaves an arm's way and takes out its swing."""
-BEGINS_S, FALL = 0.4, 1.15
-"""Seconds before a gesture, at least, and how many times as long as it rises it takes to come down."""
+BEGINS_S, LATEST_S, FALL = 0.4, 1.1, 1.15
+"""Seconds before a gesture, at least and at most, and how many times as long as it rises it takes to come down."""
 UPPER_STEPS = 0.02
 """Metres a frame by which the feet pass each other in a walk that rolls in full."""
 MOVES_FIRST, LATE = frozenset({"sit-down", "stand-up", "sit-floor", "kneel"}), 0.5
@@ -99,20 +99,30 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         return []
     if request.timeline is None:
         action = action_of(request.text)
-        stated = _fitting(stated_bearings(request.text.prompt), action)
+        stated = _fitting([*stated_bearings(request.text.prompt), *_drawn_as(action)], action)
         return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
     whole = [each for each in stated_bearings(request.text.prompt) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
         action, own = action_of(row.text), stated_bearings(row.text.prompt)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
-        stated = _fitting([*whole, *kept, *own], action)
+        stated = _fitting([*whole, *kept, *own, *_drawn_as(action)], action)
         if request.is_sequence:
             carried = [each for each in (*kept, *own) if each in stated and not each.bearing.gesture]
         if stated:
             end = min(round(row.end * fps), frames)
             found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k))
     return found
+
+
+def _drawn_as(action: str) -> list[StatedBearing]:
+    """Return the gesture that an action is drawn as, in a list; an empty one if a network shows it."""
+    return [StatedBearing(DRAWN_AS[action])] if action in DRAWN_AS else []
+
+
+def actions_alone(spans: Sequence[BorneSpan]) -> list[BorneSpan]:
+    """Return the parts of a motion whose action itself is drawn, with nothing but that."""
+    return [replace(span, stated=tuple(_drawn_as(span.action))) for span in spans if span.action in DRAWN_AS]
 
 
 def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
@@ -183,11 +193,13 @@ def _once(span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: 
     first = span.begin + (LATE * (span.end - span.begin) if span.action in MOVES_FIRST else 0.0)
     begin, end = (first + (span.end - first) * share / count for share in (at, at + 1))
     seconds, rise, hold = (end - begin) / fps, bearing.raise_s, rng.uniform(*bearing.hold_s)
-    fast = min(1.0, seconds / (rise * (1 + FALL) + 0.6 * hold))
-    rise = rise * fast
-    hold = min(hold, max(seconds - rise * (1 + FALL) - 2 * BEGINS_S, 0.5 * hold * fast))
-    start = max(min(BEGINS_S, (seconds - rise * (1 + FALL) - hold) / 2), 0.0)
-    return envelope(frames, begin / fps + start, rise, hold, FALL * rise)
+    fall = bearing.fall_s or FALL * rise
+    fast = min(1.0, seconds / (rise + fall + 0.6 * hold))
+    rise, fall = rise * fast, fall * fast
+    hold = min(hold, max(seconds - rise - fall - 2 * BEGINS_S, 0.5 * hold * fast))
+    left = (seconds - rise - fall - hold) / 2
+    start = max(min(rng.uniform(BEGINS_S, LATEST_S), left), 0.0)
+    return envelope(frames, begin / fps + start, rise, hold, fall)
 
 
 class _Drawing:

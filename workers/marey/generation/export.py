@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from marey.generation.asked import changes_of
-from marey.generation.bearing import borne, borne_spans, with_bearing
+from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
@@ -84,7 +84,9 @@ def finish(
     manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)
     finished = partial(finish_motion, layout=layout, body=body, fps=fps, clean=clean, manifest=manifest)
     clip = with_gaze(finished(borne(generated, layout, spans)))
-    return judged(clip, request, as_made=finished(features) if spans else clip)
+    acts = actions_alone(spans)
+    as_made = clip if acts == spans else finished(borne(generated, layout, acts))
+    return judged(clip, request, as_made=as_made)
 
 
 def judged(clip: MotionClip, request: Request, *, as_made: MotionClip | None = None) -> MotionClip:
