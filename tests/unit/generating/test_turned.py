@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marey.generation.turned import turned_features
+from marey.generation.turned import STILL_S, ended_turn, turned_features
 from marey.motion.courses import natural_course
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import find_contacts, skate
 from marey.motion.skeleton import HUMANML3D
 from marey.vocabulary.turns import Turn
-from tests.support.bodies import walker
+from tests.support.bodies import Body, steady, walker
 
 LAYOUT = HUMANML3D_263
 
@@ -72,3 +72,25 @@ def test_what_turns_so_far_by_itself_stays(made: float, turn: Turn) -> None:
 
 def test_there_is_no_time_for_a_large_turn() -> None:
     assert turned_features(LAYOUT.encode(walker(1.0)), LAYOUT, Turn(360, 360), "") is None
+
+
+def turner(degrees: float, seconds: float) -> np.ndarray[Any, Any]:
+    """Return features of a body that turns on the spot at an even pace, step by step."""
+    return LAYOUT.encode(Body(seconds, speed=steady(0.05), turn=degrees).joints())
+
+
+def test_a_turn_on_the_spot_ends_when_it_is_large_enough_and_rests() -> None:
+    features = turner(200.0, 9.5)
+    ends = ended_turn(features, LAYOUT, Turn(90, 90))
+    assert ends is not None
+    assert len(ends) < 0.75 * len(features)
+    assert degrees(ends) == pytest.approx(90, abs=30)
+    joints = LAYOUT.decode(ends)
+    assert np.abs(np.diff(joints[-round(STILL_S * 20) :], axis=0)).max() < 1e-3
+    speed = np.linalg.norm(np.diff(joints[:, :6], axis=0), axis=-1).max(axis=1) * 20
+    assert np.abs(np.diff(speed))[-30:].max() < 1.0
+
+
+@pytest.mark.parametrize("turn", [Turn(360, 360), Turn(whole=True), Turn(0, 15), Turn(90, 90, even=True)])
+def test_other_turns_do_not_end_sooner(turn: Turn) -> None:
+    assert ended_turn(turner(300.0, 6.0), LAYOUT, turn) is None

@@ -21,6 +21,7 @@ from marey.text.action_reader import (
     ActionReader,
     ReadAction,
     action_reader,
+    named_actions,
 )
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder, shared_pipeline
@@ -77,6 +78,14 @@ def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
     (read_as,) = read(["hey could I get a guy just ambling along the pavement, nothing fancy"])
     assert read_as.action == "walk"
     assert AGREED <= read_as.probability < SURE
+
+
+def test_an_action_that_the_words_are_only_close_to_is_not_believed_sooner() -> None:
+    (sweeps,) = read(["a janitor sweeps the floor"])
+    assert named_actions("a janitor sweeps the floor") == {"slash"}
+    assert named_actions("a janitor sweeps the floor", surely=True) == set()
+    assert AGREED < sweeps.probability < SURE
+    assert sweeps.action is None
 
 
 def test_who_stands_by_the_words_does_where_the_network_knows_nothing() -> None:

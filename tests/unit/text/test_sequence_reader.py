@@ -18,6 +18,7 @@ from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
     CONTEXT,
+    DRAWN_S,
     MOST_CUTS,
     REST_S,
     ReadClause,
@@ -108,6 +109,13 @@ def test_prompts_beside_each_other_are_encoded_in_few_passes_and_as_if_alone(
     assert [each.to_blob() for each in together] == [alone.features([text])[0].to_blob() for text in prompts]
 
 
+def test_a_blow_in_a_sequence_is_short(reading: TextPipeline) -> None:
+    (prompt,) = reading.explain(["gets hit in the stomach and falls to the ground"])
+    (text,) = reading.features(["gets hit in the stomach and falls to the ground"])
+    assert [each.seconds for each in text.movements] == [DRAWN_S, None]
+    assert prompt.movements[0] == load_vocabulary().need("flinch").plain_words
+
+
 def clauses(*written: str) -> list[ReadClause]:
     named = [each.partition(":") for each in written]
     return [ReadClause(name, 0.9, text.strip(), at_once=text.startswith("&")) for name, _, text in named]
@@ -194,6 +202,8 @@ def test_a_way_of_a_number_of_steps_comes_to_rest(reading: TextPipeline) -> None
         ("a man walks forward, stops and looks around", ["a man walks forward", "stops and looks around"]),
         ("The hero walks up to a door and knocks on it", ["The hero walks to a door", "knocks on it"]),
         ("get up from lying on the ground", []),
+        ("stand up from a chair and walk away", ["stand up from a chair", "walk away"]),
+        ("a soldier sneaks forward in a crouch", []),
     ],
 )
 def test_movements_around_a_stop_a_place_and_an_origin(

@@ -45,6 +45,7 @@ from tests.support.marey import REPOSITORY
         ("cheer with arms in the air", "cheer", ["hands-up"]),
         ("he shrugs while walking", "walking", ["shrug"]),
         ("a person walks while talking on the phone", "a person walks", ["phone-call"]),
+        ("a drunk staggers home", "a person walks home", ["drunk"]),
         ("he is drunk and walks home", "walks home", ["drunk"]),
     ],
 )
