@@ -35,7 +35,7 @@ def slide_of(joints: np.ndarray) -> float:
 def test_a_run_goes_as_far_as_its_feet_carry_it() -> None:
     joints = sliding(2.5, 0.8)
     before = LAYOUT.decode(LAYOUT.encode(joints)).astype(np.float64)
-    held = footed(LAYOUT.encode(joints), LAYOUT)
+    held = footed(LAYOUT.encode(joints), LAYOUT, 2.1)
     assert held is not None
     after = LAYOUT.decode(held).astype(np.float64)
     assert slide_of(before) > 0.5
@@ -45,4 +45,12 @@ def test_a_run_goes_as_far_as_its_feet_carry_it() -> None:
 
 
 def test_a_run_whose_feet_stand_stays() -> None:
-    assert footed(LAYOUT.encode(sliding(2.5, 0.0)), LAYOUT) is None
+    assert footed(LAYOUT.encode(sliding(2.5, 0.0)), LAYOUT, 2.1) is None
+
+
+def test_it_remains_a_run() -> None:
+    features = LAYOUT.encode(sliding(2.0, 0.8))
+    held = footed(features, LAYOUT, 2.5)
+    assert held is not None
+    assert speed_of(LAYOUT.decode(held).astype(np.float64)) == pytest.approx(2.5, abs=0.15)
+    assert footed(features, LAYOUT, 3.0) is None

@@ -232,7 +232,7 @@ def _on_floor(
     the feet, which stays."""
     if wish.count is not None:
         return features
-    if wish.action in RUNS and (held := footed(features, layout)) is not None:
+    if wish.action in RUNS and (held := footed(features, layout, RUNS[wish.action])) is not None:
         features, changes["footed"] = held, True
     if wish.action in ON_FEET and (grounded := on_floor(features, layout)) is not None:
         features, changes["grounded"] = grounded, True

@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.flights import ON_FEET, UP_M, lowest_foot
+from marey.generation.flights import JUMPS, UP_M, lowest_foot
 from marey.motion.features import FeatureLayout
 
 Float32 = NDArray[np.float32]
 
+LANDING = JUMPS | {"jumping-jacks"}
+"""Actions that end on the floor."""
 STAYING = frozenset({"kneel", "crouch", "sit", "sit-down", "sit-floor", "lie", "lie-down", "die"})
 """Actions that end in a posture which is held."""
 LAST_S, RISE_M, STILL_M = 1.2, 0.05, 0.02
@@ -32,7 +34,7 @@ def ended(features: Float32, layout: FeatureLayout, action: str) -> Float32 | No
         action: its id in the vocabulary.
     """
     joints = layout.decode(features).astype(np.float64)
-    if action in ON_FEET:
+    if action in LANDING:
         height, bound = lowest_foot(joints), UP_M
     elif action in STAYING:
         height = joints[:, 0, 1] - joints[-round(LAST_S * layout.fps) :, 0, 1].min()

@@ -7,6 +7,8 @@ alike.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,8 +20,8 @@ from marey.motion.filters import smooth
 
 Float32 = NDArray[np.float32]
 
-RUNS = frozenset({"run", "sprint"})
-"""Actions whose feet are looked at."""
+RUNS: Mapping[str, float] = {"run": 2.1, "sprint": 4.2}
+"""Actions whose feet are looked at, and metres a second that the body keeps: slower, it would not run."""
 WAY_S = 0.5
 """Standard deviation of the filter that leaves the way of the body, seconds."""
 LOW_M = 0.05
@@ -32,12 +34,13 @@ LEAST, MOST = 0.1, 0.4
 """Metres a second of the slide that is corrected, and share of the body's speed that it is held back by at most."""
 
 
-def footed(features: Float32, layout: FeatureLayout) -> Float32 | None:
+def footed(features: Float32, layout: FeatureLayout, slowest: float) -> Float32 | None:
     """Return features (T, D) of a run that is held back by the slide of its feet; None if they hardly slide.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
         layout: of the features.
+        slowest: metres a second that the body keeps.
     """
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
     frames = len(joints)
@@ -56,6 +59,7 @@ def footed(features: Float32, layout: FeatureLayout) -> Float32 | None:
         np.arange(frames), middles, [float(np.quantile(slides[begin:end], STANDS)) for begin, end in stands]
     )
     back = np.clip(smooth(slide[:, None], PASSES_S * fps)[:, 0], 0.0, MOST * speed)
+    back *= np.clip((np.median(speed) - slowest) / max(float(back.mean()), 1e-6), 0.0, 1.0)
     if back.mean() < LEAST:
         return None
     joints[..., [0, 2]] -= np.cumsum(ahead * back[:, None] / fps, axis=0)[:, None]
