@@ -199,7 +199,7 @@ def _weights_of(cuts: _Cuts) -> dict[str, Float32]:
 def train(texts: Sequence[PartedText], encoder: MiniLMEncoder, seed: int) -> Trained:
     """Return the classes and the weights of a reader."""
     classes = [*load_vocabulary().actions, OUTSIDE, CONTEXT]
-    encodings = [encoder.encode(text.text) for text in texts]
+    encodings = encoder.encodings([text.text for text in texts])
     pairs = zip(texts, encodings, strict=True)
     cuts = fit_cuts([labelled(text, encoding, classes) for text, encoding in pairs], len(classes), seed)
     inputs, wanted, weights = clauses_of(texts, encodings, encoder, classes)
