@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.motion.feet import FLOOR_BAND, _fill, clean_feet, find_contacts, floor_height, runs, skate
+from marey.motion.feet import FLOOR_BAND, RULE, _fill, clean_feet, find_contacts, floor_height, rule_for, runs, skate
 from marey.motion.filters import smooth_above
 from marey.motion.kinematics import bone_lengths
 from marey.motion.legs import two_bone_knee
 from marey.motion.pose import solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton
+from tests.support.bodies import runner
 from tests.support.motions import drift
 from tests.support.stepping import sliding, stepping
 from tests.support.walker import walker
@@ -222,3 +223,17 @@ def test_a_gap_beside_a_single_known_frame_stays_near_its_value() -> None:
     filled = _fill(values, known, 20.0)
     assert filled.min() > -0.01
     assert filled.max() < 0.11
+
+
+def test_a_running_body_stands_in_wider_bounds() -> None:
+    joints = np.asarray(runner(4.0), np.float64)
+    joints[..., 2] += 0.4 * (np.arange(len(joints)) / 20)[:, None]  # feet that slide a little, as decoded ones
+    rule = rule_for(joints, 20.0)
+    assert rule.enter_speed > 1.5 * RULE.enter_speed
+    assert rule.leave_speed == pytest.approx(2 * rule.enter_speed)
+    stands = [find_contacts(joints, HUMANML3D, 20.0, rule=each)[:, 1::2].mean() for each in (RULE, rule)]
+    assert stands[0] < 0.05 < stands[1]
+    clean, contacts = clean_feet(joints, HUMANML3D, 20.0, rule=rule)
+    assert skate(clean, contacts, HUMANML3D, 20.0) < 1e-6
+    assert rule_for(np.asarray(walker(seconds=3).joints, np.float64), 20.0) is RULE
+    assert rule_for(joints[:1], 20.0) is RULE

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.motion.capsules import CAPSULES, segment_distance
 from marey.motion.hands import APART, MEET, clear_arms, join_hands, wrist_distance
 from marey.motion.kinematics import bone_lengths, forward_kinematics
 from marey.motion.skeleton import HUMANML3D
+from tests.support.arms import arm_depth, with_hand_in_the_trunk
 from tests.support.motions import dancer
 from tests.support.walker import walker
 
@@ -47,37 +47,11 @@ def test_hands_that_are_apart_are_left_alone_to_the_last_bit():
     np.testing.assert_array_equal(join_hands(joints, np.full(30, APART), HUMANML3D), joints)
 
 
-def depth(joints, arm, other):
-    """Return metres (T,) by which a forearm is inside another capsule of the body."""
-    ends = [HUMANML3D.index(joint) for name in (arm, other) for joint in CAPSULES[name][:2]]
-    return CAPSULES[arm][2] + CAPSULES[other][2] - segment_distance(*(joints[:, joint] for joint in ends))
-
-
-def with_hand_in_the_trunk():
-    """Return joints of a walk whose right hand passes through the belly for half a second."""
-    joints = np.array(walker(seconds=3).joints, np.float64)
-    belly = joints[:, [0, 3]].mean(axis=1)
-    inside = np.exp(-(((np.arange(len(joints)) / 20 - 1.5) / 0.25) ** 2))[:, None]
-    moved = joints.copy()
-    moved[:, 21] += inside * (belly - joints[:, 21])
-    forearm, upper = (np.linalg.norm(joints[0, a] - joints[0, b]) for a, b in ((19, 21), (17, 19)))
-    for frame in moved:
-        whole = frame[21] - frame[17]
-        reach = min(np.linalg.norm(whole), 0.999 * (upper + forearm))
-        way = whole / np.linalg.norm(whole)
-        frame[21] = frame[17] + reach * way
-        along = (reach**2 + upper**2 - forearm**2) / (2 * reach)
-        aside = np.cross(way, [0, 0, 1.0])
-        side = aside / np.linalg.norm(aside) * np.sqrt(max(upper**2 - along**2, 0))
-        frame[19] = frame[17] + along * way + side
-    return moved
-
-
 def test_an_arm_inside_the_trunk_comes_out_smoothly_and_bones_stay():
     joints = with_hand_in_the_trunk()
     cleared = clear_arms(joints, HUMANML3D, 20.0)
-    assert depth(joints, "R_forearm", "trunk").max() > 0.03
-    assert depth(cleared, "R_forearm", "trunk").max() < 0.01
+    assert arm_depth(joints, "R_forearm", "trunk").max() > 0.03
+    assert arm_depth(cleared, "R_forearm", "trunk").max() < 0.01
     assert np.abs(bone_lengths(cleared, HUMANML3D) - bone_lengths(joints, HUMANML3D)).max() < 1e-9
     others = [j for j in range(22) if j not in (19, 21)]
     np.testing.assert_array_equal(cleared[:, others], joints[:, others])
