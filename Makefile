@@ -74,7 +74,7 @@ soak: $(STAMP) ## Steady load for SOAK_MINUTES (15), and whether memory, descrip
 lint: $(STAMP) ## ruff, basedpyright, import-linter, words
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/basedpyright
+	NODE_OPTIONS=--max-semi-space-size=128 $(BIN)/basedpyright  # a tenth faster: it collects garbage less often
 	PYTHONPATH=shared:workers:services:migrations $(BIN)/lint-imports
 	$(BIN)/python -m tests.lint.words
 
