@@ -17,8 +17,7 @@ import numpy as np
 from marey.core.settings import settings
 from marey.data.prepared import PreparedData
 from marey.generate import load
-from marey.motion.capsules import CAPSULES, SIDES, Array, segment_distance
-from marey.motion.skeleton import HUMANML3D
+from marey.motion.capsules import SIDES, Array, depth
 from marey.quality.measure import skate
 
 SEEDS = (0, 1)
@@ -76,9 +75,7 @@ def _inside(joints: Array) -> Array:
     found = np.zeros(len(joints), bool)
     for arm in (f"{side}forearm" for side in SIDES):
         for other in ("trunk", "head", *(f"{side}thigh" for side in SIDES)):
-            ends = [HUMANML3D.index(joint) for name in (arm, other) for joint in CAPSULES[name][:2]]
-            gap = segment_distance(*(joints[:, joint] for joint in ends))
-            found |= CAPSULES[arm][2] + CAPSULES[other][2] - gap > DEEP
+            found |= depth(joints, arm, other) > DEEP
     return found
 
 

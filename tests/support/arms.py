@@ -1,18 +1,10 @@
-"""Bodies whose arms pass through them, and how deep."""
+"""A body whose arm passes through it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from marey.motion.capsules import CAPSULES, segment_distance
-from marey.motion.skeleton import HUMANML3D
 from tests.support.walker import walker
-
-
-def arm_depth(joints, arm, other):
-    """Return metres (T,) by which a forearm is inside another capsule of the body."""
-    ends = [HUMANML3D.index(joint) for name in (arm, other) for joint in CAPSULES[name][:2]]
-    return CAPSULES[arm][2] + CAPSULES[other][2] - segment_distance(*(joints[:, joint] for joint in ends))
 
 
 def with_hand_in_the_trunk():

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from marey.motion.rotations import Array
+from marey.motion.skeleton import HUMANML3D
 
 SIDES = ("L_", "R_")
 CAPSULES: Mapping[str, tuple[str, str, float]] = {
@@ -17,6 +18,23 @@ CAPSULES: Mapping[str, tuple[str, str, float]] = {
     **{f"{s}shin": (f"{s}knee", f"{s}ankle", 0.045) for s in SIDES},
 }
 """Two joints and a radius in metres, by name."""
+
+
+def ends_of(capsule: str) -> tuple[int, int]:
+    """Return the indices of a capsule's two joints."""
+    first, last, _ = CAPSULES[capsule]
+    return HUMANML3D.index(first), HUMANML3D.index(last)
+
+
+def depth(joints: Array, one: str, other: str) -> Array:
+    """Return how deep (...,) one capsule is inside another, metres, negative where they are apart.
+
+    Args:
+        joints: (..., 22, 3) metres.
+        one, other: names of capsules.
+    """
+    gap = segment_distance(*(joints[..., joint, :] for joint in (*ends_of(one), *ends_of(other))))
+    return CAPSULES[one][2] + CAPSULES[other][2] - gap
 
 
 def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from marey.motion.body import STATURE, stature
-from marey.motion.capsules import CAPSULES, SIDES, nearest_on_segments
+from marey.motion.capsules import CAPSULES, SIDES, ends_of, nearest_on_segments
 from marey.motion.filters import smooth
 from marey.motion.kinematics import facing
 from marey.motion.legs import two_bone_knee
@@ -104,10 +104,10 @@ def clear_arms(joints: Array, skeleton: Skeleton, fps: float) -> Array:
 def _pushed_out(joints: Array, forearm: str, size: float) -> Array:
     """Return how far (T, 3) a wrist has to move so that its forearm leaves what it is in; zero where it is in
     nothing."""
-    (begin, end), radius = _ends(forearm), CAPSULES[forearm][2]
+    (begin, end), radius = ends_of(forearm), CAPSULES[forearm][2]
     push = np.zeros((len(joints), 3))
     for name in ("trunk", "head", *(f"{side}thigh" for side in SIDES)):
-        other = _ends(name)
+        other = ends_of(name)
         ours, theirs = nearest_on_segments(*(joints[:, joint] for joint in (begin, end, *other)))
         near = joints[:, begin] + ours[:, None] * (joints[:, end] - joints[:, begin])
         away = near - (joints[:, other[0]] + theirs[:, None] * (joints[:, other[1]] - joints[:, other[0]]))
@@ -115,8 +115,3 @@ def _pushed_out(joints: Array, forearm: str, size: float) -> Array:
         share = np.maximum(depth, 0.0) / np.maximum(ours, NEAREST)
         push += np.minimum(share, FARTHEST)[:, None] * normalize(away)
     return push
-
-
-def _ends(capsule: str) -> tuple[int, int]:
-    first, last, _ = CAPSULES[capsule]
-    return HUMANML3D.index(first), HUMANML3D.index(last)

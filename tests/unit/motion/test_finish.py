@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
 from marey.exporters.convert import convert
 from marey.motion.body import NamedBody
+from marey.motion.capsules import depth
 from marey.motion.clip import MotionClip, load_npz
 from marey.motion.features import HUMANML3D_263, KIT_251
 from marey.motion.feet import skate
@@ -20,7 +21,7 @@ from marey.motion.kinematics import bone_lengths, facing, forward_kinematics
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
 from marey.motion.rotations import about, angle_between, multiply
 from marey.motion.skeleton import HUMANML3D
-from tests.support.arms import arm_depth, with_hand_in_the_trunk
+from tests.support.arms import with_hand_in_the_trunk
 from tests.support.bodies import runner
 from tests.support.exported import tumbling
 from tests.support.motions import dancer, drift
@@ -256,8 +257,8 @@ def test_a_finished_body_is_solid_and_its_running_feet_stand() -> None:
     raw, clean = (
         finish_motion(through, HUMANML3D_263, clean=clean).joints.astype(np.float64) for clean in (False, True)
     )
-    assert arm_depth(raw, "R_forearm", "trunk").max() > 0.03
-    assert arm_depth(clean, "R_forearm", "trunk").max() < 0.015
+    assert depth(raw, "R_forearm", "trunk").max() > 0.03
+    assert depth(clean, "R_forearm", "trunk").max() < 0.015
     run = np.asarray(runner(4.0), np.float64)
     run[..., 2] += 0.4 * (np.arange(len(run)) / 20)[:, None]
     assert finish_motion(HUMANML3D_263.encode(run), HUMANML3D_263).contacts[:, 1::2].mean() > 0.05

@@ -6,10 +6,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from marey.motion.capsules import depth
 from marey.motion.hands import APART, MEET, clear_arms, join_hands, wrist_distance
 from marey.motion.kinematics import bone_lengths, forward_kinematics
 from marey.motion.skeleton import HUMANML3D
-from tests.support.arms import arm_depth, with_hand_in_the_trunk
+from tests.support.arms import with_hand_in_the_trunk
 from tests.support.motions import dancer
 from tests.support.walker import walker
 
@@ -50,8 +51,8 @@ def test_hands_that_are_apart_are_left_alone_to_the_last_bit():
 def test_an_arm_inside_the_trunk_comes_out_smoothly_and_bones_stay():
     joints = with_hand_in_the_trunk()
     cleared = clear_arms(joints, HUMANML3D, 20.0)
-    assert arm_depth(joints, "R_forearm", "trunk").max() > 0.03
-    assert arm_depth(cleared, "R_forearm", "trunk").max() < 0.01
+    assert depth(joints, "R_forearm", "trunk").max() > 0.03
+    assert depth(cleared, "R_forearm", "trunk").max() < 0.01
     assert np.abs(bone_lengths(cleared, HUMANML3D) - bone_lengths(joints, HUMANML3D)).max() < 1e-9
     others = [j for j in range(22) if j not in (19, 21)]
     np.testing.assert_array_equal(cleared[:, others], joints[:, others])

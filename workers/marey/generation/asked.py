@@ -31,7 +31,7 @@ from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import SHOWN
 from marey.selector.limbs import NamedLimb, limb_of
-from marey.selector.matching import TURNING, WAYS, Step, wanted_of
+from marey.selector.matching import ON_THE_SPOT, TURNING, WAYS, Step, wanted_of
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
@@ -75,8 +75,6 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
 
 ALIKE = frozenset({"idle", "nod", "flinch"})
 """Actions that networks make nearly alike from every seed: every other motion is the mirror image."""
-ON_THE_SPOT = "turn-around"
-"""Action that is a turn and nothing else."""
 
 
 @dataclass(frozen=True)
@@ -214,14 +212,14 @@ def _turned(
     """Return the motion with the turn that is asked for."""
     if wish.turn is None:
         return features
-    made = _turn(features, layout)
     first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action == ON_THE_SPOT else None
     enough = features if first is None else first
     bent = turned_features(enough, layout, wish.turn, wish.side)
-    if bent is not None:
-        enough, _ = bent
-    if enough is not features:
-        changes["turn"] = {"made": round(made), "shown": round(_turn(enough, layout))}
+    if first is None and bent is None:
+        return features
+    made = _turn(features, layout) if first is not None or bent is None else bent[1]
+    enough = enough if bent is None else bent[0]
+    changes["turn"] = {"made": round(made), "shown": round(_turn(enough, layout))}
     return enough
 
 

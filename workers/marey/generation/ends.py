@@ -35,13 +35,13 @@ def ended(features: Float32, layout: FeatureLayout, action: str) -> Float32 | No
     """
     joints = layout.decode(features).astype(np.float64)
     if action in LANDING:
-        height, bound = lowest_foot(joints), UP_M
+        height, rests, leaves = lowest_foot(joints), UP_M, UP_M
     elif action in STAYING:
         height = joints[:, 0, 1] - joints[-round(LAST_S * layout.fps) :, 0, 1].min()
-        bound = STILL_M
+        rests, leaves = STILL_M, RISE_M
     else:
         return None
-    if height[-1] <= max(bound, RISE_M if action in STAYING else 0.0):
+    if height[-1] <= leaves:
         return None
-    frames = int(np.flatnonzero(height <= bound)[-1]) + 1 if (height <= bound).any() else 0
+    frames = int(np.flatnonzero(height <= rests).max(initial=-1)) + 1
     return features[:frames] if frames >= (1 - MOST_LEFT_OUT) * len(features) else None

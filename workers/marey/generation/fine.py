@@ -83,9 +83,9 @@ def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generato
     left_of = np.stack([forward[:, 2], np.zeros(frames), -forward[:, 0]], axis=1)
     moved = joints.copy()
     turn = from_rotvec(np.radians(down)[:, None] * left_of)
-    held = smooth(joints[:, head] - joints[:, neck], HELD_S * fps)  # nods of the network's own would count, too
-    bone = length(joints[:, head] - joints[:, neck])[:, None]
-    moved[:, head] = joints[:, neck] + rotate(turn, bone * normalize(held))
+    bone = joints[:, head] - joints[:, neck]
+    held = normalize(smooth(bone, HELD_S * fps))  # nods of the network's own would count, too
+    moved[:, head] = joints[:, neck] + rotate(turn, length(bone)[:, None] * held)
     return moved
 
 
