@@ -142,6 +142,14 @@ ROOM = 4 << 30
 """Bytes that must be free there."""
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _data_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the default MAREY_HOME out of the user's own data folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def servers_home() -> Iterator[Path]:
     """Folder of the run's servers, in memory where there is room for them."""

@@ -54,7 +54,7 @@ class TextHandler:
         if spec not in self._pipelines:
             self._pipelines[spec] = TextPipeline.load(as_served(spec))
             if judges_meaning(spec):
-                self._stages[spec] = ScopeStage(MeaningJudge(self._pipelines[spec].pooled))
+                self._stages[spec] = ScopeStage(MeaningJudge.of(self._pipelines[spec]))
         self._pipeline, self._scopes = self._pipelines[spec], self._stages.get(spec)
         if self._scopes is not None:
             self._scopes.bundles[bundle] = found

@@ -231,8 +231,7 @@ def judge_of(spec: TextSpec) -> MeaningJudge:
 
     with _loading:
         if spec.encoder not in _judges:
-            encode = load_pipeline(spec).pooled
-            _judges[spec.encoder] = MeaningJudge(encode)
+            _judges[spec.encoder] = MeaningJudge.of(load_pipeline(spec))
         return _judges[spec.encoder]
 
 

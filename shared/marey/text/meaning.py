@@ -7,14 +7,20 @@ set on the sets `development` and `meaning` of `marey.checks.scope_prompts`; a c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.core.settings import Settings, settings
+from marey.text.kept_vectors import KeptVectors
 from marey.vocabulary.entries import Action, load_vocabulary
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.lexicon import EXACT, WILDCARD
 from marey.vocabulary.scope import ActionLists, Scope, match_as, match_as_thing, match_scope
+
+if TYPE_CHECKING:
+    from marey.text.pipeline import TextPipeline
 
 NOUN_LIMIT = 0.57
 """Cosine to the nearest phrase of the named action, under which a noun names a thing."""
@@ -32,10 +38,21 @@ Pooled = Callable[[Sequence[str]], list[NDArray[np.float32]]]
 class MeaningJudge:
     """Judge of prompts that words leave undecided. Vectors of phrases are computed on first use and kept."""
 
-    def __init__(self, pooled: Pooled) -> None:
+    def __init__(self, pooled: Pooled, kept: KeptVectors | None = None) -> None:
+        """Put a judge together; most callers want `of`.
+
+        Args:
+            kept: files of the vectors of all phrases, which take seconds to make; None = none.
+        """
         self._pooled = pooled
+        self._kept = kept
         self._vectors: dict[tuple[str, ...], NDArray[np.float32]] = {}
         self._verbs: tuple[list[str], NDArray[np.float32]] | None = None
+
+    @classmethod
+    def of(cls, pipeline: TextPipeline, *, config: Settings | None = None) -> MeaningJudge:
+        """Return the judge by the encoder of a pipeline, with the vectors that the home keeps."""
+        return cls(pipeline.pooled, KeptVectors((config or settings()).home, pipeline.encoder.sha256))
 
     def judge(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt, by its words where they decide.
@@ -66,7 +83,9 @@ class MeaningJudge:
         phrases."""
         if self._verbs is None:
             pairs = [(each.id, text) for each in load_vocabulary().actions.values() for text in _verb_phrases(each)]
-            self._verbs = [name for name, _ in pairs], self._matrix(tuple(text for _, text in pairs))
+            texts = [text for _, text in pairs]
+            matrix = self._encode(texts) if self._kept is None else self._kept.get(texts, self._encode)
+            self._verbs = [name for name, _ in pairs], matrix
         names, matrix = self._verbs
         cosines = matrix @ vector
         best = int(cosines.argmax())
@@ -75,9 +94,12 @@ class MeaningJudge:
 
     def _matrix(self, texts: tuple[str, ...]) -> NDArray[np.float32]:
         if texts not in self._vectors:
-            parts = (self._pooled(texts[low : low + CHUNK]) for low in range(0, len(texts), CHUNK))
-            self._vectors[texts] = np.stack([vector for part in parts for vector in part])
+            self._vectors[texts] = self._encode(texts)
         return self._vectors[texts]
+
+    def _encode(self, texts: Sequence[str]) -> NDArray[np.float32]:
+        parts = (self._pooled(texts[low : low + CHUNK]) for low in range(0, len(texts), CHUNK))
+        return np.stack([vector for part in parts for vector in part])
 
 
 def _decided(scope: Scope) -> Scope:

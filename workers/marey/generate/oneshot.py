@@ -62,7 +62,7 @@ class OneShot:
         self.bundle = bundle
         self._body = body
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
-        self._judge = MeaningJudge(self._text.pooled) if judges_meaning(bundle.manifest.text) else None
+        self._judge = MeaningJudge.of(self._text, config=config) if judges_meaning(bundle.manifest.text) else None
         threads = config.threads or max(1, len(os.sched_getaffinity(0)))
         self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads)
 

@@ -317,7 +317,7 @@ class _Run:
         lists = self.bundle.manifest.actions
         if lists is None:
             return [None] * len(prompts)
-        judge = MeaningJudge(pipeline.pooled).judge if judges_meaning(self.bundle.manifest.text) else match_scope
+        judge = MeaningJudge.of(pipeline).judge if judges_meaning(self.bundle.manifest.text) else match_scope
         return [judge(prompt.text, lists).as_json() for prompt in prompts]
 
     def report(self, markdown: str, document: Mapping[str, Any]) -> RefereeReport:

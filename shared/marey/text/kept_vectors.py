@@ -1,0 +1,73 @@
+"""Vectors of texts that never change, kept in files, so that only the first process of a machine waits for them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import logging
+import secrets
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.core.errors import MareyError
+from marey.core.private_home import FOLDER_MODE, open_private
+from marey.motion.files import read_limited
+
+log = logging.getLogger(__name__)
+
+FOLDER = "vectors"
+"""Of the home. Its files can be removed at any time."""
+LARGEST = 64 * 2**20
+"""Bytes of a file that is read."""
+
+
+class KeptVectors:
+    """Files of vectors in a folder of the home, named after the encoder and the texts that they are of."""
+
+    def __init__(self, home: Path, encoder_sha256: str) -> None:
+        self._home = home.expanduser()
+        self._encoder = encoder_sha256
+
+    def get(self, texts: Sequence[str], make: Callable[[Sequence[str]], NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return the vectors (N, W) of N texts from their file, or make and keep them.
+
+        A damaged file is made anew. A home that cannot be written keeps nothing, which the log says.
+        """
+        path = self._home / FOLDER / f"{self._name(texts)}.npy"
+        if (found := _read(path, len(texts))) is not None:
+            return found
+        vectors = make(texts)
+        try:
+            self._write(path, vectors)
+        except OSError as error:
+            log.info("the vectors of %d texts are not kept: %s", len(texts), error)
+        return vectors
+
+    def _write(self, path: Path, vectors: NDArray[np.float32]) -> None:
+        for folder in (self._home, path.parent):
+            folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+        part = path.with_name(f".{secrets.token_hex(8)}.part")
+        try:
+            with open_private(part, "xb") as file:
+                np.lib.format.write_array(file, vectors, allow_pickle=False)
+            part.replace(path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+
+    def _name(self, texts: Sequence[str]) -> str:
+        return hashlib.sha256(json.dumps([self._encoder, *texts]).encode()).hexdigest()
+
+
+def _read(path: Path, count: int) -> NDArray[np.float32] | None:
+    """Return what a file holds; None if there is none, or it does not hold `count` vectors."""
+    try:
+        vectors = np.lib.format.read_array(io.BytesIO(read_limited(path, LARGEST)), allow_pickle=False)
+    except (MareyError, ValueError):  # ValueError: its content
+        return None
+    whole = vectors.dtype == np.float32 and vectors.ndim == 2 and len(vectors) == count
+    return vectors if whole and np.isfinite(vectors).all() else None
