@@ -46,7 +46,8 @@ class Selector:
                 return found | self._users_of(name)
             if not found and name in _names_at_import(tree):
                 return self.map.covering(mutation.path, _runtime_lines(tree))
-            return found
+            # TorchScript and child processes run methods that nothing traces: tests of the class stand in.
+            return found or self._around(chain_of_nodes[1:], mutation.path)
         # The line runs once, when its module is imported: tests that run what uses it stand in.
         if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
             return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
@@ -57,6 +58,11 @@ class Selector:
             if names:
                 return names | whole
         return whole
+
+    def _around(self, nodes: Iterable[ast.AST], path: str) -> set[str]:
+        """Tests that run lines of the inmost of these nodes that any test runs."""
+        found = (self.map.covering(path, _runtime_lines(node)) for node in nodes)
+        return next(filter(None, found), set())
 
     def _stand_ins(self, tree: ast.Module, mutation: Mutation, around: list[ast.AST]) -> Iterator[set[str]]:
         for name in _bound_names(tree, mutation.line):

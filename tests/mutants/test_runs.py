@@ -57,6 +57,14 @@ def waits(x):
 
 def unused(x):
     return x + 1
+
+
+class Part:
+    def traced(self, x):
+        return x
+
+    def compiled(self, x):
+        return x * 7
 """
 TESTS = """\
 import os
@@ -81,6 +89,9 @@ def test_asks_first():
 
 def test_asks_again():
     assert toy.asks() == 5
+
+def test_part():
+    assert toy.Part().traced(1) == 1
 
 def test_broken():
     assert toy.capped(0) == 1
@@ -155,6 +166,10 @@ def test_what_runs_once_gets_the_tests_of_all_that_ask(root: Path, known: LineMa
     select = Selector(root, known).select
     assert set(select(mutant(root, "return 6").mutation)) == names("test_asks_first", "test_asks_again")
     assert set(select(mutant(root, "return 2").mutation)) >= names("test_capped", "test_waits")
+
+
+def test_a_method_that_nothing_traces_gets_the_tests_of_its_class(root: Path, known: LineMap) -> None:
+    assert set(Selector(root, known).select(mutant(root, "return x * 8").mutation)) == names("test_part")
 
 
 def test_a_table_is_held_to_the_migrated_schema(tmp_path: Path) -> None:
