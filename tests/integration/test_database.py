@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.core.errors import Unreachable
-from marey.db import Listener, create_engine, transaction, upgrade
+from marey.core.errors import InvalidInput, Unreachable
+from marey.db import Listener, Notification, create_engine, transaction, upgrade
+from marey.db.connections import DeadlineConnection
 from marey.db.database import EVENT_CHANNEL
-from marey.db.deadlines import ORDINARY
+from marey.db.deadlines import KINDS, ORDINARY, Deadline
+from marey.db.listener import _connect  # pyright: ignore[reportPrivateUsage]
 from marey.embedded import start_postgres
 from marey.jobs import get_job, sweep
 from tests.servers.audit import audit
@@ -41,6 +43,20 @@ def test_a_restart_of_postgres_costs_an_error_and_nothing_else(short_home: Path)
         engine.dispose()
 
 
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_transaction_waits_for_answers_as_long_as_its_kind_says(engine: sa.Engine, kind: Deadline) -> None:
+    with transaction(engine, kind) as conn:
+        driver = conn.connection.driver_connection
+        assert isinstance(driver, DeadlineConnection)
+        assert driver.limit == kind.answer
+        row = conn.execute(sa.text("SELECT current_setting('statement_timeout')::interval")).scalar_one()
+        assert row.total_seconds() == kind.statement
+    with transaction(engine) as conn:
+        driver = conn.connection.driver_connection
+        assert isinstance(driver, DeadlineConnection)
+        assert driver.limit == ORDINARY.answer
+
+
 def test_a_database_without_room_says_so_and_names_no_file_of_its_own(engine: sa.Engine) -> None:
     full = "DO $$ BEGIN RAISE disk_full USING MESSAGE = 'could not extend file \"base/5/1\"'; END $$"
     with pytest.raises(Unreachable, match="no disk space left") as told, transaction(engine) as conn:
@@ -59,6 +75,53 @@ def test_a_listener_is_told_that_its_connection_is_gone(short_home: Path) -> Non
         timer.join()
     with pytest.raises(Unreachable):
         Listener(server.url, (EVENT_CHANNEL,))
+
+
+def test_a_listener_behind_a_pooler_checks_that_notifications_arrive_and_loses_none(
+    database_url: str, engine: sa.Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def connect(url: str) -> DeadlineConnection:
+        connection = _connect(url)
+        connection.pooled = True
+        return connection
+
+    def notify(channel: str) -> None:
+        with transaction(engine) as conn:
+            conn.execute(sa.text("SELECT pg_notify(:channel, '7')"), {"channel": channel})
+
+    monkeypatch.setattr("marey.db.listener._connect", connect)
+    checked: list[str] = []
+    check = Listener._check_delivery  # pyright: ignore[reportPrivateUsage]
+
+    def check_late(listener: Listener, url: str) -> None:
+        notify(EVENT_CHANNEL)  # comes between LISTEN and the check
+        checked.append(url)
+        check(listener, url)
+
+    monkeypatch.setattr(Listener, "_check_delivery", check_late)
+    with Listener(database_url, (EVENT_CHANNEL,)) as listener:
+        assert checked == [database_url]
+        assert listener.wait(5) == [Notification(EVENT_CHANNEL, "7")]
+        assert listener.wait(0.1) == []
+
+
+def test_a_listener_without_notifications_is_refused_and_holds_no_connection(
+    database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[DeadlineConnection] = []
+
+    def connect(url: str) -> DeadlineConnection:
+        made.append(_connect(url))
+        made[-1].pooled = True
+        return made[-1]
+
+    monkeypatch.setattr("marey.db.listener._connect", connect)
+    monkeypatch.setattr("marey.db.listener.PING_SECONDS", 0.2)
+    monkeypatch.setattr(Listener, "_receive", lambda _self, _timeout: [])  # pyright: ignore[reportUnknownLambdaType]
+    with pytest.raises(InvalidInput, match="transaction pooler") as refused:
+        Listener(database_url, (EVENT_CHANNEL,))
+    assert refused.value.where == "MAREY_LISTEN_URL"
+    assert [connection.closed for connection in made] == [True, True]
 
 
 def test_a_client_that_stops_in_the_middle_does_not_hold_a_job_for_ever(engine: sa.Engine) -> None:

@@ -22,6 +22,7 @@ from marey.jobs import (
     fail_items,
     get_job,
     heartbeat,
+    list_items,
     list_workers,
     live_workers,
     load_texts,
@@ -35,6 +36,8 @@ from marey.jobs import (
     waiting_items,
 )
 from marey.jobs.lease_types import Claim, ItemFailure
+from marey.jobs.types import Edits
+from marey.takes import NewEdit, submit_edit
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,
@@ -108,6 +111,18 @@ def test_a_claim_takes_a_batch_in_input_order_of_one_lane(engine: sa.Engine) -> 
 def test_the_text_stage_mixes_bundles_that_read_text_alike(engine: sa.Engine) -> None:
     submit_items(engine, [new_item(n, bundle=f"{n % 2}@1") for n in range(6)])
     assert len(claim_some(engine, "text", limit=64).items) == 6
+
+
+def test_a_claimed_edit_names_its_operations_and_motions(engine: sa.Engine) -> None:
+    submit_items(engine, 1)
+    parse_texts(engine)
+    claimed = claim_some(engine)
+    commit_all(engine, claimed)
+    with transaction(engine) as conn:
+        (item,) = list_items(conn, "default", claimed.job).rows
+        assert item.motion is not None
+        submit_edit(conn, NewEdit(item.motion.id, [{"op": "mirror"}]))
+    assert claim_some(engine, "edit").items[0].edits == Edits(({"op": "mirror"},), (item.motion.id,))
 
 
 def test_priority_goes_before_age_and_age_before_nothing(engine: sa.Engine) -> None:

@@ -7,11 +7,14 @@ import threading
 import pytest
 import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from sqlalchemy.types import NullType
 
 from marey.core.errors import Conflict
 from marey.db import check_revision, create_engine, downgrade, migrate, upgrade
+from marey.db.deadlines import MIGRATION
 from marey.migrations.tables import metadata
 from tests.servers.jobs import submit_items
 from tests.support.marey import MIGRATIONS
@@ -94,3 +97,23 @@ def test_upgrading_twice_and_from_several_processes_at_once_is_fine(engine: sa.E
     assert errors == []
     upgrade(engine)
     check_revision(engine)
+
+
+def test_every_column_has_a_type() -> None:
+    """The comparison with the database leaves out what has none."""
+    columns = [column for table in metadata.tables.values() for column in table.columns]
+    assert [column for column in columns if isinstance(column.type, NullType)] == []
+
+
+def test_a_migration_may_take_longer_than_other_transactions(
+    engine: sa.Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[int] = []
+
+    def look(config: Config, _revision: str) -> None:
+        setting = "SELECT setting::int FROM pg_settings WHERE name = 'statement_timeout'"
+        found.append(config.attributes["connection"].execute(sa.text(setting)).scalar_one())
+
+    monkeypatch.setattr("alembic.command.upgrade", look)
+    upgrade(engine)
+    assert found == [MIGRATION.statement * 1000]

@@ -214,6 +214,14 @@ def test_run_now_works_on_a_paused_schedule_and_moves_no_time(
     assert change(engine, schedule, paused=False).next == before
 
 
+def test_each_schedule_names_its_own_last_run(engine: sa.Engine) -> None:
+    schedules = [new_schedule(engine) for _ in range(3)]
+    with transaction(engine) as conn:
+        asked = [run_schedule(conn, DEFAULT_TENANT, schedule) for schedule in [*schedules[:2], schedules[0]]]
+    last = [schedule_row(engine, schedule).last for schedule in schedules]
+    assert last == [asked[2], asked[1], None]
+
+
 def test_new_times_count_from_now_and_other_changes_move_none(engine: sa.Engine) -> None:
     schedule = new_schedule(engine)
     due = time_passes(engine, schedule, missed=5)

@@ -15,24 +15,20 @@ from marey.webhooks import (
     Attempt,
     DeliveryState,
     DueDelivery,
-    NewWebhook,
     WebhookChange,
     change_webhook,
     claim_deliveries,
-    create_webhook,
     delete_webhook,
     get_delivery,
     get_webhook,
     give_back_deliveries,
     list_deliveries,
-    list_webhooks,
     record_attempt,
     replay_delivery,
     rotate_secret,
     send_test,
 )
 from marey.webhooks.deliveries import DELAYS, JITTER, MAX_WAIT
-from marey.webhooks.repository import MAX_WEBHOOKS
 from tests.support.webhooks import deliveries, errors, events_written, happen, messages_of, new_webhook, time_passes
 
 REFUSED = Attempt(500, 0.1, "answered 500")
@@ -260,29 +256,3 @@ def test_events_are_forgotten_after_a_month_with_their_deliveries(engine: sa.Eng
         conn.execute(sa.text("UPDATE webhook_event SET at = at - interval '30 days' WHERE id = :id"), {"id": old})
     sweep(engine)
     assert (len(deliveries(engine, webhook)), events_written(engine)) == (1, 1)
-
-
-def test_listings_go_page_by_page_and_choose_by_state(engine: sa.Engine) -> None:
-    webhook = new_webhook(engine)
-    happen(engine, 5)
-    for due in claim(engine, 2):
-        record(engine, due, ARRIVED)
-    with transaction(engine) as conn:
-        first = list_deliveries(conn, DEFAULT_TENANT, webhook, limit=3)
-        second = list_deliveries(conn, DEFAULT_TENANT, webhook, limit=3, cursor=first.cursor)
-        events = [row.event for row in (*first.rows, *second.rows)]
-        assert (len(set(events)), events, second.cursor) == (5, sorted(events, reverse=True), None)
-        arrived = list_deliveries(conn, DEFAULT_TENANT, webhook, states=[DeliveryState.DELIVERED]).rows
-        assert [row.status for row in arrived] == [204, 204]
-        assert [row.id for row in list_webhooks(conn, DEFAULT_TENANT).rows] == [webhook]
-
-
-def test_a_tenant_has_a_limited_number_of_webhooks_and_each_wants_something(engine: sa.Engine) -> None:
-    for _ in range(MAX_WEBHOOKS):
-        new_webhook(engine)
-    with pytest.raises(Conflict, match="the limit of"):
-        new_webhook(engine)
-    with transaction(engine) as conn, pytest.raises(InvalidInput, match="is empty"):
-        change_webhook(conn, DEFAULT_TENANT, list_webhooks(conn, DEFAULT_TENANT).rows[0].id, WebhookChange(events=[]))
-    with pytest.raises(InvalidInput, match="NUL"), transaction(engine) as conn:
-        create_webhook(conn, NewWebhook(DEFAULT_TENANT, "https://a\0/", [], b""))

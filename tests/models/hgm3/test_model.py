@@ -20,7 +20,7 @@ from marey.models.hgm3.conditions import (
 )
 from marey.models.hgm3.config import PAPER, STARTER, TINY, named_config
 from marey.models.hgm3.data import CaptionData
-from marey.models.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
+from marey.models.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.motion.features import HUMANML3D_263, layout
 from marey.nn.motion_tokenizer import biased_std
@@ -433,3 +433,11 @@ def test_errors_of_swinging_joints_weigh_what_the_configuration_says() -> None:
     assert wrist[1] == pytest.approx(4 * knee[1])
     assert wrist[3] == pytest.approx(4 * wrist[2], rel=0.5)
     assert knee[3] < knee[2]
+
+
+def test_the_length_estimator_has_a_layer_for_each_width() -> None:
+    config = replace(TINY, length_hidden=(24, 16, 8))
+    network = LengthEstimator(config)
+    widths = [layer.weight.shape[::-1] for layer in network.layers if isinstance(layer, torch.nn.Linear)]
+    assert widths == [(config.condition.text_width, 24), (24, 16), (16, 8), (8, config.max_tokens)]
+    assert network(torch.zeros(2, config.condition.text_width)).shape == (2, config.max_tokens)

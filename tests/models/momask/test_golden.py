@@ -71,6 +71,11 @@ def test_names_and_shapes_are_those_of_the_public_files() -> None:
     assert [len(rvq_shapes()), len(masked_shapes()), len(residual_shapes(shared=True))] == [72, 108, 112]
 
 
+def test_by_default_the_residual_transformer_is_the_public_one() -> None:
+    network = filled(ResidualTransformer(CONFIG), names.residual_names(CONFIG), residual_shapes(shared=True))
+    assert network.shared
+
+
 def test_the_tokenizer_encodes_and_decodes_as_the_public_one(tokenizer: Tokenizer) -> None:
     golden = GOLDEN["rvq"]
     features = normals(7, 2, 196, 263)

@@ -22,6 +22,7 @@ from marey.models.momaskpp.train import train_stage
 from marey.registry import resolve
 from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
+from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 from tests.support.ablations import judge_by_two_prompts
 
@@ -55,6 +56,7 @@ def test_a_variant_trains_its_stages_alone(
     found = train_variant(str(bundle.path), stages, options_of(prepared, run, variant.of(TINY)))
     assert ("local_mm" in found, "error_mm" in found) == ("tokenizer" in stages,) * 2
     assert found["validation loss"] > 0
+    assert (run.parent / TOKENS).is_file() == ("tokenizer" not in stages), "the next variant needs them"
     made = find_bundle(str(run / "bundle"))
     assert MoMaskPPConfig.from_dict(made.manifest.parameters) == variant.of(TINY)
     for part in PARTS:

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from marey.bundles import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.generation.port import KeptFrames, Request
+from marey.models.momaskpp.attention import CrossBlock
 from marey.models.momaskpp.bundle import load_networks, random_bundle
 from marey.models.momaskpp.config import CONFIGS, TINY, MoMaskPPConfig
 from marey.models.momaskpp.generate import Generator, SamplingSettings
@@ -74,6 +76,14 @@ def test_motions_are_equal_on_two_threads(variant: Generator) -> None:
     reference = variant.generate(requests())
     assert equal_motions(reference, on_two.generate(requests()))
     assert equal_motions(reference[2:3], on_two.generate(requests()[2:3]))  # its two branches of guidance
+
+
+def test_matrices_of_blocks_are_packed(variant: Generator) -> None:
+    networks = load_networks(variant.bundle)[1]
+    blocks = [each for each in networks.masked.modules() if isinstance(each, CrossBlock)]
+    assert any(isinstance(each, nn.Linear) for block in blocks for each in block.modules()) == bool(blocks)
+    networks.masked.prepare_inference(BatchThreads(1))
+    assert not any(isinstance(each, nn.Linear) for block in blocks for each in block.modules())
 
 
 def test_seed_words_and_length_each_change_the_motion(generator: Generator) -> None:

@@ -182,6 +182,13 @@ def test_it_is_converted_to_and_from_other_formats(tmp_path) -> None:
     assert (tmp_path / "f.fbx").read_bytes() == (tmp_path / "b.fbx").read_bytes()
 
 
+def test_curves_name_the_version_that_readers_know() -> None:
+    curves = [
+        node for node in FbxFile(format_fbx(walker()), "a").first("Objects").children if node.name == "AnimationCurve"
+    ]
+    assert {node.first("KeyVer").properties[0] for node in curves} == {4008}
+
+
 def shapes(nodes: list[ReadNode], above: str = "") -> set[str]:
     """Return the paths of nodes with the types of their properties; templates and properties by name."""
     found: set[str] = set()
@@ -209,3 +216,7 @@ def test_other_versions_and_packed_arrays_are_read(version: int, packed: bool) -
     plain = format_fbx(clip)
     seen = parse_fbx(rewritten(plain, version, packed=packed))
     np.testing.assert_array_equal(seen.joints(), parse_fbx(plain).joints())
+
+
+def test_one_animation_is_nothing_to_note() -> None:
+    assert parse_fbx(format_fbx(walker(seconds=1))).notes == ()

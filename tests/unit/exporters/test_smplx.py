@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from marey.core.errors import InvalidFile, InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput, TooLarge
 from marey.exporters import Coordinates, exporter_of
 from marey.exporters.convert import convert
 from marey.motion.export_options import ExportOptions
@@ -116,3 +118,19 @@ def test_without_the_model_it_is_refused(tmp_path: Path) -> None:
         read_rig(tmp_path / "a.npz")
     with pytest.raises(InvalidFile):
         parse_smplx_rig(b"no npz", "a.npz")
+
+
+def test_a_model_that_unpacks_to_more_than_it_may_is_refused(tmp_path: Path) -> None:
+    """A small file of zeros, which would take all memory."""
+    header = io.BytesIO()
+    rows = 2**28 // 24 + 1
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (rows, 3)})
+    path = tmp_path / "SMPLX_NEUTRAL.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        with archive.open("v_template.npy", "w") as file:
+            file.write(header.getvalue())
+            for _ in range(rows * 24 // 2**20 + 1):
+                file.write(bytes(2**20))
+        archive.writestr("J_regressor.npy", b"")
+    with pytest.raises(TooLarge, match=r"over the limit of 0\.25 GiB"):
+        parse_smplx_rig(path.read_bytes())

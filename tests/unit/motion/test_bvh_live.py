@@ -110,6 +110,16 @@ def test_the_numbers_are_those_of_a_clip_that_is_written_at_once(clip: MotionCli
     assert live.endswith(b"\n")
 
 
+def test_frames_in_float32_are_written_as_the_same_numbers(tmp_path: Path) -> None:
+    clip = tumbling(HUMANML3D, 20)
+    frames = [(r.astype(np.float32), p.astype(np.float32)) for r, p in zip(clip.rotations, clip.root, strict=True)]
+    for name, numbers in (("single", np.float32), ("double", np.float64)):
+        with LiveBVH.open(tmp_path / name, clip.skeleton, clip.fps) as live:
+            for rotations, place in frames:
+                live.add(rotations.astype(numbers), place.astype(numbers))
+    assert (tmp_path / "single").read_bytes() == (tmp_path / "double").read_bytes()
+
+
 @pytest.mark.parametrize("name", SKELETONS)
 def test_it_is_read_back_as_the_same_motion(name: str, tmp_path: Path) -> None:
     clip = tumbling(SKELETONS[name], 20)

@@ -330,3 +330,10 @@ def test_a_loop_of_a_timeline_has_the_rows_of_its_cycle():
     assert loop.manifest.get("timeline") == expected.get("timeline")
     steps = read_steps([LOOP])
     assert prompt_after_cuts(manifest, manifest["prompt"], steps, clip.frames, clip.fps) == (manifest["prompt"], steps)
+
+
+def test_a_foot_begins_to_stand_in_the_first_frame_of_each_stand_but_in_no_first_frame():
+    feet = np.array([[1, 0], [1, 1], [0, 1], [1, 0], [1, 1]], bool)
+    found = onsets(feet)
+    assert found.dtype == bool
+    assert [tuple(place) for place in np.argwhere(found)] == [(1, 1), (3, 0), (4, 1)]

@@ -68,3 +68,11 @@ def test_every_linear_layer_of_a_module_is_replaced_and_nothing_else() -> None:
     kinds = [type(part).__name__ for part in module.modules()]
     assert kinds == ["Sequential", "Sequential", "PackedLinear", "LayerNorm", "GELU", "PackedLinear"]
     torch.testing.assert_close(module(x), expected)
+
+
+@pytest.mark.parametrize("shape", [(512,), (1, 512), (1, 1, 512)])
+def test_a_row_alone_gives_the_bits_that_it_gives_among_others(shape: tuple[int, ...]) -> None:
+    packed, rows = PackedLinear(nn.Linear(512, 96)), torch.randn(4, 512)
+    found = packed(rows[2].reshape(shape))
+    assert found.shape == (*shape[:-1], 96)
+    assert torch.equal(found.reshape(-1), packed(rows)[2])

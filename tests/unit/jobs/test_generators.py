@@ -1,0 +1,41 @@
+"""What the platform knows of a generator, from its bundle alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from marey.bundles import find_bundle
+from marey.core.settings import Settings
+from marey.items.item import Item
+from marey.jobs.generators import GeneratorCapabilities, capabilities_of
+from marey.text.keys import scope_key
+from marey.vocabulary.scope import ActionLists, match_scope
+from tests.support.live_api import write_bundle
+
+LISTS = ActionLists(("walk", "bow", "wave"), tried=("kick",))
+UNDECIDED = "a wave of nausea"
+"""Its words alone do not tell a gesture from a thing."""
+ROWS = ({"start": 0.0, "end": 2.0, "prompt": UNDECIDED},)
+
+
+@pytest.fixture
+def generator(tmp_path: Path) -> GeneratorCapabilities:
+    write_bundle(tmp_path, "own", actions=LISTS)
+    config = Settings(models=tmp_path, home=tmp_path)
+    return capabilities_of(find_bundle("own", config=config, verify=False), config)
+
+
+@pytest.mark.parametrize("rows", [None, ROWS])
+def test_a_verdict_has_a_key_of_its_own_where_the_prompt_has_rows(
+    generator: GeneratorCapabilities, rows: tuple[dict[str, object], ...] | None
+) -> None:
+    key = generator.scope_key(Item(UNDECIDED, timeline=rows), match_scope(UNDECIDED, LISTS))
+    assert key == scope_key(UNDECIDED, generator.bundle.reference, LISTS, in_rows=rows is not None)
+
+
+def test_what_words_decide_has_no_key(generator: GeneratorCapabilities) -> None:
+    prompt = "a person bows"
+    assert generator.scope_key(Item(prompt), match_scope(prompt, LISTS)) is None
+    assert generator.scope_key(Item(prompt), None) is None
