@@ -132,7 +132,9 @@ class Serving:
 
 @contextlib.contextmanager
 def serving(marey: Marey, *options: str) -> Iterator[Serving]:
-    """`marey serve` on any free port, ready, until the end of the block."""
+    """`marey serve` on any free port, ready, until the end of the block; with one worker unless `options` say more."""
+    if "--with" not in options and "--workers" not in options:
+        options = (*options, "--workers", "1")
     marey.home.mkdir(mode=0o700, parents=True, exist_ok=True)
     log = marey.home / "serve.log"
     with log.open("wb") as output:

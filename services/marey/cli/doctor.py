@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
-import os
 import platform
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from marey.cli.doctor_findings import Finding, broken, free_space
+from marey.core.cores import cores
 from marey.core.errors import MareyError
 from marey.core.private_home import FOLDER_MODE, is_open
 
@@ -172,11 +172,10 @@ def device(config: Settings) -> Iterator[Finding]:
     """Check the processor and the GPU."""
     import torch
 
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     able = torch.backends.cpu.get_cpu_capability()
     slow = able in ("DEFAULT", "NO AVX")
     hint = "Expect several times the time: this build of torch or this processor has no vector instructions."
-    message = f"torch {torch.__version__}, {cores} cores, {able}"
+    message = f"torch {torch.__version__}, {cores()} cores, {able}"
     yield Finding("cpu", "warn" if slow else "ok", message, hint if slow else None)
     wanted = config.device
     if not torch.cuda.is_available():

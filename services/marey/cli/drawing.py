@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.core.children import end_with_parent
+from marey.core.cores import cores
 from marey.core.errors import MareyError
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Drawers:
     """
 
     def __init__(self, count: int) -> None:
-        self._processes = min(_cores(), MOST_PROCESSES, count // FEW)
+        self._processes = min(cores(), MOST_PROCESSES, count // FEW)
         self._pool: ProcessPoolExecutor | None = None
         if self._processes > 1:
             self._pool = ProcessPoolExecutor(self._processes, multiprocessing.get_context("spawn"), initializer=_begin)
@@ -134,7 +135,3 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # there is a process for each core; numpy is loaded after this
     end_with_parent()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

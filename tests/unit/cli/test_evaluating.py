@@ -11,12 +11,9 @@ from typer.testing import CliRunner
 
 from marey.cli.commands import schedules
 from marey.cli.evaluating import EvaluationArguments, check_evaluation, repeats_of
-from marey.cli.roles.serving import default_roles, parse_roles
 from marey.client import EvaluationDetail
 from marey.client.evaluation_requests import request_body
 from marey.core.errors import InvalidInput, ItemsFailed, NotFound, Regressed
-from marey.core.settings import Settings
-from tests.support.evaluations import write_evaluator, write_generator
 
 
 def asked(**changes: Any) -> EvaluationArguments:
@@ -133,12 +130,3 @@ def test_a_cron_line_in_place_of_a_command_is_an_add(commands: tuple[typer.Typer
     assert runner.invoke(app, ["list"]).exit_code == 0
     assert called == [["add", "0 3 * * 1", "hgm3"]] * 2 + [["list"]]
     assert runner.invoke(app, ["nonsense"]).exit_code == 2
-
-
-def test_a_server_measures_by_itself_where_it_has_a_bundle_that_does(tmp_path: Path) -> None:
-    config = Settings(home=tmp_path, models=tmp_path / "models")
-    write_generator(config.models, "hgm3-x", model="hgm3")
-    assert default_roles(config) == "hgm3+text,edit"
-    write_evaluator(config.models)
-    assert default_roles(config) == "hgm3+text+evaluator,edit"
-    assert parse_roles(default_roles(config)) == [("hgm3", "text", "evaluator"), ("edit",)]

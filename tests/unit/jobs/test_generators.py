@@ -1,4 +1,4 @@
-"""What the platform knows of a generator, from its bundle alone."""
+"""Capabilities of a generator, read from its bundle alone."""
 
 from __future__ import annotations
 

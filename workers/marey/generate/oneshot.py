@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from marey.core.cores import cores
 from marey.core.errors import InvalidInput
 from marey.core.extras import extra
 from marey.items.timeline import prompts_with_rows
@@ -63,7 +63,7 @@ class OneShot:
         self._body = body
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
         self._judge = MeaningJudge.of(self._text, config=config) if judges_meaning(bundle.manifest.text) else None
-        threads = config.threads or max(1, len(os.sched_getaffinity(0)))
+        threads = config.threads or cores()
         self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads)
 
     def match_scope(self, prompt: str, lists: ActionLists) -> Scope:

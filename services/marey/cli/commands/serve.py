@@ -19,7 +19,19 @@ def serve(
         typer.Option(
             "--with",
             help="Workers: + joins queues in one child, a comma separates children. "
-            "None given = one child for prompts, every model that has a bundle here, and evaluations; one for edits.",
+            "None given = --workers children for prompts and every model that has a bundle here, the first for "
+            "evaluations as well; one for edits.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            min=1,
+            max=64,
+            help="Children that read prompts and generate. Default: one for each core, at most 4, and one for each "
+            "2 GiB of memory; one on a GPU.",
+            show_default=False,
         ),
     ] = None,
     port: Annotated[
@@ -30,19 +42,22 @@ def serve(
     """Run all services on this machine, with a database and queue of their own, until Ctrl-C."""
     os.umask(UMASK)
     from marey.cli.ports import try_port
-    from marey.cli.roles.serving import default_roles, parse_roles
+    from marey.cli.roles.serving import default_roles, default_workers, parse_roles
     from marey.core.extras import extra
 
     with extra("worker"), no_collection():
         from marey.cli.supervisor import Supervisor
         from marey.core.settings import Settings, settings
+    if roles is not None and workers is not None:
+        raise InvalidInput("is given beside --with, which names all children", where="--workers", hint="Drop one.")
     changes: dict[str, object] = {}
     if host is not None:
         changes["host"] = host
     if port is not None:
         changes["port"] = port or try_port(host or settings().host, 0)
     config: Settings = settings().model_copy(update=changes)
-    Supervisor(config, parse_roles(roles or default_roles(config))).run()
+    roles = roles or default_roles(config, workers or default_workers(config.device))
+    Supervisor(config, parse_roles(roles)).run()
 
 
 def worker(

@@ -6,8 +6,10 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from marey.core.cores import cores
 from marey.core.errors import InvalidInput
 from marey.registry import get_model, model_names
 
@@ -21,6 +23,12 @@ EDIT = "edit"
 """The queue of edits of stored motions."""
 WITHOUT_DEVICE = frozenset({TEXT, EDIT})
 """Queues that compute on no device."""
+MOST_WORKERS = 4
+"""Children that generate by default: more gain little beside database, queue and API."""
+WORKER_MEMORY = 2 << 30
+"""Bytes of the machine's memory for each of them; one takes 0.5 to 0.7 GiB with the bundles of the checkout."""
+NVIDIA = Path("/dev/nvidia0")
+"""The first GPU on Linux: a process without torch cannot ask CUDA."""
 EVERY_MODEL = "models"
 """In the queues of a worker: every model that has a bundle here."""
 PLATFORM = {
@@ -42,13 +50,29 @@ def live_models(queues: Iterable[str]) -> dict[str, str]:
     return {spec.name: spec.live for spec in specs if spec.live is not None}
 
 
-def default_roles(config: Settings) -> str:
-    """Return the roles of two children: every model with a bundle here, prompts, and evaluations if there is an
-    evaluator; and edits, which take milliseconds and wait for no batch. More children would compete for the cores."""
+def default_roles(config: Settings, workers: int) -> str:
+    """Return the roles of the children of a server.
+
+    Each of `workers` children serves every model with a bundle here, and prompts; the first, evaluations as well if
+    there is an evaluator. One more serves edits, which take milliseconds and wait for no batch.
+    """
     from marey.bundles import list_bundles
 
+    queues = "+".join([*models_here(config), TEXT])
     judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
-    return "+".join([*models_here(config), TEXT, *judges]) + f",{EDIT}"
+    return ",".join(["+".join([queues, *judges]), *[queues] * (workers - 1), EDIT])
+
+
+def default_workers(device: str) -> int:
+    """Return how many children generate unless the user says it: one for each core, within the machine's memory.
+
+    A second child makes a list of prompts in two thirds of the time on two cores: batches leave cores idle while
+    prompts are read and files written. Children on a GPU would only wait for each other.
+    """
+    if device.startswith("cuda") or (device == "auto" and NVIDIA.exists()):
+        return 1
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return max(1, min(cores(), MOST_WORKERS, memory // WORKER_MEMORY))
 
 
 def models_here(config: Settings) -> list[str]:
@@ -118,4 +142,4 @@ def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
 
 def threads_of(config: Settings, torch_children: int) -> int:
     """Return the torch threads of one child: the cores, divided by the children that compute."""
-    return config.threads or max(1, len(os.sched_getaffinity(0)) // max(1, torch_children))
+    return config.threads or max(1, cores() // max(1, torch_children))
