@@ -135,7 +135,7 @@ _BRINGING = frozenset(
 """Verbs by which arms come to where they are held: what is told before and after is done before and after."""
 _GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
 """Nouns of ways before which an adjective is one of the person: "sad walk"."""
-_GAIT = re.compile(r"(\w+)(.*)", re.DOTALL)
+_GAIT = re.compile(r"([\w-]+)(.*)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,11 @@ class _Words:
         """True if something is done in them: "salutes", "crosses his arms"; not "with his arms crossed"."""
         bearing, first = self.stated.bearing, self.stated.words.partition(" ")[0]
         arms = bool(bearing.arms) and not (bearing.pace or bearing.gait or bearing.roll)
-        return not self.instead and not self.stated.whole and (bearing.gesture or (arms and first in _event_verbs()))
+        return (
+            not self.instead
+            and not self.stated.whole
+            and (bearing.gesture or bearing.work or (arms and first in _event_verbs()))
+        )
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any, Literal, cast
 from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
-Gait = Literal["limp", "stagger", ""]
+Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", ""]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 
@@ -49,6 +49,7 @@ class ArmPose:
         share: 0 to 1, of the way from where the motion has the arm.
         shake: metres by which the hand moves to and fro.
         hz: how often it does so in a second.
+        path: places of the wrist, as `hand`, at the times of the keys of the bearing.
     """
 
     at: str = ""
@@ -59,6 +60,24 @@ class ArmPose:
     share: float = 1.0
     shake: Vector = (0.0, 0.0, 0.0)
     hz: float = 0.0
+    path: tuple[Vector, ...] = ()
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Poses that a body goes through in a bearing: over and over in work, once in a gesture.
+
+    Attributes:
+        times: seconds, from 0 on; the last one ends a round.
+        trunk, twist, head, sink: at these times, beside what the bearing has throughout; empty = nothing. `twist`:
+            degrees of the trunk towards its left.
+    """
+
+    times: tuple[float, ...]
+    trunk: tuple[float, ...] = ()
+    twist: tuple[float, ...] = ()
+    head: tuple[float, ...] = ()
+    sink: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +88,8 @@ class Bearing:
         id: its name.
         gesture: done once, by itself or beside another action.
         fall_s: seconds in which a gesture ends; 0 = a little longer than it takes to begin.
+        keys: what the body goes through; None = it stays as it is.
+        work: something that is done ("saws a plank"), not a way to do something else.
         arms: by `left` and `right`, those that it moves.
     """
 
@@ -89,7 +110,14 @@ class Bearing:
     raise_s: float = 0.5
     fall_s: float = 0.0
     hold_s: tuple[float, float] = (1.0, 2.0)
+    work: bool = False
+    keys: Keys | None = None
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
+
+    @property
+    def lasts(self) -> bool:
+        """True if it goes on in the movements after its own."""
+        return not (self.gesture or self.work)
 
     @property
     def is_manner(self) -> bool:
@@ -173,11 +201,14 @@ def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
     arms = cast("Mapping[str, Any]", values.get("arms", {}))
     sides = {side: arms.get(side) or arms.get("both") for side in ("left", "right")}
     poses = {side: ArmPose(**_tuples(pose)) for side, pose in sides.items() if pose is not None}
-    own = {key: value for key, value in values.items() if key != "arms" and key not in WORDS}
-    return Bearing(name, arms=poses, **_tuples(own))
+    keys = Keys(**_tuples(values["keys"])) if "keys" in values else None
+    own = {key: value for key, value in values.items() if key not in ("arms", "keys", *WORDS)}
+    return Bearing(name, arms=poses, keys=keys, **_tuples(own))
 
 
 def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: tuple(cast("list[Any]", value)) if isinstance(value, list) else value for name, value in values.items()
-    }
+    return {name: _tuple(value) for name, value in values.items()}
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(map(_tuple, cast("list[Any]", value))) if isinstance(value, list) else value

@@ -212,7 +212,7 @@ class ScopeMatcher:
         does = [each for each in bare.stated if not each.whole and (each.bearing.gesture or each.bearing.arms)]
         if not any(map(bare.fits, named or {STANDING})) or not (named or does):
             return None
-        alone = [each for each in bare.stated if each.bearing.gesture or not rest]
+        alone = [each for each in bare.stated if not each.bearing.lasts or not rest]
         drawn = tuple(NamedAction(each.words[:MAX_TEXT], "known") for each in alone)
         others = rest.actions if rest and (named or not drawn) else ()
         flags: tuple[Flag, ...] = tuple(

@@ -81,11 +81,11 @@ def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
 
 
 def test_an_action_that_the_words_are_only_close_to_is_not_believed_sooner() -> None:
-    (sweeps,) = read(["a janitor sweeps the floor"])
-    assert named_actions("a janitor sweeps the floor") == {"slash"}
-    assert named_actions("a janitor sweeps the floor", surely=True) == set()
-    assert AGREED < sweeps.probability < SURE
-    assert sweeps.action is None
+    (slips,) = read(["a man slips"])
+    assert named_actions("a man slips") == {"die"}
+    assert named_actions("a man slips", surely=True) == set()
+    assert AGREED < slips.probability < SURE
+    assert slips.action is None
 
 
 def test_who_stands_by_the_words_does_where_the_network_knows_nothing() -> None:

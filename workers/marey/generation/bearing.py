@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.generation.asked import action_of
-from marey.generation.gaits import limping, staggering
+from marey.generation.gaits import GAITS
 from marey.generation.port import MotionFeatures, Request
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.bearings import DRAWN_AS, ArmPose, Bearing, StatedBearing, load_bearings
+from marey.vocabulary.bearings import DRAWN_AS, ArmPose, Bearing, Keys, StatedBearing, Vector, load_bearings
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -44,6 +44,8 @@ MOVES_FIRST, LATE = frozenset({"sit-down", "stand-up", "sit-floor", "kneel"}), 0
 """Actions that are done before a gesture, and the share of the motion that they take."""
 SEATED_SHARE = 0.7
 """Share of the lean of a standing trunk that one has that does not lean from the hips."""
+KEYED_S = 0.06
+"""Standard deviation of the filter of ways through keys, seconds: they pass without a halt."""
 SHORTEST = 10
 """Frames of the shortest motion on which anything is drawn."""
 
@@ -99,16 +101,16 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         return []
     if request.timeline is None:
         action = action_of(request.text)
-        stated = _fitting([*stated_bearings(request.text.prompt), *_drawn_as(action)], action)
+        stated = fitting([*stated_bearings(request.text.prompt), *_drawn_as(action)], action)
         return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
     whole = [each for each in stated_bearings(request.text.prompt) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
         action, own = action_of(row.text), stated_bearings(row.text.prompt)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
-        stated = _fitting([*whole, *kept, *own, *_drawn_as(action)], action)
+        stated = fitting([*whole, *kept, *own, *_drawn_as(action)], action)
         if request.is_sequence:
-            carried = [each for each in (*kept, *own) if each in stated and not each.bearing.gesture]
+            carried = [each for each in (*kept, *own) if each in stated and each.bearing.lasts]
         if stated:
             end = min(round(row.end * fps), frames)
             found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k))
@@ -131,7 +133,7 @@ def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
     return all(each.is_manner for each in both) or all(each.arms for each in both)
 
 
-def _fitting(stated: Sequence[StatedBearing], action: str) -> tuple[StatedBearing, ...]:
+def fitting(stated: Sequence[StatedBearing], action: str) -> tuple[StatedBearing, ...]:
     """Return the bearings that an action can have, each once, in the order of the vocabulary."""
     order = list(load_bearings())
     once = {each.name: each for each in stated if each.shown_in(action)}
@@ -154,8 +156,7 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
         rng = np.random.default_rng([span.seed, span.begin])
         for each in span.stated:
             if each.bearing.gait and each.shown_in(span.action) == "body":
-                draw = limping if each.bearing.gait == "limp" else staggering
-                joints = draw(joints, layout, span.begin, span.end, each.side, rng)
+                joints = GAITS[each.bearing.gait](joints, layout, span.begin, span.end, each.side, rng)
     body = StandingBody(joints)
     for stated, ways, rng in _drawn(spans, len(features), layout.fps):
         _Drawing(body, stated, ways, layout.fps, rng).draw()
@@ -211,26 +212,32 @@ class _Drawing:
         self._body, self._ways, self._rng = body, ways, rng
         self._bearing: Bearing = stated.bearing
         self._arms = arms_of(stated)
+        self._is_exchanged = stated.side == LEFT and len(self._arms) == len(ARMS)
         self._time = np.arange(len(ways.trunk)) / fps
         self._fps = fps
+        self._pace = float(rng.uniform(0.92, 1.08))
         self._size, self._begins = float(rng.uniform(0.9, 1.1)), 0.0 if self._bearing.gesture else rng.uniform(0, 0.6)
 
     def draw(self) -> None:
         """Draw it: trunk first, arms last."""
         bearing, body = self._bearing, self._body
         way, legs = self._ways.trunk * self._size, self._ways.legs * self._size
-        if bearing.sink:
-            body.shift(-bearing.sink * legs)
-        if bearing.trunk:
-            body.bow(bearing.trunk * legs, arms_hang=0.85, head=0.0)
-            body.lean(SEATED_SHARE * bearing.trunk * (way - legs), "left")
+        keys = bearing.keys or Keys(times=(0.0,))
+        if bearing.sink or keys.sink:
+            body.shift(-(bearing.sink + self._keyed(keys.sink)) * legs)
+        if bearing.trunk or keys.trunk:
+            trunk = bearing.trunk + self._keyed(keys.trunk)
+            body.bow(trunk * legs, arms_hang=0.85, head=0.0)
+            body.lean(SEATED_SHARE * trunk * (way - legs), "left")
+        if keys.twist:
+            body.lean((-1.0 if self._is_exchanged else 1.0) * self._keyed(keys.twist) * way, "up")
         if bearing.heave:
             body.lean(bearing.heave * way * self._swung(bearing.heave_hz), "left")
         if bearing.roll:
             aside = self._swung(bearing.roll_hz) if bearing.roll_hz else self._steps()
             body.lean(bearing.roll * legs * aside, "forward")
-        if bearing.head:
-            body.turn(NECK, "left", bearing.head * way)
+        if bearing.head or keys.head:
+            body.turn(NECK, "left", (bearing.head + self._keyed(keys.head)) * way)
         if bearing.tilt:
             side = self._rng.choice([-1.0, 1.0]) if not bearing.roll_hz else -self._swung(0.7 * bearing.roll_hz)
             body.turn(NECK, "forward", bearing.tilt * way * side)
@@ -267,10 +274,11 @@ class _Drawing:
     def _move(self, side: str, pose: ArmPose) -> None:
         """Bring an arm to its pose."""
         body, (_, shoulder, elbow, wrist) = self._body, ARMS[side]
-        if pose.hand is not None:
+        if pose.at:
             place = self._place(side, pose.at)
             swung = np.sin(2 * np.pi * pose.hz * self._since() + self._begins)[:, None]
-            target = body.from_shoulder(side, place) + np.array(pose.hand) + swung * np.array(pose.shake)
+            hand = self._keyed(pose.path) if pose.path else np.array(pose.hand)
+            target = body.from_shoulder(side, place) + hand + swung * np.array(pose.shake)
             upper, fore = body.reach(side, target, pose.elbow)
         else:
             upper, fore = (
@@ -280,6 +288,17 @@ class _Drawing:
                 for wanted, a, b in ((pose.upper, shoulder, elbow), (pose.fore, elbow, wrist))
             )
         body.move_arm(side, pose.share * self._ways.arms, upper, fore, lag=0.0, straight=not self._bearing.gesture)
+
+    def _keyed(self, values: Sequence[float] | Sequence[Vector]) -> Array:
+        """Return numbers (T,), or points (T, 3), that are `values` at the times of the keys; 0 if there are none."""
+        frames = len(self._time)
+        if not values or self._bearing.keys is None:
+            return np.zeros(frames)
+        times, through = np.array(self._bearing.keys.times), np.array(values, np.float64)
+        since = self._pace * self._since()
+        at = np.minimum(since, times[-1]) if self._bearing.gesture else (since + self._begins) % times[-1]
+        columns = [smooth(np.interp(at, times, each), KEYED_S, self._fps) for each in through.reshape(len(times), -1).T]
+        return columns[0] if through.ndim == 1 else np.stack(columns, axis=-1)
 
     def _since(self) -> Array:
         """Return seconds (T,): of a gesture since the hand came to its place, else since the beginning."""

@@ -1,10 +1,13 @@
-"""Gaits that a network does not know: limps and staggers, drawn on walks.
+"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees and skips; and a foot that taps.
 
 A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
-slower. Frames are played at other times, so standing feet stay.
+slower. Frames are played at other times, so standing feet stay. Knees are lifted while their feet pass the other ones;
+who skips hops on the standing foot meanwhile.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +16,9 @@ from marey.checks.kinematics import smooth
 from marey.generation.turned import bent_along
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
-from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, StandingBody
+from marey.posing.limbs import BONE_LENGTHS
+from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, StandingBody, eased
+from marey.vocabulary.bearings import Gait
 
 Array = NDArray[np.floating]
 
@@ -30,6 +35,22 @@ UNEVEN, UNEVEN_HZ = 0.28, 0.55
 """By how much its time runs faster and slower, and how often a second."""
 WANDERS = 0.05
 """Metres by which its hips go to the sides of its feet."""
+KNEE_UP, KNEE_SKIPS = 78.0, 58.0
+"""Degrees of a lifted thigh from the vertical: in a march with high knees, and in a skip."""
+SHANK_BACK = 14.0
+"""Degrees by which the shank below it hangs back."""
+APART = 0.03
+"""Metres by which a lifted foot is outward of its hip."""
+LIFTS_S = 0.07
+"""Standard deviation of the filter by which a knee comes up, seconds."""
+UP_FIRST = 1.5
+"""By how much a foot rises before it goes ahead: it would slide."""
+HOPS, HOP_FROM = 0.12, 0.6
+"""Metres by which who skips leaves the floor, and the share of the lift of the other knee from which on."""
+STILL = 0.15
+"""Metres a second of the hips, under which a body stands."""
+TAPS, TAPS_HZ, TAPS_S = 0.05, 2.6, (1.6, 1.0)
+"""Metres by which the toes of a tapping foot rise, how often a second, and seconds of tapping and of rest."""
 
 
 def limping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
@@ -68,6 +89,63 @@ def staggering(
     body.shift(np.zeros(len(time)), left=WANDERS * inside * np.sin(2 * np.pi * 1.3 * hz * time + phase))
     rate = 1.0 + UNEVEN * inside * np.sin(2 * np.pi * UNEVEN_HZ * time + rng.uniform(0, 2 * np.pi))
     return _retimed(body.solved(), rate, begin, end)
+
+
+def with_high_knees(
+    joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator
+) -> Array:
+    """Return joints (T, 22, 3) of a walk that lifts its knees high in the frames `begin` to `end`; see `limping`."""
+    del side, rng  # both knees, all the same
+    return _knees_lifted(joints, layout, begin, end, KNEE_UP, 0.0)
+
+
+def skipping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` skip; see `limping`."""
+    del side, rng
+    return _knees_lifted(joints, layout, begin, end, KNEE_SKIPS, HOPS)
+
+
+def _knees_lifted(joints: Array, layout: FeatureLayout, begin: int, end: int, degrees: float, hops: float) -> Array:
+    """Return joints (T, 22, 3) with thighs that are lifted by `degrees` in each step, and hops of so many metres."""
+    body, inside = StandingBody(joints), _inside(len(joints), begin, end, layout.fps)
+    thigh, shank = np.radians(degrees), np.radians(SHANK_BACK)
+    up = np.zeros(len(joints))
+    for side, (hip, knee, ankle, toe) in LEGS.items():
+        lifted = inside * smooth(_stands(body, OTHER_SIDE[side], layout.fps), LIFTS_S, layout.fps)
+        share = np.stack([lifted**2, eased(UP_FIRST * lifted), lifted**2], axis=-1)
+        bent = BONE_LENGTHS[knee] * np.array([0.0, -np.cos(thigh), np.sin(thigh)])
+        below = BONE_LENGTHS[ankle] * np.array([0.0, -np.cos(shank), -np.sin(shank)])
+        for moved, place in (([knee], bent), ([ankle, toe], bent + below)):
+            wanted = np.tile(place + np.array([APART, 0.0, 0.0]), (len(joints), 1))
+            away = body.joints[:, hip] + body.world(wanted, side) - body.joints[:, moved[0]]
+            body.joints[:, moved] += (share * away)[:, None]
+        up = np.maximum(up, lifted)
+    body.joints[:, :, 1] += hops * eased((up - HOP_FROM) / (1.0 - HOP_FROM))[:, None]
+    return body.solved()
+
+
+def tapping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a body that stands, and taps a foot in the frames `begin` to `end`; see `limping`."""
+    taps = side if side in LEGS else str(rng.choice(list(LEGS)))
+    time = np.arange(len(joints)) / layout.fps
+    busy = (time + rng.uniform(0, TAPS_S[0])) % sum(TAPS_S) < TAPS_S[0]
+    speed = np.linalg.norm(np.gradient(smooth(joints[:, 0], 0.2, layout.fps), axis=0), axis=-1) * layout.fps
+    way = _inside(len(joints), begin, end, layout.fps) * smooth(
+        (busy & (speed < STILL)).astype(float), 0.08, layout.fps
+    )
+    moved = joints.copy()
+    moved[:, LEGS[taps][-1], 1] += TAPS * way * np.sin(np.pi * TAPS_HZ * time) ** 2
+    return StandingBody(moved).solved()
+
+
+GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Generator], Array]] = {
+    "limp": limping,
+    "stagger": staggering,
+    "high-knees": with_high_knees,
+    "skip": skipping,
+    "foot-tap": tapping,
+}
+"""Gaits of bearings, by their name in `bearings.toml`."""
 
 
 def _inside(frames: int, begin: int, end: int, fps: float) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.generation.asked import generate_as_asked
+from marey.generation.lengths import resolved_length
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.sequences import as_timeline
@@ -51,7 +52,7 @@ def resolve_request(generator: Generator[S], request: Request) -> Request:
     """
     request = as_timeline(generator, request)
     if request.timeline is None:
-        return replace(generator.resolve_length(request), open=request.open or request.frames is None)
+        return replace(resolved_length(generator, request), open=request.open or request.frames is None)
     check_timelines(generator)
     for row in request.timeline:
         generator.limits.check(Request(row.text, request.seed))

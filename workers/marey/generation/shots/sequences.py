@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
 
+from marey.generation.lengths import resolved_length
 from marey.generation.port import Generator, Limits, Request
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
@@ -69,7 +70,7 @@ def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> 
 def _drawn_frames(generator: Generator[Any], request: Request, number: int) -> int:
     """Return the frames that the model gives a movement alone."""
     alone = Request(request.text.movements[number], part_seed(request.seed, SEED, number))
-    return generator.resolve_length(alone).frames or generator.limits.min_frames
+    return resolved_length(generator, alone).frames or generator.limits.min_frames
 
 
 def _shared(frames: int, lengths: Sequence[int]) -> list[int]:

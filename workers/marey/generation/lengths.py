@@ -1,0 +1,42 @@
+"""Length of a motion whose prompt names none: that of the model, or as long as what is drawn on it takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from marey.generation.asked import action_of
+from marey.generation.bearing import BEGINS_S, FALL, fitting
+from marey.generation.port import Generator, Request
+from marey.text.features import TextFeatures
+from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.bearings import Bearing
+
+WORK_S = 5.0
+"""Seconds of work at least: two rounds of the longest."""
+
+
+def resolved_length(generator: Generator[Any], request: Request) -> Request:
+    """Return a request with its length set, where the model decides lengths beforehand.
+
+    Raises:
+        InvalidInput: as `Limits.check`.
+    """
+    resolved = generator.resolve_length(request)
+    if request.frames is not None or resolved.frames is None:
+        return resolved
+    limits = generator.limits
+    return replace(resolved, frames=limits.within(max(resolved.frames, round(_least(request.text) * limits.fps))))
+
+
+def _least(text: TextFeatures) -> float:
+    """Return the seconds that the bearings of a text take that are done, one gesture after the other."""
+    done = [each.bearing for each in fitting(stated_bearings(text.prompt), action_of(text))]
+    gestures = [_seconds(bearing) for bearing in done if bearing.gesture]
+    return max([sum(gestures), *(WORK_S for bearing in done if bearing.work)])
+
+
+def _seconds(gesture: Bearing) -> float:
+    """Return the seconds of a gesture, with a moment before and after it."""
+    rounds = gesture.keys.times[-1] if gesture.keys else sum(gesture.hold_s) / 2
+    return gesture.raise_s + rounds + (gesture.fall_s or FALL * gesture.raise_s) + 2 * BEGINS_S
