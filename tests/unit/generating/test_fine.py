@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from marey.generation.fine import FINE, drawn_features
+from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
 from marey.motion.rotations import from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
@@ -25,7 +26,7 @@ RAISED = Body(5.0, right=lift(0.5, 5.0))
 
 def drawn(action: str, body: Body | None = None, count: int | None = None, seed: int = 1) -> np.ndarray[Any, Any]:
     body = body or (RAISED if action == "wave" else Body(5.0))
-    features = drawn_features(LAYOUT.encode(body.joints()), LAYOUT, action, count, seed)
+    features = drawn_features(LAYOUT.encode(body.joints()), LAYOUT, action, FineWish(count), seed)
     assert features is not None
     return LAYOUT.decode(features)
 
@@ -78,7 +79,7 @@ def test_an_elbow_that_swings_with_the_hand_comes_to_rest() -> None:
         joints[:, joint] = joints[:, shoulder] + rotate(whole_arm, joints[:, joint] - joints[:, shoulder])
     assert elbow_share(joints) > 0.45
     assert not FINE["wave"].is_well(joints, 20.0)
-    features = drawn_features(LAYOUT.encode(joints), LAYOUT, "wave", None, 1)
+    features = drawn_features(LAYOUT.encode(joints), LAYOUT, "wave", FineWish(), 1)
     assert features is not None
     made = LAYOUT.decode(features)
     assert elbow_share(made) < 0.3
@@ -106,4 +107,4 @@ def test_seeds_differ_and_equal_seeds_do_not(action: str) -> None:
 
 @pytest.mark.parametrize("action", FINE)
 def test_nothing_is_drawn_on_a_motion_without_room(action: str) -> None:
-    assert drawn_features(LAYOUT.encode(Body(1.0).joints()), LAYOUT, action, None, 1) is None
+    assert drawn_features(LAYOUT.encode(Body(1.0).joints()), LAYOUT, action, FineWish(), 1) is None

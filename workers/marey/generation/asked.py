@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
+from marey.generation.fine_wish import FineWish
 from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
 from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
@@ -106,7 +107,7 @@ class _Wish:
             return cls()
         text = request.text
         steps = wanted_of(text.actions or (text.rewritten,))
-        action = _action_of(text, steps)
+        action = _action_of(text, steps) or _row_of_blows(steps or ())
         prompt, gaze = text.prompt, stated_gaze(text.prompt)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
@@ -120,6 +121,10 @@ class _Wish:
     def side(self) -> str:
         """`left` or `right` if an action is asked for on one side, else empty."""
         return next((each.side for step in self.steps or () for each in step if each.side in ("left", "right")), "")
+
+    def fine(self, request: Request) -> FineWish:
+        """Return what is asked for of a movement that is drawn."""
+        return FineWish(self.count, self.side, request.text.prompt)
 
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
@@ -147,6 +152,12 @@ def _one_action(steps: Sequence[Step]) -> str:
     if TURNING in named and named <= WAYS | {TURNING}:
         return TURNING
     return named.pop() if len(named) == 1 == len(steps) else ""
+
+
+def _row_of_blows(steps: Sequence[Step]) -> str:
+    """Return the id of the only action of several steps if it is drawn, kind by kind: "a jab, a cross and a hook"."""
+    named = {each.action for step in steps for each in step}
+    return named.pop() if named == {"punch"} else ""
 
 
 def generate_as_asked(
@@ -181,7 +192,7 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     fixed = None if request.open else request.frames
     if layout.skeleton.name == HUMANML3D.name:
         if wish.action in FINE and not _shows(features, layout, wish):
-            drawn = drawn_features(features, layout, wish.action, wish.count, request.seed)
+            drawn = drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
             if drawn is not None:
                 features, changes["drawn"] = drawn, wish.action
         for change in (_as_often, _turned, _on_floor, _ended):
@@ -298,7 +309,7 @@ def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
         return False
     motion = Motion(joints, layout.fps)
     as_often = wish.count is None or len(REPETITIONS[wish.action](motion)) == wish.count
-    return as_often and RULES[wish.action](motion, "") >= SHOWN
+    return as_often and RULES[wish.action](motion, wish.side if FINE[wish.action].sided else "") >= SHOWN
 
 
 def _turn(features: Float32, layout: FeatureLayout) -> float:

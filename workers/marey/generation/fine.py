@@ -1,5 +1,5 @@
-"""Movements so small that a tokenizer's codes lose them: nods, trembling and waves, drawn on the motion that a network
-made.
+"""Movements so small or so short that a tokenizer's codes lose them, drawn on the motion that a network made: nods,
+trembling, waves, punches, dribbles.
 
 The network gives the body that nods or shivers, where its arms are and how it stands; of the movement itself no code
 keeps 8 degrees of the head, nor 4 mm at 4 Hz (`models/hgm3-open/README.md`, "Tokenizer"). They are drawn as those of
@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.fine_wish import FineWish
+from marey.generation.striking import dribbled, punched
 from marey.generation.waving import waved, waves_well
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
@@ -22,8 +24,8 @@ from marey.motion.rotations import Array, from_rotvec, length, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 
 Float32 = NDArray[np.float32]
-Draw = Callable[[Array, float, int | None, np.random.Generator], Array | None]
-"""`(joints, fps, count, generator)` to joints (T, 22, 3), metres; None if the movement has no place in them."""
+Draw = Callable[[Array, float, FineWish, np.random.Generator], Array | None]
+"""`(joints, fps, wish, generator)` to joints (T, 22, 3), metres; None if the movement has no place in them."""
 
 NOD_DEGREES, NOD_HZ = (11.0, 17.0), (1.3, 1.7)
 NODS, PAUSE_S = (3, 5), (0.6, 1.2)
@@ -42,28 +44,26 @@ SHAKES: Mapping[str, float] = {
 """Metres by which joints tremble."""
 
 
-def drawn_features(
-    features: Float32, layout: FeatureLayout, action: str, count: int | None, seed: int
-) -> Float32 | None:
+def drawn_features(features: Float32, layout: FeatureLayout, action: str, wish: FineWish, seed: int) -> Float32 | None:
     """Return features (T, D) with the small movement of an action of `FINE`; None if the motion has no place for it.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
         layout: of the features.
         action: id in the vocabulary.
-        count: repetitions; None = any number.
+        wish: what the prompt asks for.
         seed: of the motion; decides rates and sizes.
     """
     joints = layout.decode(features).astype(np.float64)
     if len(joints) < 2 * (2 * EDGE_S) * layout.fps:
         return None
-    drawn = FINE[action].draw(joints, layout.fps, count, np.random.default_rng([seed, len(action)]))
+    drawn = FINE[action].draw(joints, layout.fps, wish, np.random.default_rng([seed, len(action)]))
     return None if drawn is None else encode_all(layout, drawn)
 
 
-def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
+def nodded(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array:
     """Return joints whose head tips down and up, in rows of a few nods or as often as is asked for."""
-    frames, rate = len(joints), rng.uniform(*NOD_HZ)
+    frames, rate, count = len(joints), rng.uniform(*NOD_HZ), wish.count
     down, at = np.zeros(frames), EDGE_S * fps
     left, row = count if count is not None else frames, int(rng.integers(*NODS, endpoint=True))
     period = fps / rate
@@ -89,9 +89,9 @@ def nodded(joints: Array, fps: float, count: int | None, rng: np.random.Generato
     return moved
 
 
-def trembling(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array:
+def trembling(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array:
     """Return joints that tremble, the hands most; the feet stand."""
-    del count  # trembling has no number
+    del wish  # trembling has no number
     time = np.arange(len(joints)) / fps
     edge = np.minimum(time, time[-1] - time) / EDGE_S
     strength, rate = smoothstep(np.clip(edge, 0.0, 1.0)), rng.uniform(*SHAKE_HZ)
@@ -111,11 +111,19 @@ class Fine(NamedTuple):
     Attributes:
         draw: draws it.
         is_well: `(joints, fps)`; False if it is to be drawn in a motion that shows its action, too.
+        sided: it is drawn on the side that the prompt names.
     """
 
     draw: Draw
     is_well: Callable[[Array, float], bool] = lambda joints, fps: True
+    sided: bool = False
 
 
-FINE: Mapping[str, Fine] = {"nod": Fine(nodded), "shiver": Fine(trembling), "wave": Fine(waved, waves_well)}
+FINE: Mapping[str, Fine] = {
+    "nod": Fine(nodded),
+    "shiver": Fine(trembling),
+    "wave": Fine(waved, waves_well),
+    "punch": Fine(punched, lambda joints, fps: False, sided=True),  # networks hardly shoot a fist out
+    "dribble": Fine(dribbled, sided=True),
+}
 """Small movements by action."""

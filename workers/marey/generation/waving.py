@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from marey.checks.kinematics import ELBOWS, PELVIS, SHOULDERS, WRISTS, velocity
+from marey.generation.fine_wish import FineWish
 from marey.motion.feet import runs
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
@@ -38,12 +39,12 @@ def waves_well(joints: Array, fps: float) -> bool:
     return max(shares, default=0.0) <= ELBOW_MOVES
 
 
-def waved(joints: Array, fps: float, count: int | None, rng: np.random.Generator) -> Array | None:
+def waved(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
     """Return joints whose lifted hands wave, `count` times or on and on; None if no hand is up for long."""
     spans = [(k, *span) for k in (0, 1) for span in _lifted(joints, fps, k)]
     if not spans:
         return None
-    motion = Motion(joints, fps)
+    motion, count = Motion(joints, fps), wish.count
     draws = RULES["wave"](motion, "") < SHOWN if count is None else len(REPETITIONS["wave"](motion)) != count
     longest = max(end - begin for _, begin, end in spans)
     rate, degrees = rng.uniform(*HZ), rng.uniform(*DEGREES)

@@ -162,9 +162,24 @@ def _thrusts(m: Motion, fastest: float) -> Array:
     return grades
 
 
+def _swung_blows(m: Motion) -> Array:
+    """(2,) grades that each fist swings across in front of the face, or up to it: hooks and uppercuts."""
+    grades = np.zeros(2)
+    for k in (0, 1):
+        for a, b in runs(m.hand_speed[:, k] > 1.2):
+            way = m.hands[max(a - 1, 0) : b + 1, k]  # ahead, up and aside of the shoulders
+            gone = max(float(np.ptp(way[:, 2])), float(way[:, 1].max() - way[0, 1]))
+            place = min(least(float(way[:, 0].max()), 0.28, 0.1), least(float(way[:, 1].max()), -0.05, 0.1))
+            fast = least(float(m.hand_speed[a:b, k].max()), 1.9, 0.5)
+            bent = least(float(m.elbows[max(a - 3, 0) : b, k].max()), 60, 20)
+            grades[k] = max(grades[k], min(fast, least(gone, 0.3, 0.1), place, bent))
+    return grades
+
+
 def punch(m: Motion, side: str) -> float:
-    """Shoot a fist forward."""
-    return min(of_side(_thrusts(m, 1.9).tolist(), side), most(m.path, 0.5 * m.seconds + 0.8, 0.4))
+    """Shoot a fist forward, or swing it across or up."""
+    blows = np.maximum(_thrusts(m, 1.9), _swung_blows(m))
+    return min(of_side(blows.tolist(), side), most(m.path, 0.5 * m.seconds + 0.8, 0.4))
 
 
 def slash(m: Motion, side: str) -> float:

@@ -1,0 +1,96 @@
+"""Punches and dribbles that are drawn on a motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.generation.fine import drawn_features
+from marey.generation.fine_wish import FineWish
+from marey.motion.features import HUMANML3D_263
+from marey.motion.skeleton import HUMANML3D
+from marey.selector.motion import Motion
+from marey.selector.repetitions import REPETITIONS
+from marey.selector.rules import RULES
+from tests.support.bodies import Body
+
+LAYOUT = HUMANML3D_263
+FPS = LAYOUT.fps
+BEFORE = LAYOUT.decode(LAYOUT.encode(Body(6.0).joints())).astype(np.float64)
+LEGS = [HUMANML3D.index(f"{side}_{joint}") for side in "LR" for joint in ("ankle", "foot")]
+SHOULDERS, WRISTS = [16, 17], [20, 21]
+
+
+def drawn(action: str, prompt: str = "", *, count: int | None = None, side: str = "", seed: int = 1) -> np.ndarray:
+    features = drawn_features(LAYOUT.encode(BEFORE), LAYOUT, action, FineWish(count, side, prompt), seed)
+    assert features is not None
+    return LAYOUT.decode(features).astype(np.float64)
+
+
+def hands(joints: np.ndarray) -> np.ndarray:
+    """Places (T, 2, 3) of left and right wrist from the middle of the shoulders, of a body that faces +Z."""
+    return joints[:, WRISTS] - joints[:, SHOULDERS].mean(1, keepdims=True)
+
+
+def struck(joints: np.ndarray) -> list[int]:
+    """The hand (0 = left) of each blow in its order: one that is far out ahead."""
+    out = hands(joints)[..., 2] > 0.38
+    begun = [(frame, k) for k in (0, 1) for frame in np.flatnonzero(out[1:, k] & ~out[:-1, k])]
+    return [k for _, k in sorted(begun)]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_punches_are_as_many_as_asked_for(count: int) -> None:
+    joints = drawn("punch", "throws punches", count=count)
+    assert len(REPETITIONS["punch"](Motion(joints, FPS))) == count
+    assert struck(joints) == [k % 2 for k in range(count)]
+
+
+@pytest.mark.parametrize("kind", ["punches", "jab", "cross", "hook", "uppercut"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_hand_that_is_named_strikes_and_the_other_guards(kind: str, side: str) -> None:
+    joints = drawn("punch", f"throws a {side} {kind}", side=side)
+    motion = Motion(joints, FPS)
+    assert RULES["punch"](motion, side) >= 0.5
+    assert RULES["punch"](motion, "left" if side == "right" else "right") < 0.5
+    guard = hands(joints)[:, 1 if side == "left" else 0]
+    assert guard[:, 1].min() > -0.2
+    assert guard[:, 2].max() < 0.38
+
+
+def test_a_row_is_in_the_order_of_the_prompt() -> None:
+    assert struck(drawn("punch", "throws a jab, a cross and a left hook")) == [0, 1, 0]
+    assert struck(drawn("punch", "a right hook, then a hook")) == [1, 0]
+    assert struck(drawn("punch", "throws a single punch")) == [0]
+    assert len(struck(drawn("punch", "punches the bag"))) >= 4
+
+
+def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
+    hook = hands(drawn("punch", "a right hook", side="right"))[:, 1]
+    assert np.ptp(hook[:, 0]) > 0.35
+    uppercut = hands(drawn("punch", "a right uppercut", side="right"))[:, 1]
+    assert uppercut[:, 1].min() < -0.2
+    assert uppercut[:, 1].max() > 0.05
+
+
+@pytest.mark.parametrize("action", ["punch", "dribble"])
+def test_the_feet_stay(action: str) -> None:
+    made = drawn(action)
+    assert np.abs(made - BEFORE[: len(made)])[:, LEGS].max() < 0.03
+
+
+def test_there_is_no_punch_without_time_for_it() -> None:
+    short = LAYOUT.encode(Body(1.3).joints())
+    assert drawn_features(short, LAYOUT, "punch", FineWish(None, "", "an uppercut"), 1) is None
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_hand_dribbles_beside_the_hips(side: str) -> None:
+    joints = drawn("dribble", "dribbles", side=side)
+    assert RULES["dribble"](Motion(joints, FPS), side) >= 0.5
+    k = WRISTS[0 if side == "left" else 1]
+    height = joints[:, k, 1]
+    assert 0.15 < np.ptp(height) < 0.35
+    downs = np.sum((np.diff(height)[:-1] < 0) & (np.diff(height)[1:] >= 0))
+    assert 1.3 < downs / (len(joints) / FPS) < 2.1
+    assert np.ptp(joints[:, WRISTS[1 if side == "left" else 0], 1]) < 0.05
