@@ -78,17 +78,17 @@ def test_an_elbow_that_swings_with_the_hand_comes_to_rest() -> None:
     for joint in (elbow, wrist):
         joints[:, joint] = joints[:, shoulder] + rotate(whole_arm, joints[:, joint] - joints[:, shoulder])
     assert elbow_share(joints) > 0.45
-    assert not FINE["wave"].is_well(joints, 20.0)
+    assert not FINE["wave"].is_well(joints, 20.0, FineWish())
     features = drawn_features(LAYOUT.encode(joints), LAYOUT, "wave", FineWish(), 1)
     assert features is not None
     made = LAYOUT.decode(features)
     assert elbow_share(made) < 0.3
-    assert FINE["wave"].is_well(made, 20.0)
+    assert FINE["wave"].is_well(made, 20.0, FineWish())
     assert RULES["wave"](Motion(made, 20.0), "right") >= 0.5  # the hand still swings
 
 
 def test_a_wave_that_swings_about_its_elbow_is_left_as_it_is() -> None:
-    assert FINE["wave"].is_well(Body(5.0, right=lift(0.5, 5.0), wave=2.0).joints(), 20.0)
+    assert FINE["wave"].is_well(Body(5.0, right=lift(0.5, 5.0), wave=2.0).joints(), 20.0, FineWish())
 
 
 def test_a_drawn_wave_moves_the_arm_alone_and_keeps_its_bones() -> None:

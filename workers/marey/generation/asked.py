@@ -191,7 +191,7 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if layout.skeleton.name == HUMANML3D.name:
-        if wish.action in FINE and not _shows(features, layout, wish):
+        if wish.action in FINE and not _shows(features, layout, wish, request):
             drawn = drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
             if drawn is not None:
                 features, changes["drawn"] = drawn, wish.action
@@ -300,12 +300,12 @@ def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -
     return SHOWN > mirrored > as_made
 
 
-def _shows(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
+def _shows(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> bool:
     """Return True if a motion shows its small movement well, and as often as it is asked for, by itself."""
     if len(features) < SHORTEST:
         return False
     joints = layout.decode(features)
-    if not FINE[wish.action].is_well(joints.astype(np.float64), layout.fps):
+    if not FINE[wish.action].is_well(joints.astype(np.float64), layout.fps, wish.fine(request)):
         return False
     motion = Motion(joints, layout.fps)
     as_often = wish.count is None or len(REPETITIONS[wish.action](motion)) == wish.count

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.dodging import dodged, dodges_well, kicked_ball
 from marey.generation.fine_wish import FineWish
 from marey.generation.striking import dribbled, punched
 from marey.generation.waving import waved, waves_well
@@ -105,17 +106,23 @@ def trembling(joints: Array, fps: float, wish: FineWish, rng: np.random.Generato
     return moved
 
 
+def never(joints: Array, fps: float, wish: FineWish) -> bool:
+    """Return False: what a network makes of it is never as good."""
+    del joints, fps, wish
+    return False
+
+
 class Fine(NamedTuple):
     """A small movement.
 
     Attributes:
         draw: draws it.
-        is_well: `(joints, fps)`; False if it is to be drawn in a motion that shows its action, too.
+        is_well: `(joints, fps, wish)`; False if it is to be drawn in a motion that shows its action, too.
         sided: it is drawn on the side that the prompt names.
     """
 
     draw: Draw
-    is_well: Callable[[Array, float], bool] = lambda joints, fps: True
+    is_well: Callable[[Array, float, FineWish], bool] = lambda joints, fps, wish: True
     sided: bool = False
 
 
@@ -123,7 +130,9 @@ FINE: Mapping[str, Fine] = {
     "nod": Fine(nodded),
     "shiver": Fine(trembling),
     "wave": Fine(waved, waves_well),
-    "punch": Fine(punched, lambda joints, fps: False, sided=True),  # networks hardly shoot a fist out
-    "dribble": Fine(dribbled, sided=True),
+    "punch": Fine(punched, never, sided=True),
+    "dribble": Fine(dribbled, never, sided=True),
+    "dodge": Fine(dodged, dodges_well, sided=True),
+    "kick-ball": Fine(kicked_ball, sided=True),
 }
 """Small movements by action."""

@@ -33,8 +33,9 @@ DEGREES, HZ = (18.0, 30.0), (1.6, 2.3)
 """To each side, and swings a second, of a swing that is drawn."""
 
 
-def waves_well(joints: Array, fps: float) -> bool:
+def waves_well(joints: Array, fps: float, wish: FineWish) -> bool:
     """Return True if a waving arm swings about its elbow."""
+    del wish
     shares = (_elbow_share(joints, fps, k, begin, end) for k in (0, 1) for begin, end in _lifted(joints, fps, k))
     return max(shares, default=0.0) <= ELBOW_MOVES
 

@@ -1,0 +1,85 @@
+"""Dodges and kicks of a ball that are drawn on a body that stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.generation.dodging import LOWEST, calm, dodges_well
+from marey.generation.fine import drawn_features
+from marey.generation.fine_wish import FineWish
+from marey.motion.features import HUMANML3D_263
+from marey.motion.skeleton import HUMANML3D
+from marey.selector.motion import Motion
+from marey.selector.rules import RULES
+from tests.support.bodies import Body, walker
+
+LAYOUT = HUMANML3D_263
+FPS = LAYOUT.fps
+STANDS = Body(5.0).joints()
+PELVIS, HEAD, FEET = 0, 15, [7, 8, 10, 11]
+
+
+def drawn(action: str, prompt: str, *, side: str = "", count: int | None = None, seed: int = 1) -> np.ndarray:
+    features = drawn_features(LAYOUT.encode(STANDS), LAYOUT, action, FineWish(count, side, prompt), seed)
+    assert features is not None
+    return LAYOUT.decode(features).astype(np.float64)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_head_goes_to_the_side_that_is_named_and_comes_back(side: str) -> None:
+    joints = drawn("dodge", f"slips to the {side}", side=side, count=1)
+    left = (joints[:, HEAD] - joints[0, HEAD])[:, 0]  # of a body that faces +Z
+    far = left.max() if side == "left" else -left.min()
+    assert far > 0.25
+    assert np.abs(left[[0, -1]]).max() < 0.03
+    assert np.abs(joints[:, FEET] - joints[0, FEET]).max() < 0.03
+    assert RULES["dodge"](Motion(joints, FPS), side) >= 0.5
+
+
+def test_a_duck_goes_down_and_stays_off_the_floor() -> None:
+    joints = drawn("dodge", "ducks under a branch", count=1)
+    assert joints[0, HEAD, 1] - joints[:, HEAD, 1].min() > 0.25
+    assert joints[:, PELVIS, 1].min() > LOWEST - 0.05
+    assert RULES["dodge"](Motion(joints, FPS), "") >= 0.5
+
+
+def test_a_body_leans_back_from_a_blow() -> None:
+    joints = drawn("dodge", "leans back", count=1)
+    assert (joints[:, HEAD, 2] - joints[0, HEAD, 2]).min() < -0.2
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_dodges_are_as_many_as_asked_for(count: int) -> None:
+    joints = drawn("dodge", "slips aside", side="left", count=count)
+    away = joints[:, HEAD, 0] - joints[0, HEAD, 0] > 0.15
+    assert np.sum(away[1:] & ~away[:-1]) == count
+
+
+def test_a_dodge_of_the_network_is_kept_where_no_lean_is_asked_for() -> None:
+    assert dodges_well(STANDS, FPS, FineWish(prompt="dodges an attack"))
+    assert not dodges_well(STANDS, FPS, FineWish(prompt="leans out of the way"))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_leg_swings_through_the_ball_and_the_other_one_stands(side: str) -> None:
+    joints = drawn("kick-ball", "kicks a ball", side=side)
+    ankle, other = (HUMANML3D.index(f"{each}_ankle") for each in (("L", "R") if side == "left" else ("R", "L")))
+    way = joints[:, ankle, 2] - joints[0, ankle, 2]
+    assert way.min() < -0.3
+    assert way.max() > 0.4
+    assert way.argmin() < way.argmax()
+    assert np.abs(joints[:, other] - joints[0, other]).max() < 0.05
+    assert RULES["kick-ball"](Motion(joints, FPS), side) >= 0.5
+
+
+def test_a_body_that_walked_stands_in_place() -> None:
+    joints = calm(walker(5.0).astype(np.float64), FPS)
+    assert len(joints) == len(walker(5.0))
+    assert np.abs(joints[:, FEET] - joints[0, FEET]).max() == 0
+    assert np.abs(joints - joints.mean(0)).max() <= 0.03 + 1e-9
+
+
+def test_there_is_no_kick_without_time_for_it() -> None:
+    short = LAYOUT.encode(Body(1.3).joints())
+    assert drawn_features(short, LAYOUT, "kick-ball", FineWish(), 1) is None
