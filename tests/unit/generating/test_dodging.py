@@ -1,15 +1,15 @@
-"""Dodges and kicks of a ball that are drawn on a body that stands."""
+"""Dodges that are drawn on a body that stands."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from marey.generation.dodging import LOWEST, calm, dodges_well
+from marey.generation.calm import calm
+from marey.generation.dodging import LOWEST, dodges_well
 from marey.generation.fine import drawn_features
 from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
-from marey.motion.skeleton import HUMANML3D
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
 from tests.support.bodies import Body, walker
@@ -61,25 +61,8 @@ def test_a_dodge_of_the_network_is_kept_where_no_lean_is_asked_for() -> None:
     assert not dodges_well(STANDS, FPS, FineWish(prompt="leans out of the way"))
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_a_leg_swings_through_the_ball_and_the_other_one_stands(side: str) -> None:
-    joints = drawn("kick-ball", "kicks a ball", side=side)
-    ankle, other = (HUMANML3D.index(f"{each}_ankle") for each in (("L", "R") if side == "left" else ("R", "L")))
-    way = joints[:, ankle, 2] - joints[0, ankle, 2]
-    assert way.min() < -0.3
-    assert way.max() > 0.4
-    assert way.argmin() < way.argmax()
-    assert np.abs(joints[:, other] - joints[0, other]).max() < 0.05
-    assert RULES["kick-ball"](Motion(joints, FPS), side) >= 0.5
-
-
 def test_a_body_that_walked_stands_in_place() -> None:
     joints = calm(walker(5.0).astype(np.float64), FPS)
     assert len(joints) == len(walker(5.0))
     assert np.abs(joints[:, FEET] - joints[0, FEET]).max() == 0
     assert np.abs(joints - joints.mean(0)).max() <= 0.03 + 1e-9
-
-
-def test_there_is_no_kick_without_time_for_it() -> None:
-    short = LAYOUT.encode(Body(1.3).joints())
-    assert drawn_features(short, LAYOUT, "kick-ball", FineWish(), 1) is None

@@ -1,4 +1,4 @@
-"""Punches and dribbles that are drawn on a motion."""
+"""Punches that are drawn on a motion."""
 
 from __future__ import annotations
 
@@ -73,24 +73,11 @@ def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     assert uppercut[:, 1].max() > 0.05
 
 
-@pytest.mark.parametrize("action", ["punch", "dribble"])
-def test_the_feet_stay(action: str) -> None:
-    made = drawn(action)
+def test_the_feet_stay() -> None:
+    made = drawn("punch")
     assert np.abs(made - BEFORE[: len(made)])[:, LEGS].max() < 0.03
 
 
 def test_there_is_no_punch_without_time_for_it() -> None:
     short = LAYOUT.encode(Body(1.3).joints())
     assert drawn_features(short, LAYOUT, "punch", FineWish(None, "", "an uppercut"), 1) is None
-
-
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_a_hand_dribbles_beside_the_hips(side: str) -> None:
-    joints = drawn("dribble", "dribbles", side=side)
-    assert RULES["dribble"](Motion(joints, FPS), side) >= 0.5
-    k = WRISTS[0 if side == "left" else 1]
-    height = joints[:, k, 1]
-    assert 0.15 < np.ptp(height) < 0.35
-    downs = np.sum((np.diff(height)[:-1] < 0) & (np.diff(height)[1:] >= 0))
-    assert 1.3 < downs / (len(joints) / FPS) < 2.1
-    assert np.ptp(joints[:, WRISTS[1 if side == "left" else 0], 1]) < 0.05

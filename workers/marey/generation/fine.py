@@ -1,5 +1,5 @@
 """Movements so small or so short that a tokenizer's codes lose them, drawn on the motion that a network made: nods,
-trembling, waves, punches, dribbles.
+trembling, waves, punches, dodges, balls.
 
 The network gives the body that nods or shivers, where its arms are and how it stands; of the movement itself no code
 keeps 8 degrees of the head, nor 4 mm at 4 Hz (`models/hgm3-open/README.md`, "Tokenizer"). They are drawn as those of
@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.dodging import dodged, dodges_well, kicked_ball
+from marey.generation.ball_games import dribbled, kicked_ball, thrown
+from marey.generation.dodging import dodged, dodges_well
 from marey.generation.fine_wish import FineWish
-from marey.generation.striking import dribbled, punched
+from marey.generation.striking import punched
 from marey.generation.waving import waved, waves_well
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
@@ -134,5 +135,6 @@ FINE: Mapping[str, Fine] = {
     "dribble": Fine(dribbled, never, sided=True),
     "dodge": Fine(dodged, dodges_well, sided=True),
     "kick-ball": Fine(kicked_ball, sided=True),
+    "throw": Fine(thrown, sided=True),
 }
 """Small movements by action."""

@@ -1,8 +1,7 @@
-"""Punches and dribbles, drawn on the body that a network made.
+"""Punches, drawn on the body that a network made.
 
 The network gives the footwork, the stance and the turns of a fight, but its fists seldom go out: a punch lasts three of
-its tokens. The guard and the ways of the fists are drawn with a turn of the trunk; the legs stay. A hand that dribbles
-is drawn likewise.
+its tokens. The guard and the ways of the fists are drawn with a turn of the trunk; the legs stay.
 """
 
 from __future__ import annotations
@@ -82,9 +81,6 @@ _ONE = re.compile(
     r"\b(?:a|an|one|single)\b(?: [\w-]+){0,3} (?:punch|jab|hook|uppercut|cross|blow)\b(?! (?:combo|combination))"
 )
 """Words of a single punch."""
-_DRIBBLE_HZ, _STROKE = (1.5, 1.9), 0.24
-_BALL: Point = (0.10, 0.08, 0.32)
-"""Place of the wrist in the middle of its stroke: outward, up and forward of the hips, metres."""
 
 
 def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
@@ -140,21 +136,3 @@ def _kinds(wish: FineWish, rng: np.random.Generator) -> list[tuple[_Strike, str]
         last = own or wish.side or usual or OTHER_SIDE[last]
         found.append((strike, last))
     return found or [(_STRAIGHT, side) for side in ([wish.side] if wish.side else [LEFT, RIGHT])]
-
-
-def dribbled(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array:
-    """Return joints (T, 22, 3) of a body whose hand goes up and down with a ball; the other arm stays."""
-    side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT]))
-    body, time = StandingBody(joints), np.arange(len(joints)) / fps
-    body.shift(np.full(len(joints), -0.05))
-    body.bow(np.full(len(joints), 14.0), arms_hang=0.9, head=-0.3)
-    phase = 2 * np.pi * (rng.uniform(*_DRIBBLE_HZ) * time + rng.uniform(0.0, 1.0))
-    place = np.tile(_BALL, (len(joints), 1))
-    place[:, 1] += 0.5 * _STROKE * np.cos(phase)
-    hips = body.joints[:, 0]
-    target = body.from_shoulder(side, hips) + place
-    body.move_arm(side, np.ones(len(joints)), *body.reach(side, target, (0.8, -0.6, -0.6)), lag=0.0, straight=True)
-    other = OTHER_SIDE[side]
-    guard = body.from_shoulder(other, hips) + np.array([0.16, 0.16, 0.26])
-    body.move_arm(other, np.full(len(joints), 0.8), *body.reach(other, guard), lag=0.0, straight=True)
-    return body.solved()
