@@ -84,6 +84,7 @@ def test_matrices_of_blocks_are_packed(variant: Generator) -> None:
     assert any(isinstance(each, nn.Linear) for block in blocks for each in block.modules()) == bool(blocks)
     networks.masked.prepare_inference(BatchThreads(1))
     assert not any(isinstance(each, nn.Linear) for block in blocks for each in block.modules())
+    assert all(isinstance(block.gelu, nn.Identity) for block in blocks)  # in the pass before it
 
 
 def test_seed_words_and_length_each_change_the_motion(generator: Generator) -> None:
