@@ -49,6 +49,7 @@ def test_a_transaction_waits_for_answers_as_long_as_its_kind_says(engine: sa.Eng
         driver = conn.connection.driver_connection
         assert isinstance(driver, DeadlineConnection)
         assert driver.limit == kind.answer
+        assert driver.heard_lately()
         row = conn.execute(sa.text("SELECT current_setting('statement_timeout')::interval")).scalar_one()
         assert row.total_seconds() == kind.statement
     with transaction(engine) as conn:

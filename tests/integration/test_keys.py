@@ -37,6 +37,14 @@ def test_a_key_opens_until_it_is_revoked(engine: sa.Engine) -> None:
         assert [row.id for row in list_keys(conn, "default")] == [key.id]
 
 
+def test_a_key_that_is_revoked_again_keeps_the_time_of_the_first(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        key = create_key(conn, "ci", {"read"}).key.id
+        first = revoke_key(conn, "default", key).revoked
+    with transaction(engine) as conn:
+        assert revoke_key(conn, "default", key).revoked == first
+
+
 def test_the_secret_is_stored_nowhere(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
         made = create_key(conn, "ci", {"read"})

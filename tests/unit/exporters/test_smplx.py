@@ -104,6 +104,7 @@ def test_the_file_has_the_keys_that_tools_read(model: Path) -> None:
         assert not file["poses"][:, 66:].any(), "face and fingers are at rest"
         assert (str(file["gender"]), str(file["surface_model_type"])) == ("neutral", "smplx")
         assert file["mocap_frame_rate"] == file["mocap_framerate"] == 30
+        assert file["mocap_time_length"] == pytest.approx(clip.frames / 30)
         assert file["betas"].shape == (16,)
     assert data == exporter_of("smplx").write(clip, Coordinates(rig=str(model)))
 

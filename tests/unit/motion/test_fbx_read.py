@@ -233,3 +233,12 @@ def test_a_packed_array_takes_no_more_room_than_it_claims() -> None:
     large = fbx_parse.Packed("l", 2**31, True, memoryview(bomb))
     with pytest.raises(TooLarge):
         file.array(fbx_parse.ReadNode("KeyTime", [large], []), "l", most=2**32)
+
+
+@pytest.mark.parametrize(
+    ("settings", "fps"),
+    [({}, 30.0), ({"TimeMode": 8}, 30000 / 1001), ({"TimeMode": 11}, 24.0), ({"TimeMode": 7}, 30.0),
+     ({"TimeMode": 14, "CustomFrameRate": 12.5}, 12.5)],
+)  # fmt: skip
+def test_the_rate_is_that_of_the_time_mode(settings: dict[str, float], fps: float) -> None:
+    assert read_scene(scene_file([("a", -1, {})], settings), "a.fbx").fps == pytest.approx(fps)

@@ -173,6 +173,11 @@ def test_feet_stand_where_they_are_slow_and_low():
     assert SNAPMOGEN_296.contacts(standing).all()
     sliding = root + np.arange(20)[:, None] * np.array([0.0, 0.0, 0.0034])  # 0.34 squared is over 0.11
     assert not SNAPMOGEN_296.contacts(SNAPMOGEN_296.encode_pose(rotations, sliding)).any()
+    leg = np.tile(rotations[:1], (20, 1, 1))
+    leg[10:, SNAPMOGEN.index("L_legUpper0001_bind_JNT")] = about("X", -1.2)  # held up from frame 10 on
+    later = SNAPMOGEN_296.contacts(SNAPMOGEN_296.encode_pose(leg, root))
+    assert later[:8].all()
+    assert not later[11:, :2].any()
     turned = rotations.copy()
     turned[:, SNAPMOGEN.index("L_legUpper0001_bind_JNT")] = about("X", -1.2)  # the left leg is held up
     contacts = SNAPMOGEN_296.contacts(SNAPMOGEN_296.encode_pose(turned, root))
