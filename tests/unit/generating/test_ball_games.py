@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.generation.ball_games import kicks_well
 from marey.generation.fine import drawn_features
 from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
@@ -69,3 +70,8 @@ def test_an_arm_throws_from_behind_the_shoulder_and_the_feet_stay(side: str) -> 
 def test_nothing_is_drawn_without_time_for_it(action: str) -> None:
     short = LAYOUT.encode(Body(1.3).joints())
     assert drawn_features(short, LAYOUT, action, FineWish(), 1) is None
+
+
+def test_a_kick_of_the_network_is_kept_where_a_run_up_is_asked_for() -> None:
+    assert kicks_well(STANDS, FPS, FineWish(prompt="runs up and kicks the ball"))
+    assert not kicks_well(STANDS, FPS, FineWish(prompt="a footballer takes a penalty"))

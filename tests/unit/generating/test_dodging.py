@@ -56,9 +56,9 @@ def test_dodges_are_as_many_as_asked_for(count: int) -> None:
     assert np.sum(away[1:] & ~away[:-1]) == count
 
 
-def test_a_dodge_of_the_network_is_kept_where_no_lean_is_asked_for() -> None:
-    assert dodges_well(STANDS, FPS, FineWish(prompt="dodges an attack"))
-    assert not dodges_well(STANDS, FPS, FineWish(prompt="leans out of the way"))
+def test_a_dodge_of_the_network_is_kept_where_the_feet_leave_their_place() -> None:
+    assert dodges_well(STANDS, FPS, FineWish(prompt="jumps aside"))
+    assert not dodges_well(STANDS, FPS, FineWish(prompt="dodges an attack"))
 
 
 def test_a_body_that_walked_stands_in_place() -> None:

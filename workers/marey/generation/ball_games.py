@@ -7,6 +7,8 @@ as in the calmest second of the motion.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +27,8 @@ KICK_S = (0.34, 0.13, 0.13, 0.65)
 """Seconds in which the leg of a ball's kick goes back, comes through the ball, follows through, and steps down."""
 KICK_WAY = ((0.0, 0.0, 0.0), (0.02, 0.32, -0.44), (0.0, 0.06, 0.16), (-0.04, 0.40, 0.60), (0.0, 0.0, 0.0))
 """Places of the ankle meanwhile: outward, up and forward of where it stands, metres."""
+_RUNS_UP = re.compile(r"\b(?:run|ran|jog|sprint|approach|step|charg|walk|dribbl)")
+"""Words of what comes before a kick of a ball."""
 THROW_S = (0.5, 0.12, 0.14, 0.2, 0.75)
 """Seconds in which the hand of a throw goes back, stays there, comes ahead, follows through and comes down."""
 THROW_WAY: tuple[Point, ...] = (
@@ -52,6 +56,12 @@ def dribbled(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator
     guard = body.from_shoulder(other, hips) + np.array([0.16, 0.16, 0.26])
     body.move_arm(other, np.full(len(joints), 0.8), *body.reach(other, guard), lag=0.0, straight=True)
     return body.solved()
+
+
+def kicks_well(joints: Array, fps: float, wish: FineWish) -> bool:
+    """Return True if a run-up is asked for, which is not drawn."""
+    del joints, fps
+    return bool(_RUNS_UP.search(wish.prompt.lower()))
 
 
 def kicked_ball(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:

@@ -24,8 +24,8 @@ FIRST_S, PAUSE_S = (0.5, 0.9), (0.7, 1.3)
 """Seconds before the first dodge, and between two."""
 _DUCKS = re.compile(r"\b(?:ducks?|ducking|ducked|crouch\w*|under|below)\b")
 _BACK = re.compile(r"\b(?:back|backwards?|away from)\b")
-_LEANS = re.compile(r"\b(?:duck|lean|slip|weav|bob|sway|head|tilt)")
-"""Words of dodges in which the feet stay."""
+_SPRINGS = re.compile(r"\b(?:hop|jump|leap|spr[iau]ng|dash|div|roll|step|skip|run|rush|scurr)")
+"""Words of dodges in which the feet leave their place."""
 ASIDE, BACK, DOWN = (0.13, 30.0), (0.10, 26.0), (0.24, 24.0)
 """Metres that the hips go, and degrees that the trunk leans: to a side, back, and down."""
 LOWEST = 0.56
@@ -35,9 +35,9 @@ READY, COVERS = (0.14, -0.22, 0.24), (0.11, -0.10, 0.26)
 
 
 def dodges_well(joints: Array, fps: float, wish: FineWish) -> bool:
-    """Return True if a dodge of the network is as good as one that is drawn: no lean is asked for, nor a duck."""
+    """Return True if the feet are to leave their place, which is not drawn."""
     del joints, fps
-    return not _LEANS.search(wish.prompt.lower())
+    return bool(_SPRINGS.search(wish.prompt.lower()))
 
 
 def dodged(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.ball_games import dribbled, kicked_ball, thrown
+from marey.generation.ball_games import dribbled, kicked_ball, kicks_well, thrown
 from marey.generation.dodging import dodged, dodges_well
 from marey.generation.fine_wish import FineWish
 from marey.generation.striking import punched
@@ -134,7 +134,7 @@ FINE: Mapping[str, Fine] = {
     "punch": Fine(punched, never, sided=True),
     "dribble": Fine(dribbled, never, sided=True),
     "dodge": Fine(dodged, dodges_well, sided=True),
-    "kick-ball": Fine(kicked_ball, sided=True),
+    "kick-ball": Fine(kicked_ball, kicks_well, sided=True),
     "throw": Fine(thrown, sided=True),
 }
 """Small movements by action."""
