@@ -114,13 +114,14 @@ def with_steps(stands: Bool, carried: Array, toes: Array, fps: float) -> tuple[B
     stands, lifts = stands.copy(), np.zeros(stands.shape)
     pushed = np.cumsum(np.linalg.norm(carried_on(carried, toes), axis=-1), axis=0)
     swing, period = max(round(STEP_S * fps), 3), round(2 * STEP_EVERY_S * fps)
+    beside = min(swing // 2, period // 2 - swing)  # the steps of the other foot are no nearer
     last = [0.0, 0.0]
     for begin in range(swing, len(stands) - swing, 1):
         side = (begin // (period // 2)) % 2
         if begin % (period // 2) or begin + 2 * swing > len(stands):
             continue
         window = slice(begin, begin + swing)
-        wide = slice(begin - swing // 2, begin + swing + swing // 2)
+        wide = slice(begin - beside, begin + swing + beside)
         far = pushed[min(begin + period // 2, len(stands) - 1), side] - last[side]
         if not stands[wide, side].all():
             last[side] = pushed[begin, side]
