@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import io
 import json
 import logging
 import secrets
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,8 @@ FOLDER = "vectors"
 """Of the home. Its files can be removed at any time."""
 LARGEST = 64 * 2**20
 """Bytes of a file that is read."""
+WAIT_S, TICK = 30.0, 0.05
+"""Seconds for which a process waits for another one that makes the same vectors, and between two looks."""
 
 
 class KeptVectors:
@@ -35,21 +40,39 @@ class KeptVectors:
     def get(self, texts: Sequence[str], make: Callable[[Sequence[str]], NDArray[np.float32]]) -> NDArray[np.float32]:
         """Return the vectors (N, W) of N texts from their file, or make and keep them.
 
-        A damaged file is made anew. A home that cannot be written keeps nothing, which the log says.
+        A damaged file is made anew, by one process while the others wait. A home that cannot be written keeps nothing,
+        which the log says.
         """
         path = self._home / FOLDER / f"{self._name(texts)}.npy"
-        if (found := _read(path, len(texts))) is not None:
-            return found
-        vectors = make(texts)
+        if (vectors := _read(path, len(texts))) is not None:
+            return vectors
         try:
-            self._write(path, vectors)
+            with self._alone(path.with_suffix(".lock")):
+                if (vectors := _read(path, len(texts))) is None:
+                    vectors = make(texts)
+                    self._write(path, vectors)
         except OSError as error:
             log.info("the vectors of %d texts are not kept: %s", len(texts), error)
-        return vectors
+        return make(texts) if vectors is None else vectors
 
-    def _write(self, path: Path, vectors: NDArray[np.float32]) -> None:
+    @contextmanager
+    def _alone(self, path: Path) -> Iterator[None]:
+        """Hold a lock that the other processes of this home wait for, but none for ever."""
         for folder in (self._home, path.parent):
             folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+        ends = time.monotonic() + WAIT_S
+        with open_private(path, "a") as file:
+            while True:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    if time.monotonic() >= ends:
+                        break
+                    time.sleep(TICK)
+            yield
+
+    def _write(self, path: Path, vectors: NDArray[np.float32]) -> None:
         part = path.with_name(f".{secrets.token_hex(8)}.part")
         try:
             with open_private(part, "xb") as file:

@@ -1,8 +1,11 @@
 """Vectors of fixed texts are made once and kept in the home."""
 
+import fcntl
 import logging
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -32,7 +35,7 @@ def test_vectors_are_made_once(tmp_path: Path) -> None:
     second = KeptVectors(tmp_path, "encoder").get(TEXTS, make)
     assert make.asked == 2
     assert first.tobytes() == second.tobytes()
-    assert [path.stat().st_mode & 0o077 for path in tmp_path.rglob("*")] == [0, 0]
+    assert not any(path.stat().st_mode & 0o077 for path in tmp_path.rglob("*"))
 
 
 @pytest.mark.parametrize(("encoder", "texts"), [("another", TEXTS), ("encoder", TEXTS[::-1])])
@@ -47,11 +50,11 @@ def test_other_texts_and_encoders_have_vectors_of_their_own(tmp_path: Path, enco
 def test_a_damaged_file_is_made_anew(tmp_path: Path, content: str) -> None:
     make = Maker()
     KeptVectors(tmp_path, "encoder").get(TEXTS, make)
-    (path,) = (tmp_path / "vectors").iterdir()
+    (path,) = (tmp_path / "vectors").glob("*.npy")
     _damage(path, content)
     assert KeptVectors(tmp_path, "encoder").get(TEXTS, make)[0, 1] == 4
     assert KeptVectors(tmp_path, "encoder").get(TEXTS, make)[0, 1] == 4
-    assert [path] == list((tmp_path / "vectors").iterdir())
+    assert {path, path.with_suffix(".lock")} == set((tmp_path / "vectors").iterdir())
 
 
 def _damage(path: Path, how: str) -> None:
@@ -75,6 +78,35 @@ def test_a_home_that_cannot_be_written_keeps_nothing(tmp_path: Path, caplog: pyt
     with caplog.at_level(logging.INFO):
         assert len(KeptVectors(tmp_path, "encoder").get(TEXTS, make)) == 2
     assert "are not kept" in caplog.text
+    assert make.asked == 2
+
+
+def test_one_makes_the_vectors_and_the_others_wait_for_them(tmp_path: Path) -> None:
+    make, begun, go_on = Maker(), Event(), Event()
+
+    def slowly(texts: Sequence[str]) -> NDArray[np.float32]:
+        begun.set()
+        assert go_on.wait(60)
+        return make(texts)
+
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(KeptVectors(tmp_path, "encoder").get, TEXTS, slowly)
+        assert begun.wait(60)
+        second = pool.submit(KeptVectors(tmp_path, "encoder").get, TEXTS, make)
+        assert not wait([second], 0.3).done
+        go_on.set()
+        assert first.result(60).tobytes() == second.result(60).tobytes()
+    assert make.asked == 2
+
+
+def test_none_waits_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    KeptVectors(tmp_path, "encoder").get(TEXTS, Maker())
+    (path,) = (tmp_path / "vectors").glob("*.npy")
+    path.unlink()
+    monkeypatch.setattr("marey.text.kept_vectors.WAIT_S", 0.2)
+    with path.with_suffix(".lock").open("a") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert len(KeptVectors(tmp_path, "encoder").get(TEXTS, Maker())) == 2
 
 
 def test_a_judge_encodes_the_phrases_of_the_vocabulary_once(tmp_path: Path) -> None:
