@@ -9,7 +9,7 @@ import json
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -56,7 +56,7 @@ class KeptVectors:
         return make(texts) if vectors is None else vectors
 
     @contextmanager
-    def _alone(self, path: Path) -> Iterator[None]:
+    def _alone(self, path: Path) -> Generator[None]:
         """Hold a lock that the other processes of this home wait for, but none for ever."""
         for folder in (self._home, path.parent):
             folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
