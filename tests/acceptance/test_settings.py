@@ -75,7 +75,8 @@ def test_an_interrupted_demo_ends_like_any_command(tmp_path: Path) -> None:
     demo = _demo(tmp_path)
     demo.send_signal(signal.SIGINT)
     said = demo.communicate(timeout=120)[1].decode()
-    assert demo.returncode == 130, said
+    # Python ends itself by the signal where that comes while a text is compiled; a shell says 130 of both.
+    assert demo.returncode in (130, -signal.SIGINT), said
     assert "make demo: interrupted" in said
     assert "Traceback" not in said
     _wait_for_servers(tmp_path, 0)
