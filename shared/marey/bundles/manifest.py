@@ -186,12 +186,16 @@ class BundleManifest(_Frozen):
             raise ValueError(f"{reserved[0]} cannot be a file with a hash")
         return self
 
+    @property
+    def draws_bearings(self) -> bool:
+        """Return True if bearings are drawn: where prompts are read behind their plain action, without these words."""
+        return self.text is not None and self.text.plain_action
+
     @model_validator(mode="after")
     def _with_bearings(self) -> Self:
-        """Say in the lists of actions whether bearings are drawn: where prompts are read behind their plain action."""
+        """Say in the lists of actions whether bearings are drawn."""
         if self.actions is not None:
-            drawn = self.text is not None and self.text.plain_action
-            object.__setattr__(self, "actions", replace(self.actions, drawn=drawn))
+            object.__setattr__(self, "actions", replace(self.actions, drawn=self.draws_bearings))
         return self
 
     @field_serializer("actions", mode="wrap")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -24,9 +25,11 @@ def asked(generator: Any, prompt: str, rewritten: str = "a person stands upright
 
 
 class _Short:
-    """A generator that gives every motion two seconds."""
+    """A generator that gives every motion two seconds; bearings are drawn on its motions, or not."""
 
-    def __init__(self, generator: Any) -> None:
+    def __init__(self, generator: Any, *, draws: bool = True) -> None:
+        text = generator.bundle.manifest.text.model_copy(update={"plain_action": draws})
+        self.bundle = SimpleNamespace(manifest=generator.bundle.manifest.model_copy(update={"text": text}))
         self.limits = generator.limits
 
     def resolve_length(self, request: Request) -> Request:
@@ -45,6 +48,12 @@ def test_work_and_gestures_have_the_time_that_they_take(generator: Any) -> None:
     assert seconds("a man shrugs") + 2 < seconds("a man shrugs and salutes") < 8
     assert resolve_request(generator, asked(generator, "a man sweeps the floor")).frames >= WORK_S * fps
     assert resolve_request(generator, asked(generator, "a man sweeps the floor")).open
+
+
+def test_a_model_that_reads_the_words_of_a_gesture_decides_how_long_it_takes(generator: Any) -> None:
+    short: Any = _Short(generator, draws=False)
+    for prompt in ("a man sweeps the floor", "a man swings a golf club"):
+        assert resolved_length(short, asked(generator, prompt)).frames == 2 * generator.limits.fps
 
 
 def test_a_length_that_is_asked_for_stays(generator: Any) -> None:

@@ -77,8 +77,7 @@ def finish(
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
     layout, features = generator.layout, generated.features
-    text = generator.bundle.manifest.text
-    drawn = text is not None and text.plain_action  # bearings are left out of what the model reads
+    drawn = generator.bundle.manifest.draws_bearings
     spans = borne_spans(request, layout.fps, len(features)) if drawn else []
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
     manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)

@@ -23,7 +23,7 @@ def resolved_length(generator: Generator[Any], request: Request) -> Request:
         InvalidInput: as `Limits.check`.
     """
     resolved = generator.resolve_length(request)
-    if request.frames is not None or resolved.frames is None:
+    if request.frames is not None or resolved.frames is None or not generator.bundle.manifest.draws_bearings:
         return resolved
     limits = generator.limits
     return replace(resolved, frames=limits.within(max(resolved.frames, round(_least(request.text) * limits.fps))))
@@ -31,7 +31,9 @@ def resolved_length(generator: Generator[Any], request: Request) -> Request:
 
 def _least(text: TextFeatures) -> float:
     """Return the seconds that the bearings of a text take that are done, one gesture after the other."""
-    done = [each.bearing for each in fitting(stated_bearings(text.prompt), action_of(text))]
+    if not (stated := stated_bearings(text.prompt)):
+        return 0.0  # most prompts: their action need not be read
+    done = [each.bearing for each in fitting(stated, action_of(text))]
     gestures = [_seconds(bearing) for bearing in done if bearing.gesture]
     return max([sum(gestures), *(WORK_S for bearing in done if bearing.work)])
 
