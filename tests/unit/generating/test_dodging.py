@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from marey.generation.calm import calm
 from marey.generation.dodging import LOWEST, dodges_well
-from marey.generation.fine import drawn_features
 from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
 from tests.support.bodies import Body, walker
+from tests.support.drawn_motions import drawn_on
 
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
@@ -20,10 +22,7 @@ STANDS = Body(5.0).joints()
 PELVIS, HEAD, FEET = 0, 15, [7, 8, 10, 11]
 
 
-def drawn(action: str, prompt: str, *, side: str = "", count: int | None = None, seed: int = 1) -> np.ndarray:
-    features = drawn_features(LAYOUT.encode(STANDS), LAYOUT, action, FineWish(count, side, prompt), seed)
-    assert features is not None
-    return LAYOUT.decode(features).astype(np.float64)
+drawn = partial(drawn_on, STANDS)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

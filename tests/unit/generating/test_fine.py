@@ -16,6 +16,7 @@ from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES
 from tests.support.bodies import Body, lift
+from tests.support.drawn_motions import drawn_on
 
 LAYOUT = HUMANML3D_263
 
@@ -26,9 +27,7 @@ RAISED = Body(5.0, right=lift(0.5, 5.0))
 
 def drawn(action: str, body: Body | None = None, count: int | None = None, seed: int = 1) -> np.ndarray[Any, Any]:
     body = body or (RAISED if action == "wave" else Body(5.0))
-    features = drawn_features(LAYOUT.encode(body.joints()), LAYOUT, action, FineWish(count), seed)
-    assert features is not None
-    return LAYOUT.decode(features)
+    return drawn_on(body.joints(), action, count=count, seed=seed)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES
 from tests.support.bodies import Body
+from tests.support.drawn_motions import drawn_on
 
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
@@ -21,10 +24,7 @@ LEGS = [HUMANML3D.index(f"{side}_{joint}") for side in "LR" for joint in ("ankle
 SHOULDERS, WRISTS = [16, 17], [20, 21]
 
 
-def drawn(action: str, prompt: str = "", *, count: int | None = None, side: str = "", seed: int = 1) -> np.ndarray:
-    features = drawn_features(LAYOUT.encode(BEFORE), LAYOUT, action, FineWish(count, side, prompt), seed)
-    assert features is not None
-    return LAYOUT.decode(features).astype(np.float64)
+drawn = partial(drawn_on, BEFORE)
 
 
 def hands(joints: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import smooth
 from marey.generation.calm import calm
 from marey.generation.fine_wish import FineWish
-from marey.posing.standing import ARMS, LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased
+from marey.posing.standing import ARMS, LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
 
 Array = NDArray[np.floating]
 Point = tuple[float, float, float]
@@ -23,6 +23,8 @@ Point = tuple[float, float, float]
 _DRIBBLE_HZ, _STROKE = (1.5, 1.9), 0.24
 _BALL: Point = (0.10, 0.08, 0.32)
 """Place of the wrist in the middle of its stroke: outward, up and forward of the hips, metres."""
+SPARE_S = 0.4
+"""Seconds beside a kick or a throw, at least."""
 KICK_S = (0.34, 0.13, 0.13, 0.65)
 """Seconds in which the leg of a ball's kick goes back, comes through the ball, follows through, and steps down."""
 KICK_WAY = ((0.0, 0.0, 0.0), (0.02, 0.32, -0.44), (0.0, 0.06, 0.16), (-0.04, 0.40, 0.60), (0.0, 0.0, 0.0))
@@ -58,6 +60,30 @@ def dribbled(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator
     return body.solved()
 
 
+def _begun(
+    joints: Array,
+    fps: float,
+    wish: FineWish,
+    rng: np.random.Generator,
+    parts: tuple[float, ...],
+    early: tuple[float, float],
+) -> tuple[str, StandingBody, Array, Array] | None:
+    """Return the side that acts, a body that stands, the time of its frames and when each part of its movement begins
+    and the last one ends; None if there is no time for it.
+
+    Args:
+        parts: seconds of each part.
+        early: range of the share of the other seconds that comes before.
+    """
+    left = len(joints) / fps - sum(parts)
+    if left < SPARE_S:
+        return None
+    side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT, RIGHT]))
+    start = float(rng.uniform(*early)) * left
+    times = start + np.concatenate([[0.0], np.cumsum(parts)])
+    return side, StandingBody(calm(joints, fps)), np.arange(len(joints)) / fps, times
+
+
 def kicks_well(joints: Array, fps: float, wish: FineWish) -> bool:
     """Return True if a run-up is asked for, which is not drawn."""
     del joints, fps
@@ -66,18 +92,14 @@ def kicks_well(joints: Array, fps: float, wish: FineWish) -> bool:
 
 def kicked_ball(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
     """Return joints (T, 22, 3) of a body that stands and kicks a ball; None if there is no time for it."""
-    total, seconds = sum(KICK_S), len(joints) / fps
-    if seconds < total + 0.4:
+    begun = _begun(joints, fps, wish, rng, KICK_S, (0.2, 0.45))
+    if begun is None:
         return None
-    side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT, RIGHT]))
-    body, time = StandingBody(calm(joints, fps)), np.arange(len(joints)) / fps
-    start = float(rng.uniform(0.2, 0.45)) * (seconds - total)
-    times = start + np.concatenate([[0.0], np.cumsum(KICK_S)])
-    place = np.stack([np.interp(time, times, each) for each in np.array(KICK_WAY).T], axis=-1)
-    place = smooth(place, 0.035, fps)
-    winds, strikes, ends = times[1], times[3], times[4]
-    trunk = np.interp(time, [start, winds, strikes, ends], [0.0, 12.0, -10.0, 0.0])
-    swing = np.interp(time, [start, winds, strikes, ends], [0.0, -1.0, 1.0, 0.0])
+    side, body, time, times = begun
+    place = smooth(way_through(time, times, KICK_WAY), 0.035, fps)
+    turns = times[[0, 1, 3, 4]]  # it begins, is wound up, has struck, has ended
+    trunk = way_through(time, turns, (0.0, 12.0, -10.0, 0.0))
+    swing = way_through(time, turns, (0.0, -1.0, 1.0, 0.0))
     on = _on(time, times)
     body.shift(-0.04 * on, left=-0.06 * SIGN[side] * on)
     body.lean(smooth(trunk, 0.05, fps), "left")
@@ -93,18 +115,15 @@ def kicked_ball(joints: Array, fps: float, wish: FineWish, rng: np.random.Genera
 
 def thrown(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
     """Return joints (T, 22, 3) of a body that stands and throws; None if there is no time for it."""
-    total, seconds = sum(THROW_S), len(joints) / fps
-    if seconds < total + 0.4:
+    begun = _begun(joints, fps, wish, rng, THROW_S, (0.25, 0.5))
+    if begun is None:
         return None
-    side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT, RIGHT]))
-    body, time = StandingBody(calm(joints, fps)), np.arange(len(joints)) / fps
-    start = float(rng.uniform(0.25, 0.5)) * (seconds - total)
-    times = start + np.concatenate([[0.0], np.cumsum(THROW_S)])
-    twist, trunk = (smooth(np.interp(time, times, each), 0.04, fps) for each in (THROW_TWIST, THROW_TRUNK))
+    side, body, time, times = begun
+    twist, trunk = (smooth(way_through(time, times, each), 0.04, fps) for each in (THROW_TWIST, THROW_TRUNK))
     body.lean(SIGN[side] * twist, "up")
     body.lean(trunk, "left")
     body.shift(-0.03 * _on(time, times), forward=0.002 * trunk)
-    place = smooth(np.stack([np.interp(time, times, each) for each in np.array(THROW_WAY).T], axis=-1), 0.025, fps)
+    place = smooth(way_through(time, times, THROW_WAY), 0.025, fps)
     way = eased((time - times[0] + 0.4) / 0.4) * (1 - eased((time - times[-1]) / 0.4))
     body.move_arm(side, way, *body.reach(side, place, (0.9, -0.2, -0.4)), lag=0.0, straight=True)
     ahead = np.array([0.08, -0.06, 0.42]) + _after(time, times)[:, None] * np.array([0.14, -0.30, -0.34])

@@ -23,7 +23,7 @@ from marey.generation.port import MotionFeatures, Request
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope
+from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import DRAWN_AS, ArmPose, Bearing, Keys, StatedBearing, Vector, load_bearings
 
@@ -294,11 +294,9 @@ class _Drawing:
         frames = len(self._time)
         if not values or self._bearing.keys is None:
             return np.zeros(frames)
-        times, through = np.array(self._bearing.keys.times), np.array(values, np.float64)
-        since = self._pace * self._since()
+        times, since = self._bearing.keys.times, self._pace * self._since()
         at = np.minimum(since, times[-1]) if self._bearing.gesture else (since + self._begins) % times[-1]
-        columns = [smooth(np.interp(at, times, each), KEYED_S, self._fps) for each in through.reshape(len(times), -1).T]
-        return columns[0] if through.ndim == 1 else np.stack(columns, axis=-1)
+        return smooth(way_through(at, times, values), KEYED_S, self._fps)
 
     def _since(self) -> Array:
         """Return seconds (T,): of a gesture since the hand came to its place, else since the beginning."""

@@ -137,4 +137,4 @@ FINE: Mapping[str, Fine] = {
     "kick-ball": Fine(kicked_ball, kicks_well, sided=True),
     "throw": Fine(thrown, sided=True),
 }
-"""Small movements by action."""
+"""Small and sudden movements by action."""

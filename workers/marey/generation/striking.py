@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.generation.fine_wish import FineWish
-from marey.posing.standing import ARMS, LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased
+from marey.posing.standing import ARMS, LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
 
 Array = NDArray[np.floating]
 Point = tuple[float, float, float]
@@ -96,10 +96,10 @@ def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator)
     elbows = {side: np.tile(ELBOW, (len(joints), 1)) for side in ARMS}
     for start, strike, side in strikes:
         inside = (time >= start) & (time < start + strike.seconds)
-        points = np.array([GUARD[side], *strike.way, GUARD[side]])
+        points = [GUARD[side], *strike.way, GUARD[side]]
         since = time[inside] - start
-        ways[side][inside] = np.stack([np.interp(since, strike.times, each) for each in points.T], axis=-1)
-        twist[inside] -= SIGN[side] * np.interp(since, strike.times, strike.twist)
+        ways[side][inside] = way_through(since, strike.times, points)
+        twist[inside] -= SIGN[side] * way_through(since, strike.times, strike.twist)
         lifted = eased(np.minimum(since, strike.seconds - since) / 0.12)[:, None]
         elbows[side][inside] = (1 - lifted) * np.array(ELBOW) + lifted * np.array(strike.elbow)
     body.lean(smooth(twist, SMOOTH_S, fps), "up")

@@ -276,6 +276,22 @@ def stations(frames: int, times: Sequence[float], points: Array | Sequence[Seque
     return (1 - w) * through[k] + w * through[k + 1]
 
 
+def way_through(t: Array, times: Sequence[float] | Array, points: Sequence[float] | Sequence[Sequence[float]]) -> Array:
+    """Numbers (T,), or path (T, K), in straight lines through points (n,) or (n, K); ends are held.
+
+    Unlike `stations` it stops nowhere; callers smooth it.
+
+    Args:
+        t: (T,) seconds.
+        times: (n,) seconds of the points, increasing.
+        points: what is passed.
+    """
+    through = np.asarray(points, np.float64)
+    if through.ndim == 1:
+        return np.interp(t, times, through)
+    return np.stack([np.interp(t, times, each) for each in through.T], axis=-1)
+
+
 def tremble(frames: int, rate: float, phase: float) -> Array:
     """Oscillation (frames,) between -1 and 1 of about `rate` per second, unsteady in pace and strength.
 
