@@ -16,7 +16,9 @@ import httpx2
 import psutil
 
 from benchmarks.platform import BUNDLE, Platform, marey, platform, processor_seconds
-from marey.client.fetching import PARALLEL, Download, plan
+from marey.client.downloads import PARALLEL
+from marey.client.fetching import plan
+from marey.client.file_to_fetch import FileToFetch
 from marey.db import transaction
 from marey.jobs import (
     AssetDigest,
@@ -91,13 +93,13 @@ def _fetch(cluster: Platform, job: str, folder: Path) -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _bare(cluster: Platform, files: Sequence[Download], folder: Path, threads: int) -> float:
+def _bare(cluster: Platform, files: Sequence[FileToFetch], folder: Path, threads: int) -> float:
     """Processor seconds of the loop, in this process: nothing is checked, resumed or flushed to the disk."""
     before = time.process_time()
     headers = {"Authorization": f"Bearer {cluster.key}"}
     with httpx2.Client(base_url=cluster.url, headers=headers) as client, ThreadPoolExecutor(threads) as pool:
 
-        def one(file: Download) -> None:
+        def one(file: FileToFetch) -> None:
             answer = client.get(file.url)
             assert answer.status_code == 200
             (folder / file.path.name).write_bytes(answer.content)

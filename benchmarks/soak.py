@@ -25,7 +25,8 @@ from cryptography.fernet import Fernet
 
 from benchmarks.platform import BUNDLE, Platform, platform
 from benchmarks.trend import Trend, fit
-from marey.client.fetching import download_all, plan
+from marey.client.downloads import download_all
+from marey.client.fetching import plan
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, MareyError
 from marey.db import transaction

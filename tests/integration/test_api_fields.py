@@ -64,6 +64,7 @@ def test_of_a_body_that_cannot_be_read_the_body_is_named(http: httpx2.Client, pa
     ("method", "path"),
     [
         *(("POST", path) for path in WITH_BODY),
+        ("POST", "/v1/motions/files"),
         ("POST", "/v1/motions/review"),
         ("POST", "/v1/motions/reroll"),
         ("POST", f"/v1/motions/{NOBODY}/edits"),
@@ -88,6 +89,10 @@ def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> Non
 @pytest.mark.parametrize(
     ("method", "path", "sent", "field", "message"),
     [
+        (
+            *("POST", "/v1/motions/files", {"motions": [NOBODY], "formats": ["../x"]}, "formats.0"),
+            "'../x' cannot be used: allowed are names of formats, as npz, bvh, glb or mp4",
+        ),
         ("POST", "/v1/motions/review", {"motions": [], "verdict": "kept"}, "motions", "is empty"),
         ("POST", "/v1/motions/review", {"motions": ["walk"], "verdict": None}, "motions.0", f"'walk' is not {AN_ID}"),
         (

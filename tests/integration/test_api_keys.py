@@ -25,6 +25,7 @@ OTHERS = {
     "GET /metrics": "metrics",
     "POST /v1/texts/parse": "read",
     "POST /v1/jobs": "submit",
+    "POST /v1/motions/files": "read",
     "POST /v1/motions/review": "submit",
     "POST /v1/motions/reroll": "submit",
     "POST /v1/motions/{motion}/edits": "submit",

@@ -14,7 +14,7 @@ from pydantic import SecretStr
 
 from marey.api.making import maker
 from marey.client import Client
-from marey.client.fetching import ATTEMPTS, download_all
+from marey.client.downloads import ATTEMPTS, download_all
 from marey.client.file_to_fetch import FileToFetch
 from marey.core.errors import InvalidInput, Unreachable
 from marey.core.hashing import sha256_of

@@ -54,6 +54,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "PATCH /v1/webhooks/{webhook}": {"name": "another"},
     "PATCH /v1/jobs/{job}": {"priority": 5, "comment": "x"},
     "PATCH /v1/schedules/{schedule}": {"paused": True},
+    "POST /v1/motions/files": {"motions": ["<motion>"], "formats": ["npz"]},
     "POST /v1/motions/review": {"motions": ["<motion>"], "verdict": "kept"},
     "POST /v1/motions/reroll": {"motions": ["<motion>"]},
     "POST /v1/motions/{motion}/edits": {"ops": [{"op": "mirror"}]},

@@ -6,7 +6,7 @@ import threading
 import time
 from pathlib import Path
 
-from marey.client.fetching import download_all
+from marey.client.downloads import download_all
 from marey.client.file_to_fetch import FileToFetch
 from marey.client.server_address import Server
 from marey.client.stream_socket import Link

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated
 
-from fastapi import Depends, Security
+from fastapi import Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
 from starlette.requests import HTTPConnection
 
@@ -20,17 +20,15 @@ METRICS = "metrics"
 bearer = HTTPBearer(auto_error=False, description="An API key: `marey admin keys create`.")
 
 
-def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials | None, Security(bearer)]) -> ApiKey:
-    """Return the key of a request.
+Credentials = Annotated[HTTPAuthorizationCredentials | None, Security(bearer)]
+
+
+def authenticated(shared: Context, secret: str | None) -> ApiKey:
+    """Return the key of this secret.
 
     Raises:
         Unauthenticated: no key, or an invalid one.
     """
-    return authenticated(shared, None if credentials is None else credentials.credentials)
-
-
-def authenticated(shared: Context, secret: str | None) -> ApiKey:
-    """Return the key of this secret; raises as `caller`."""
     if not secret:
         raise no_key()
     with transaction(shared.engine) as conn:
@@ -61,15 +59,15 @@ def check_scope(key: ApiKey, scope: str) -> None:
         raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
 
 
-def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiKey, SecurityScopes], ApiKey]:
+def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, Credentials, SecurityScopes], ApiKey]:
     """Return a dependency: the caller's key, authorized for the scopes that the route's `Security` names.
 
-    The OpenAPI document lists the scopes, too.
+    The OpenAPI document lists the scopes, too. One dependency looks the key up and authorizes it: each costs a change
+    of threads.
     """
 
-    def check(
-        asked: HTTPConnection, shared: Shared, key: Annotated[ApiKey, Depends(caller)], wanted: SecurityScopes
-    ) -> ApiKey:
+    def check(asked: HTTPConnection, shared: Shared, credentials: Credentials, wanted: SecurityScopes) -> ApiKey:
+        key = authenticated(shared, None if credentials is None else credentials.credentials)
         for scope in wanted.scopes:
             authorize(shared, key, scope, kind)
         check_query(asked)  # only now: unauthenticated callers learn no parameters

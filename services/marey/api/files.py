@@ -46,15 +46,26 @@ class RequestedFile:
     """Headers and options of a file request."""
 
     request: Request
-    byte_range: Annotated[str | None, Header(alias="Range")] = None
-    if_range: Annotated[str | None, Header(alias="If-Range")] = None
-    if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None
+    byte_range: str | None
+    if_range: str | None
+    if_none_match: str | None
+    redirect: bool
+
+
+async def requested_file(
+    request: Request,
+    byte_range: Annotated[str | None, Header(alias="Range")] = None,
+    if_range: Annotated[str | None, Header(alias="If-Range")] = None,
+    if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None,
     redirect: Annotated[
         bool, Query(description="False = this server sends the content, even if it could redirect to a bucket.")
-    ] = True
+    ] = True,
+) -> RequestedFile:
+    """Return the headers and options of a file request. Async: needs no thread."""
+    return RequestedFile(request, byte_range, if_range, if_none_match, redirect)
 
 
-FileRequest = Annotated[RequestedFile, Depends()]
+FileRequest = Annotated[RequestedFile, Depends(requested_file)]
 
 
 def file_response(

@@ -26,6 +26,7 @@ EXAMPLES: dict[tuple[str, str], Any] = {
     ("NewItemBody", "application/x-ndjson"): {**_ITEM, "model": "hgm3", "settings": {"guidance": 4.5}},
     ("JobPatch", "application/json"): {"priority": 50, "comment": "for tonight's review"},
     ("NewReviewBody", "application/json"): {"motions": [_MOTION], "verdict": "kept", "comment": "clean feet"},
+    ("NewPackBody", "application/json"): {"motions": [_MOTION], "formats": ["npz", "bvh"]},
     ("NewRerollBody", "application/json"): {"motions": [_MOTION], "comment": "slides at the end"},
     ("NewEditBody", "application/json"): {"ops": [{"op": "trim", "from": 0.5, "to": 3.2}, {"op": "loop"}]},
     ("NewStreamBody", "application/json"): {"prompt": "a person walks forward", "seconds": 60.0, "seed": 7},

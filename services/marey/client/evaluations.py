@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal, Unpack, get_args
 
+from marey.client.downloads import download_all
 from marey.client.evaluation_requests import EvaluationOptions, naming_lines, request_body
-from marey.client.fetching import check_folder, download_all
+from marey.client.fetching import check_folder
 from marey.client.file_to_fetch import FileToFetch
 from marey.client.resources import Resource, identifier
 from marey.client.types.common import File

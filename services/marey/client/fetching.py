@@ -1,16 +1,14 @@
-"""Fetching the files of motions, eight at a time: into `.part` files, resumed, checked by sha256; with a manifest."""
+"""Fetching the files of the motions of a job into a folder, with a manifest."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from marey.client.file_requests import made_file
+from marey.client.downloads import download_all
 from marey.client.file_to_fetch import FORMAT, FileToFetch
 from marey.client.folder_lock import alone_in
 from marey.client.making import SOURCE, asked_of, check_body, check_rig, making_of
@@ -18,19 +16,10 @@ from marey.client.manifest import check_manifest, remove_left, row_of, write_man
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.rigs import Rigs
 from marey.client.transport import Transport
-from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
-from marey.core.hashing import sha256_of
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError
 from marey.exporters import check_known, check_options, exporters, extension_of
 from marey.exporters.making import FileRecipe
 from marey.motion.export_options import PLAIN, ExportOptions
-from marey.motion.files import write_atomically
-
-PARALLEL = 8
-ATTEMPTS = 4
-"""Downloads of one file that may break off; each continues where the last one stopped."""
-BLOCK = 2**18
-MAKING_SECONDS = 600.0
-"""Seconds to wait for a file that the server makes."""
 
 Planned = list[tuple[dict[str, Any], list[FileToFetch]]]
 """Items of the API, in input order, each with its files."""
@@ -247,44 +236,6 @@ def naming(item: dict[str, Any]) -> Naming:
     )
 
 
-def download_all(
-    client: Transport, downloads: Sequence[FileToFetch], *, overwrite: bool, done: Callable[[FileToFetch], None]
-) -> None:
-    """Fetch files, eight at a time, after a check of the existing ones.
-
-    Args:
-        overwrite: replace files with other content.
-        done: called after each file, by the thread that fetched it; never after this function has returned.
-
-    Raises:
-        Conflict: a file exists with other content; nothing is fetched then.
-        InvalidFile: the data that arrived has another sha256, or cannot be written.
-    """
-    missing: list[FileToFetch] = []
-    for download in downloads:
-        if _is_there(download, overwrite):
-            done(download)
-        else:
-            missing.append(download)
-
-    def fetch(download: FileToFetch) -> None:
-        if download.asked is None:
-            _download(client, download, overwrite=overwrite)
-        else:
-            made = made_file(client, download.url, download.path, download.asked, timeout=MAKING_SECONDS)
-            if not _is_there(made, overwrite):
-                _download(client, made, overwrite=overwrite)
-        done(download)
-
-    with ThreadPoolExecutor(PARALLEL) as pool:
-        try:
-            for _ in pool.map(fetch, missing):
-                pass
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
 def _wanted(
     files: list[dict[str, Any]], formats: Sequence[str] | None, export: ExportOptions, item: str
 ) -> Iterator[tuple[dict[str, Any], FileRecipe | None, Mapping[str, str | bool] | None]]:
@@ -300,80 +251,3 @@ def _wanted(
         if making is None and name not in by_format:
             raise Conflict(f"was not made as {name}", where=f"item {item}", hint=f"It has {', '.join(by_format)}.")
         yield by_format[name if making is None else SOURCE], making, None
-
-
-def _is_there(download: FileToFetch, overwrite: bool) -> bool:
-    if download.making is not None or download.asked is not None:  # only making it again tells
-        return False
-    try:
-        if download.path.stat().st_size == download.size and sha256_of(download.path) == download.sha256:
-            return True
-    except FileNotFoundError:
-        return False
-    if not overwrite:
-        raise _conflict(download.path)
-    return False
-
-
-def _conflict(path: Path) -> Conflict:
-    return Conflict(
-        "already exists and holds something else",
-        where=str(path),
-        hint="Choose another folder, or pass overwrite=True.",
-        argument="overwrite",
-    )
-
-
-def _finish(download: FileToFetch, part: Path, overwrite: bool) -> None:
-    """Put a file that has arrived in its place, or what is made of it."""
-    path = download.path
-    if download.making is None:
-        part.replace(path)
-        return
-    try:
-        content = download.making.make(part.read_bytes(), str(path))
-    finally:
-        part.unlink()
-    if not path.exists() or path.read_bytes() != content:
-        if path.exists() and not overwrite:
-            raise _conflict(path)
-        write_atomically(path, content)
-
-
-def _download(client: Transport, download: FileToFetch, *, overwrite: bool) -> None:
-    part = download.path.with_name(download.path.name + ".part")
-    for attempt in range(1, ATTEMPTS + 1):
-        try:
-            _continue(client, download, part)
-        except Unreachable:
-            if attempt == ATTEMPTS:
-                raise
-            continue
-        except OSError as error:
-            raise InvalidFile(f"cannot be written: {error.strerror}", where=str(part)) from error
-        if sha256_of(part) == download.sha256:
-            return _finish(download, part, overwrite)
-        part.unlink()  # a remainder of another file, or damaged in transit: start again
-    raise InvalidFile(
-        "the data that arrived has another sha256 than the server says",
-        where=str(download.path),
-        hint="Fetch it again later.",
-    )
-
-
-def _continue(client: Transport, download: FileToFetch, part: Path) -> None:
-    have = part.stat().st_size if part.exists() else 0
-    if have >= download.size:
-        have = 0
-    headers = {"Range": f"bytes={have}-"} if have else {}
-    with client.stream(download.url, headers) as response:
-        resumed = response.status_code == 206
-        with part.open("ab" if resumed else "wb") as stream:
-            left = download.size - (have if resumed else 0)
-            for block in response.iter_bytes(BLOCK):
-                stream.write(block)
-                left -= len(block)
-                if left < 0:  # the sha256 cannot be right any more, and the rest may have no end
-                    break
-            stream.flush()
-            os.fsync(stream.fileno())

@@ -11,6 +11,7 @@ from marey.exporters.making import FileRecipe
 
 FORMAT = re.compile(r"[a-z0-9]{1,16}")
 """File formats that a server may name; the format is the extension if its exporter is not installed."""
+OF_A_MOTION = re.compile(r"/v1/motions/([^/?]+)/files/[^/?]+")
 
 
 @dataclass(frozen=True)
@@ -30,4 +31,15 @@ class FileToFetch:
     @property
     def format(self) -> str:
         """The format of the file, such as `npz`."""
-        return self.url.rpartition("/")[2] if self.making is None else self.making.format
+        return self.stored_format if self.making is None else self.making.format
+
+    @property
+    def stored_format(self) -> str:
+        """The format of what the server sends."""
+        return self.url.rpartition("/")[2]
+
+    @property
+    def motion(self) -> str | None:
+        """Id of the motion whose stored file the server sends; None = another file."""
+        found = OF_A_MOTION.fullmatch(self.url)
+        return None if found is None else found[1]

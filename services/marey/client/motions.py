@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from marey.client.fetching import check_folder, download_all
+from marey.client.downloads import download_all
+from marey.client.fetching import check_folder
 from marey.client.file_requests import format_of, made_file
 from marey.client.file_to_fetch import FORMAT, FileToFetch
 from marey.client.folder_lock import alone_in

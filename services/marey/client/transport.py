@@ -148,16 +148,18 @@ class Transport:
 
     @contextmanager
     def stream(
-        self, path: str, headers: Mapping[str, str] | None = None, *, patience: float = 30.0
+        self, path: str, headers: Mapping[str, str] | None = None, *, json: Any = None, patience: float = 30.0
     ) -> Generator[httpx2.Response]:
         """Open an answer that is read in pieces; redirects (to the object store) are followed without the key.
 
         Args:
+            json: sent by POST; None = GET.
             patience: seconds of silence after which the server counts as unreachable.
         """
         timeout = httpx2.Timeout(patience, connect=5.0)
-        options: dict[str, Any] = {"headers": headers, "follow_redirects": True, "timeout": timeout}
-        with _as_unreachable(self.server), self._http.stream("GET", path, **options) as response:
+        options: dict[str, Any] = {"headers": headers, "json": json, "follow_redirects": True, "timeout": timeout}
+        method = "GET" if json is None else "POST"
+        with _as_unreachable(self.server), self._http.stream(method, path, **options) as response:
             if response.status_code >= 400:
                 response.read()
                 raise _refused_elsewhere(response) if response.history else error_of(response)

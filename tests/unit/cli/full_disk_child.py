@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from marey.client.fetching import download_all
+from marey.client.downloads import download_all
 from marey.client.file_to_fetch import FileToFetch
 from marey.client.lines import Lines
 from marey.client.manifest import COLUMNS, write_manifest

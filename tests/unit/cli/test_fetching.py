@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from marey.client.fetching import ATTEMPTS, BLOCK, FetchObserver, download_all, fetch_job, plan
+from marey.client.downloads import ATTEMPTS, BLOCK, download_all
+from marey.client.fetching import FetchObserver, fetch_job, plan
 from marey.client.file_to_fetch import FileToFetch
 from marey.client.folder_lock import alone_in
 from marey.client.server_address import Server

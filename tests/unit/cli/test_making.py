@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from marey.client.fetching import download_all, plan
+from marey.client.downloads import download_all
+from marey.client.fetching import plan
 from marey.client.server_address import Server
 from marey.client.transport import Transport
 from marey.core.errors import Conflict

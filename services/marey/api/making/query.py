@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import Field, fields
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -54,10 +54,10 @@ def _descriptions() -> dict[str, str]:
     return {name: " ".join(text.split()) for name, text in entries}
 
 
-def _reader() -> Callable[..., Mapping[str, Any]]:
+def _reader() -> Callable[..., Awaitable[Mapping[str, Any]]]:
     """Return a dependency with a parameter for each option; it checks no more than their types: the key comes first."""
 
-    def read(**given: Any) -> Mapping[str, Any]:
+    async def read(**given: Any) -> Mapping[str, Any]:  # async: needs no thread
         return given
 
     described = _descriptions()

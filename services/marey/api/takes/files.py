@@ -37,30 +37,24 @@ MAKING_RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 
 
-def motion_of(shared: Context, tenant: str, motion: UUID) -> jobs.MotionRow:
-    """Return a motion.
+def motion_and_rig(
+    shared: Context, tenant: str, motion: UUID, *, rig: str | None, body: str | None
+) -> tuple[jobs.MotionRow, RigRow | None]:
+    """Return a motion, and the tenant's rig that a request names as `rig` or as `body`; None if it names none, or one
+    of Marey's.
 
     Raises:
-        NotFound: the tenant has no such motion.
-    """
-    with transaction(shared.engine) as conn:
-        return jobs.get_motion(conn, tenant, motion)
-
-
-def rig_of(shared: Context, tenant: str, *, rig: str | None, body: str | None) -> RigRow | None:
-    """Return the tenant's rig that a request names as `rig` or as `body`; None if it names none, or one of Marey's.
-
-    Raises:
-        NotFound: the tenant has no such rig.
+        NotFound: the tenant has no such motion, or no such rig.
         InvalidInput: the request names both.
     """
-    export_options({"rig": rig, "body": body})
-    name = rig if rig is not None else body
-    if name is None or name in (REFERENCE_RIGS if rig is not None else OWN_BODIES):
-        return None
     with transaction(shared.engine) as conn:
+        row = jobs.get_motion(conn, tenant, motion)
+        export_options({"rig": rig, "body": body})
+        name = rig if rig is not None else body
+        if name is None or name in (REFERENCE_RIGS if rig is not None else OWN_BODIES):
+            return row, None
         try:
-            return get_rig(conn, tenant, name)
+            return row, get_rig(conn, tenant, name)
         except NotFound as error:
             error.where = "rig" if rig is not None else "body"
             raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from typing import Annotated
+from typing import Annotated, Any
 from uuid import UUID
 
 from fastapi import APIRouter, Depends, Path, Query, Response
@@ -21,13 +21,13 @@ from marey.api.making.query import GivenOptions, Rate, WantedBody, WantedRig
 from marey.api.takes.files import (
     MAKING_RESPONSES,
     being_made,
-    motion_of,
+    motion_and_rig,
     recipe,
     rig_header,
-    rig_of,
     source_of,
     stored_file,
 )
+from marey.api.takes.packs import FORMAT, NewPackBody, pack_response, packed_files
 from marey.api.takes.schemas import (
     MotionDetailView,
     MotionView,
@@ -39,14 +39,12 @@ from marey.api.takes.schemas import (
 )
 from marey.api.takes.service import file_stem, made_again
 from marey.core.disposition import download_name
-from marey.core.validation import worded
 from marey.exporters import extension_of
 from marey.http.json_bodies import UniqueKeysRoute
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
 from marey.items.values import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
-FORMAT = worded(r"^[a-z0-9]{1,16}$", "names of formats, as npz, bvh, glb or mp4")
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES, route_class=UniqueKeysRoute)
 
 
@@ -122,6 +120,22 @@ def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: S
     return RerollsView(items=[RerollView.of(take) for take in takes])
 
 
+PACK_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/x-tar": {"schema": {"type": "string", "format": "binary"}}}},
+}
+
+
+@router.post("/files", response_class=Response, responses=PACK_RESPONSES)
+async def get_files(body: NewPackBody, shared: Shared, key: Reader) -> Response:
+    """Get stored files of many motions as a tar, each as `<motion>.<format>`.
+
+    In the order given, at most 64 MiB together; the server sends them itself, without a redirect. A file whose content
+    is lost is left out.
+    """
+    files = await run_in_threadpool(packed_files, shared, key.tenant, body)
+    return pack_response(shared, key.tenant, files)
+
+
 @router.get("/{motion}")
 def get_motion(motion: UUID, conn: Connection, key: Reader) -> MotionDetailView:
     """Get one motion, with the graph and settings it was made from."""
@@ -146,8 +160,7 @@ async def get_file(
     A file in a format that was not stored, or with a rate or options of its own, is made on request and kept for a
     while; 202 if that takes longer than 5 s: ask again.
     """
-    row = await run_in_threadpool(motion_of, shared, key.tenant, motion)
-    own_rig = await run_in_threadpool(rig_of, shared, key.tenant, rig=rig, body=body)
+    row, own_rig = await run_in_threadpool(motion_and_rig, shared, key.tenant, motion, rig=rig, body=body)
     file = stored_file(row, wanted := recipe(row, format, {**options, "rig": rig, "body": body}, fps, own_rig))
     caching = FOR_EVER if file is not None else CHECKED
     if file is None:
