@@ -27,8 +27,9 @@ from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
+from marey.text.misleading_words import without_misleading
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from marey.text.plain_action import only_action, with_subject, without_rise
+from marey.text.plain_action import only_action, with_subject
 from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
@@ -236,7 +237,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_rise(text) for text in texts]
+        texts = [without_misleading(text) for text in texts]
         if not self._reads_actions:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
         return TrainedReaders(self.pooled, self._encoded, movements=self.spec.movements).read(texts)

@@ -19,7 +19,7 @@ from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
-VERSION = 6
+VERSION = 7
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
@@ -32,18 +32,6 @@ ALONE = frozenset({STANDING, NODDING})
 post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
-_UP_TO = re.compile(
-    r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
-    (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
-    (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-_DOWN = re.compile(
-    r"""\bdown(?=\ (?:the|a|an|his|her|their|this|that)\ (?:[\w-]+\ ){0,2}
-    (?:road|street|hall|hallway|corridor|aisle|path|catwalk|runway|alley|lane|sidewalk|pavement|avenue|track|beach
-    |boardwalk|river|shore|trail|block|line|row|tunnel)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
 _NOD = re.compile(r"\bnod", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z]+")
 
@@ -74,13 +62,6 @@ def _third_persons() -> frozenset[str]:
     """Return the forms with -s of all verbs that are known, but for those that are parts of the body, too: "arms"."""
     lists = load_word_lists()
     return frozenset(third_person(verb) for verb in _verbs() if verb.isalpha()) - lists.body_parts - lists.uncounted
-
-
-def without_rise(prompt: str) -> str:
-    """Return a prompt in which who goes up to a place or a person goes there: "walks up to the door" as "walks to the
-    door", and "down the street" as "along the street". Of "up" and "down", models read a climb.
-    """
-    return _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
 
 
 def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) -> str:

@@ -7,7 +7,8 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
+from marey.data.gesture_drawing import GesturePace, respond
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, eased, envelope, stations
 
 Array = NDArray[np.floating]

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES, Gesture, respond
+from marey.data.gesture_drawing import respond
 from marey.data.gesture_stances import glide, settle, step, turn_hips
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import ARMS, LEFT, OTHER_SIDE, StandingBody, direction, envelope
 
 Array = NDArray[np.floating]

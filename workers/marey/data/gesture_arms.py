@@ -6,7 +6,8 @@ import random
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, drawn_arm, respond
+from marey.data.gesture_drawing import GesturePace, arms_of, drawn_arm, respond
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import ARMS, StandingBody, swings, swung
 
 _WAVES = {

@@ -5,9 +5,10 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of
-from marey.data.gesture_postures import STAND, HandPlace, Point, Posture
-from marey.data.gesture_sequels import TEMPOS, Sequel, both, near
+from marey.data.gesture_drawing import arms_of
+from marey.posing.gesture import BOTH, SIDES, Gesture
+from marey.posing.postures import STAND, HandPlace, Point, Posture
+from marey.posing.sequels import TEMPOS, Sequel, both, near
 from marey.posing.standing import LEFT
 
 _SQUATS = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 
 from marey.data.gesture_blows import Blow, Point, strike
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near, on_guard
 from marey.data.gesture_stances import step
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import OTHER_SIDE, StandingBody
 
 _STABS: dict[str, tuple[Point, Point, Point]] = {

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES
 from marey.data.gesture_stances import glide, settle, turn_hips
+from marey.posing.gesture import SIDES
 from marey.posing.standing import LEFT, StandingBody
 
 Array = NDArray[np.floating]

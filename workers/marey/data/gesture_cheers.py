@@ -7,9 +7,10 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, arms_of
+from marey.data.gesture_drawing import arms_of
 from marey.data.gesture_hops import jumps
 from marey.data.part import FPS
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, envelope, stations
 
 Array = NDArray[np.floating]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import TEMPOS, Sequel, both, near
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import TEMPOS, Sequel, both, near
 from marey.posing.standing import LEFT, RIGHT
 
 _KNEE = HandPlace((0.0, 0.08, -0.02), "knee", (0.8, -0.3, -0.5))

@@ -7,11 +7,11 @@ import math
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_flights import standing_feet
-from marey.data.gesture_posing import pose
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture, mirrored
-from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.passing import pose
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture, mirrored
+from marey.posing.sequels import Sequel, both, near
 from marey.posing.standing import LEFT, RIGHT, StandingBody
 
 _GUARD = {
@@ -79,7 +79,7 @@ _BENDS: dict[bool, Point] = {True: (46, 0, 34), False: (34, -30, 6)}
 _LEG = 0.775
 """Metres from hip to ankle of a leg that is almost straight."""
 _STANDS = 0.94
-"""Metres of the hips over the floor for which the postures are written; see `marey.data.gesture_postures`."""
+"""Metres of the hips over the floor for which the postures are written; see `marey.posing.postures`."""
 _HIP = 0.08
 """Metres of the hip joints below the pelvis."""
 _LINES = {

@@ -8,12 +8,12 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_floor import SUPINE, on_back
-from marey.data.gesture_posing import pose
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel, both, near
 from marey.data.part import FPS
+from marey.posing.floor import SUPINE, on_back
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.passing import pose
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import Sequel, both, near
 from marey.posing.standing import StandingBody, direction, eased
 
 Array = NDArray[np.floating]

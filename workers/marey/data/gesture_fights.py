@@ -7,9 +7,9 @@ import random
 import numpy as np
 
 from marey.data.gesture_blows import Blow, Point, strike
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_guards import begun, near, on_guard
 from marey.data.gesture_stances import settle, step
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, StandingBody, envelope
 
 _OUTWARD = (1.0, 0.1, -0.2)

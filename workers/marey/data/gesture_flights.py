@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from marey.data.gesture_drawing import Gesture
-from marey.data.gesture_posing import pose
-from marey.data.gesture_postures import FootPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel
 from marey.data.part import GRAVITY
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.gesture import Gesture
+from marey.posing.passing import pose
+from marey.posing.postures import FootPlace, Point, Posture
+from marey.posing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT, StandingBody
 
 _LEGS = {LEFT: (7, 10), RIGHT: (8, 11)}

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_stances import settle, step, turn_hips
 from marey.data.part import FPS
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, StandingBody, envelope
 
 Array = NDArray[np.floating]

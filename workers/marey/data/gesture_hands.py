@@ -7,7 +7,8 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, respond
+from marey.data.gesture_drawing import GesturePace, arms_of, respond
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, direction, stations, swings
 
 Array = NDArray[np.floating]

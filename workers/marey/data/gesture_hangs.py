@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_posing import pose
-from marey.data.gesture_postures import FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel, near
 from marey.data.part import FPS
 from marey.motion.rotations import from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.bones import two_bones
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.passing import pose
+from marey.posing.postures import FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import Sequel, near
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody, eased
 
 Array = NDArray[np.floating]

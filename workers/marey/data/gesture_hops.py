@@ -6,10 +6,10 @@ import random
 from collections.abc import Sequence
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_flights import StandingFoot, fly, on_feet
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Posture
-from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Posture
+from marey.posing.sequels import Sequel, both, near
 from marey.posing.standing import LEFT, RIGHT
 
 _LONGEST = 7.6

@@ -7,8 +7,8 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import SIDES
 from marey.data.part import Part
+from marey.posing.gesture import SIDES
 from marey.posing.standing import ARMS
 
 Array = NDArray[np.floating]

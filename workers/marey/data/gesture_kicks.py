@@ -7,9 +7,9 @@ import math
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import Sequel, both, near
 from marey.posing.standing import LEFT, RIGHT
 
 _LEG = 0.785

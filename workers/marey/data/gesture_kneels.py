@@ -6,9 +6,9 @@ import math
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import FLOOR_PACES, Sequel, both
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import FLOOR_PACES, Sequel, both
 from marey.posing.standing import LEFT, RIGHT
 
 _BACK = FootPlace((0.1, 0.15, -0.66), (0.0, -0.93, 0.35))

@@ -6,9 +6,9 @@ import random
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_stances import before, settle
 from marey.data.part import FPS
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import LEGS, StandingBody, eased, envelope, tremble
 
 _HEAD, _NECK = 15, (12,)

@@ -7,13 +7,13 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_gaits import speed_of
 from marey.data.part import FPS, GRAVITY, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.bones import with_bones
+from marey.posing.gesture import Gesture
 from marey.posing.limbs import LEG_CHAINS
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody
 

@@ -7,9 +7,10 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, arms_of, respond
+from marey.data.gesture_drawing import GesturePace, arms_of, respond
 from marey.data.part import FPS
 from marey.motion.rotations import normalize
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import OTHER_SIDE, RIGHT, StandingBody, direction, eased, envelope, swings
 
 Array = NDArray[np.floating]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Posture
-from marey.data.gesture_sequels import Sequel, both, near
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Posture
+from marey.posing.sequels import Sequel, both, near
 
 _PACES = {"quick": (0.6, 0.85), "": (0.9, 1.4), "slow": (1.6, 2.4)}
 """Seconds from standing to sitting or back."""

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_aims import GUNS, TWISTS
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace, respond
+from marey.data.gesture_drawing import GesturePace, respond
 from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, stations
 
 Array = NDArray[np.floating]

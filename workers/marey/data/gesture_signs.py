@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.part import FPS
 from marey.motion.rotations import normalize
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, direction, envelope, stations, swung
 
 Array = NDArray[np.floating]

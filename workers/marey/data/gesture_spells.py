@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel, near
+from marey.posing.gesture import BOTH, SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import Sequel, near
 from marey.posing.standing import LEFT, RIGHT
 
 _OUT: Point = (0.8, -0.8, -0.3)

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_steps import small_step_spin
 from marey.data.gesture_ways import about_vertical, posed, spine_yaw
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.bones import with_bones
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.limbs import LEG_CHAINS, LEVEL
 from marey.posing.standing import LEFT, StandingBody, eased
 

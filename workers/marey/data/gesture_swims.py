@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_tumbling import BODY, WholeMotion, tumble
 from marey.data.part import FPS
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import LEFT, StandingBody
+from marey.posing.tumbling import BODY, WholeMotion, tumble
 
 Array = NDArray[np.floating]
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_stances import glide, settle, step, turn_hips
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, envelope
 
 Array = NDArray[np.floating]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.gesture_drawing import SIDES, Gesture
 from marey.data.gesture_gaits import is_plain_walk, is_quick_run, speed_of
 from marey.data.gesture_idles import is_plain_idle
 from marey.data.gesture_stairs import steps_back
@@ -18,6 +17,7 @@ from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
 from marey.posing.bones import with_bones
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody
 
 Array = NDArray[np.floating]

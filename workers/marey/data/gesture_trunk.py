@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
+from marey.data.gesture_drawing import GesturePace
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, envelope, swings, tremble
 
 _SLIGHT, _DEEP = 36.0, 66.0

@@ -6,9 +6,9 @@ import random
 
 import numpy as np
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture
 from marey.data.gesture_stances import settle, turn_hips
 from marey.data.part import FPS
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, direction, eased, envelope
 
 _ARMS = {

@@ -7,8 +7,9 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_drawing import BOTH, SIDES, Gesture, GesturePace
+from marey.data.gesture_drawing import GesturePace
 from marey.data.part import FPS
+from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import OTHER_SIDE, StandingBody, stations, swings
 
 Array = NDArray[np.floating]

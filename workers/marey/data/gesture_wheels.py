@@ -6,9 +6,9 @@ import math
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import FootPlace, HandPlace, Posture
-from marey.data.gesture_sequels import Sequel
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import FootPlace, HandPlace, Posture
+from marey.posing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT
 
 _CARS = {

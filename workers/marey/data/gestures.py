@@ -29,15 +29,11 @@ from marey.data.gesture_bends import bend_over, pick_up, squat
 from marey.data.gesture_blades import slash, stab
 from marey.data.gesture_cheers import cheer
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
-from marey.data.gesture_crawls import crawl
 from marey.data.gesture_crouches import crouch
 from marey.data.gesture_crunches import arabesque, knee_to_elbow
 from marey.data.gesture_dodges import dodge, flinch
-from marey.data.gesture_drawing import Gesture
 from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
-from marey.data.gesture_falls import die
 from marey.data.gesture_fights import block, punch
-from marey.data.gesture_floor import get_up, lie, lie_down, sit_floor
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
 from marey.data.gesture_guards import fight_stance
 from marey.data.gesture_hands import reach_forward, talk
@@ -50,7 +46,6 @@ from marey.data.gesture_laughs import laugh
 from marey.data.gesture_leaps import leap
 from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_pushes import push
-from marey.data.gesture_rolls import flip, roll
 from marey.data.gesture_seats import sit, sit_down, stand_up
 from marey.data.gesture_shots import shoot
 from marey.data.gesture_signs import signal
@@ -70,6 +65,11 @@ from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
 from marey.data.spoken import spoken
+from marey.posing.crawls import crawl
+from marey.posing.falls import die
+from marey.posing.floor import get_up, lie, lie_down, sit_floor
+from marey.posing.gesture import Gesture
+from marey.posing.rolls import flip, roll
 from marey.posing.standing import StandingBody
 
 Array = NDArray[np.floating]

@@ -25,6 +25,7 @@ from marey.generation.port import GenerationControl, Generator, Limits, MotionFe
 from marey.generation.repetitions import repeated
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.turned import NEAR, ended_turn, turned_features
+from marey.generation.whole_body import AGAIN
 from marey.items.values import MAX_SECONDS
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
@@ -111,7 +112,7 @@ class _Wish:
         prompt, gaze = text.prompt, stated_gaze(text.prompt)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
-        count = stated_count(prompt, action) if action in REPETITIONS else None
+        count = stated_count(prompt, action) if action in REPETITIONS or action in AGAIN else None
         if action == "spin":
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
@@ -124,7 +125,8 @@ class _Wish:
 
     def fine(self, request: Request) -> FineWish:
         """Return what is asked for of a movement that is drawn."""
-        return FineWish(self.count, self.side, request.text.prompt)
+        fixed = request.frames is not None and not request.open
+        return FineWish(self.count, self.side, request.text.prompt, fixed, request.beside)
 
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
@@ -206,7 +208,7 @@ def _as_often(
     features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion with as many repetitions as are asked for; `changes` says so, as in all of these."""
-    if wish.count is None or "drawn" in changes:  # what is drawn is as often as asked for
+    if wish.count is None or "drawn" in changes or wish.action not in REPETITIONS:  # what is drawn is as often
         return features
     as_often = stepped if wish.action in STEPPING else repeated
     often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)

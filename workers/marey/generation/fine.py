@@ -19,6 +19,7 @@ from marey.generation.dodging import dodged, dodges_well
 from marey.generation.fine_wish import FineWish
 from marey.generation.striking import punched
 from marey.generation.waving import waved, waves_well
+from marey.generation.whole_body import CHOICES, whole_body
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
@@ -136,5 +137,6 @@ FINE: Mapping[str, Fine] = {
     "dodge": Fine(dodged, dodges_well, sided=True),
     "kick-ball": Fine(kicked_ball, kicks_well, sided=True),
     "throw": Fine(thrown, sided=True),
+    **{action: Fine(whole_body(action), never) for action in CHOICES},
 }
 """Small and sudden movements by action."""

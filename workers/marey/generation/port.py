@@ -54,6 +54,7 @@ class Request:
     free: bool = False  # the text is not read: kept frames alone decide
     timeline: tuple[TimedText, ...] | None = None  # prompts at stated times; `text` is that of the first
     open: bool = False  # `frames` were not asked for: what the prompt asks for may need more or fewer
+    beside: tuple[str, str] = ("", "")  # prompts of the rows of a timeline before and after it; empty = none
 
     @property
     def is_sequence(self) -> bool:

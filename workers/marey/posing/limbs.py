@@ -9,6 +9,8 @@ from marey.motion.skeleton import HUMANML3D
 
 FPS = 20.0
 """Frames a second of its motions."""
+GRAVITY = 9.81
+"""Metres a second, each second."""
 LEG_CHAINS = ((1, 4, 7, 10), (2, 5, 8, 11))
 """Hip, knee, ankle and toe of the left leg, and of the right one."""
 ARM_CHAINS = ((13, 16, 18, 20), (14, 17, 19, 21))

@@ -53,6 +53,8 @@ class WantedAction:
 
 Step = tuple[WantedAction, ...]
 """Actions of one stretch of time."""
+ONCE = frozenset({"die", "lie", "lie-down", "get-up"})
+"""Actions that cannot be done again where they end: "he slips and falls" is one fall."""
 
 
 def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
@@ -64,11 +66,17 @@ def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
 
     Returns:
         One step a sentence, none for a sentence that names only what is not done; None if a sentence names no action,
-        or one that has no rule.
+        or one that has no rule. Sentences behind each other that name one action of `ONCE` are one step.
     """
     steps = [step for step in map(_step, sentences) if step != ()]
     found = tuple(step for step in steps if step is not None)
-    return found if found and len(found) == len(steps) else None
+    if not found or len(found) < len(steps):
+        return None
+    return tuple(step for before, step in zip((None, *found), found, strict=False) if step != before or not _once(step))
+
+
+def _once(step: Step) -> bool:
+    return all(each.action in ONCE for each in step)
 
 
 def wanted_by_meaning(scope: Mapping[str, Any] | None) -> tuple[Step, ...] | None:

@@ -190,12 +190,14 @@ class _Row(_Strand):
     def __init__(self, timeline: _Timeline, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
         super().__init__(timeline, part, timed.text, (limits.max_frames, limits.max_frames - CONTEXT))
         self.open = timed.open
+        self.beside = "", ""
         self.features: Float32 | None = None
         self.changes: Mapping[str, Any] = {}
 
     def request(self) -> Request:
         """Return the request of the first window."""
-        return Request(self.text, self.seed, self.lengths[0], open=self.open and len(self.lengths) == 1)
+        own_length = self.open and len(self.lengths) == 1
+        return Request(self.text, self.seed, self.lengths[0], open=own_length, beside=self.beside)
 
     def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
@@ -260,7 +262,9 @@ class _Timeline:
         self.seed = request.seed
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
-        for strand, row in zip(self.rows, request.timeline, strict=True):
+        prompts = ["", *(row.text.prompt for row in request.timeline), ""]
+        for number, (strand, row) in enumerate(zip(self.rows, request.timeline, strict=True)):
+            strand.beside = prompts[number], prompts[number + 2]
             if row.made is not None:
                 strand.add(Window(row.made, 0, len(row.made)))
                 strand.changes = row.changes

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import gaussian_filter1d
 
-from marey.data.gesture_postures import HandPlace, Posture
-from marey.data.part import FPS
 from marey.motion.rotations import cross, normalize
 from marey.posing.bones import two_bones
-from marey.posing.limbs import BONE_LENGTHS, CARRIED
+from marey.posing.limbs import BONE_LENGTHS, CARRIED, FPS
+from marey.posing.monotone import blurred, monotone
+from marey.posing.postures import HandPlace, Posture
 from marey.posing.standing import ARMS, LEFT, LEGS, SIGN, StandingBody, eased
 
 Array = NDArray[np.floating]
@@ -75,8 +73,8 @@ class _Posing:
         rows = np.asarray(values, np.float64)
         if len(rows) == 1:
             return np.repeat(rows, len(self.t), axis=0)
-        path = PchipInterpolator(self.times, rows)(np.clip(self.t, self.times[0], self.times[-1]))
-        return gaussian_filter1d(path, smooth, axis=0, mode="nearest")
+        path = monotone(self.times, rows, self.t)
+        return blurred(path, smooth)
 
     def _floor(self, points: Array) -> Array:
         """Convert points (..., 3) of the world to left, up, forward."""
@@ -170,7 +168,7 @@ class _Posing:
             if far > _STEP and max(places[k, 1], places[k + 1, 1]) < _FLOOR:
                 within = np.clip((self.t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0)
                 lift += min(0.12, 0.05 + 0.2 * far) * np.sin(np.pi * within)
-        return gaussian_filter1d(lift, _SMOOTH_FEET)
+        return blurred(lift, _SMOOTH_FEET)
 
     def _arm(self, side: str) -> None:
         hands = [posture.hands.get(side) for posture in self.postures]
@@ -188,7 +186,7 @@ class _Posing:
             pole += weight * normalize(towards)
         free = share.get(None, np.zeros((len(self.t), 1)))
         target += 4 * free * (1 - free) * (np.array(_VIA) @ self._trunk_axes(side))
-        target, pole = (gaussian_filter1d(one, _SMOOTH, axis=0, mode="nearest") for one in (target, pole))
+        target, pole = (blurred(one, _SMOOTH) for one in (target, pole))
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
         target *= np.clip(distance, _LEAST_REACH, _ARM_REACH * (BONE_LENGTHS[elbow] + BONE_LENGTHS[wrist])) / distance
         lengths = (BONE_LENGTHS[elbow], BONE_LENGTHS[wrist])
@@ -198,7 +196,7 @@ class _Posing:
             joints[:, elbow], joints[:, wrist] = two_bones(joints[:, shoulder], wrists, pole, lengths)
             sunk = np.clip((_LIFTED - joints[:, elbow, 1]) / _LIFTED, 0.0, 2.0)
             lift = self._world(np.array(_ELBOW_LIFT), side)
-            pole = normalize(pole) + gaussian_filter1d(sunk, 2.0, mode="nearest")[:, None] * lift
+            pole = normalize(pole) + blurred(sunk, 2.0)[:, None] * lift
 
     def _clear(self, wrists: Array, side: str) -> Array:
         """Move wrists (T, 3) that would go through the trunk or the thigh away from it."""
@@ -209,7 +207,7 @@ class _Posing:
             nearest = joints[:, a] + np.clip(along, 0.0, 1.0)[:, None] * bone
             away = wrists - nearest
             short = np.maximum(room - np.linalg.norm(away, axis=-1, keepdims=True), 0.0)
-            wrists = wrists + gaussian_filter1d(short * normalize(away + out), _SMOOTH, axis=0, mode="nearest")
+            wrists = wrists + blurred(short * normalize(away + out), _SMOOTH)
         return wrists
 
     def _weights(self) -> Array:

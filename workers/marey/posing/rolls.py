@@ -1,13 +1,13 @@
-"""Bodies that roll over the floor and that flip in the air; see `marey.data.gestures`."""
+"""Bodies that roll over the floor and that flip in the air."""
 
 from __future__ import annotations
 
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair, stood
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import LEFT, RIGHT
+from marey.posing.tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair, stood
 
 _TUCKED = pair(Limb((0.1, -0.36, 0.4), towards=(0.1, -0.6, 0.8)))
 _SHINS = pair(Limb((0.2, -0.3, 0.3), towards=(0.9, -0.3, 0.1)))
@@ -22,12 +22,23 @@ def _hands_down(ahead: float, wide: float = 0.24) -> dict[str, Limb]:
     return pair(Limb((wide, 0.04, ahead), FLOOR, (0.8, 0.3, -0.5)))
 
 
-def roll(rng: random.Random) -> Gesture:
-    form = rng.choices(["forward", "shoulder", "backward", "sideways"], (4, 4, 2, 3))[0]
+def roll(
+    rng: random.Random, form: str = "", *, side: str = "", stands: bool = False, crouches: bool | None = None
+) -> Gesture:
+    """A roll over the floor.
+
+    Args:
+        rng: decides everything that is not given.
+        form: forward, shoulder, backward or sideways.
+        side: left or right, to which it goes sideways.
+        stands: without steps before it.
+        crouches: the body stays low behind it.
+    """
+    form = form or rng.choices(["forward", "shoulder", "backward", "sideways"], (4, 4, 2, 3))[0]
     tempo = rng.choice(["quick", "quick", "", "", "slow"])
     pace = rng.uniform(*_PACES[tempo])
     done = Tumble(times=[rng.uniform(0.1, 0.6)])
-    steps = form in ("forward", "shoulder") and tempo != "slow" and rng.random() < 0.45
+    steps = not stands and form in ("forward", "shoulder") and tempo != "slow" and rng.random() < 0.45
     start = _steps_in(rng, done, pace) if steps else 0.0
     if form == "sideways":
         end = _roll_aside(rng, done, pace)
@@ -35,14 +46,14 @@ def roll(rng: random.Random) -> Gesture:
         end = _roll_back(rng, done, pace)
     else:
         end = _roll_ahead(rng, done, pace, start, form == "shoulder")
-    crouches = rng.random() < 0.3
+    crouches = rng.random() < 0.3 if crouches is None else crouches
     feet = done.poses[-1].feet
     if crouches:
         low = Whole(end, rng.uniform(0.55, 0.66), (18, 0, 0), (14, 0, 0), (-14, 0, 0), {}, feet, splay=0.35)
         done.then(0.35 * pace, _turned_on(low, done.poses[-1]), rng.uniform(0.4, 1.4))
     else:
         done.then(0.55 * pace, _turned_on(Whole(end, 1.0, feet=feet), done.poses[-1]), rng.uniform(0.2, 0.9))
-    right = rng.random() < 0.5
+    right = side == RIGHT if side else rng.random() < 0.5
     told = done if right else done.mirrored()
     side = ("right" if right else "left") if form == "sideways" else ""
     kinds = [
@@ -159,12 +170,18 @@ def _roll_aside(rng: random.Random, done: Tumble, pace: float) -> tuple[float, f
 # -- flips ---------------------------------------------------------------------------------------------------------
 
 
-def flip(rng: random.Random) -> Gesture:
-    """A somersault in the air, backward or forward, from standing or out of steps, tucked or half open."""
-    form = rng.choices(["back", "front"], (3, 2))[0]
+def flip(rng: random.Random, form: str = "", *, stands: bool = False) -> Gesture:
+    """A somersault in the air, from standing or out of steps, tucked or half open.
+
+    Args:
+        rng: decides everything that is not given.
+        form: back or front.
+        stands: without steps before it.
+    """
+    form = form or rng.choices(["back", "front"], (3, 2))[0]
     turn = 1.0 if form == "front" else -1.0
     done = Tumble(times=[rng.uniform(0.15, 0.8)])
-    steps = form == "front" and rng.random() < 0.6
+    steps = not stands and form == "front" and rng.random() < 0.6
     start = _steps_in(rng, done, 0.9) if steps else 0.0
     far = rng.uniform(0.9, 1.3) if steps else rng.uniform(0.35, 0.8)
     end, lasts = start + turn * far, rng.uniform(0.62, 0.72)

@@ -1,13 +1,13 @@
-"""Bodies that crawl on hands and knees; see `marey.data.gestures`."""
+"""Bodies that crawl on hands and knees."""
 
 from __future__ import annotations
 
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import Sequel
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT
 
 _PELVIS = 0.47
@@ -23,15 +23,32 @@ _LIFT = 0.07
 """Metres by which a hand is lifted on its way."""
 
 
-def crawl(rng: random.Random) -> Gesture:
-    """The hand of one side and the knee of the other move together, then the other two."""
+def on_fours(rng: random.Random) -> Posture:
+    """On hands and knees, about where a crawl ends."""
+    hand = HandPlace((rng.uniform(0.15, 0.22), 0.05, _SHOULDERS + 0.04), "floor", (0.6, 0.2, -0.8))
+    shank = FootPlace((rng.uniform(0.08, 0.13), 0.085, 0.02 - _SHANK), (0.0, -0.3, -0.95))
+    posture = Posture((0.0, _PELVIS, 0.0), (_TILT, 0, 0), (0, 0, 0), (rng.uniform(-36, -16), 0, 0))
+    poles: Point = (0.1, -0.8, 0.6)
+    return replace(
+        posture, hands=dict.fromkeys(SIDES, hand), feet=dict.fromkeys(SIDES, shank), knees=dict.fromkeys(SIDES, poles)
+    )
+
+
+def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None = None) -> Gesture:
+    """The hand of one side and the knee of the other move together, then the other two.
+
+    Args:
+        rng: decides everything that is not given.
+        back: backward.
+        seconds: for about how long.
+    """
     tempo = rng.choice(["slow", "", "", "quick"])
     period = rng.uniform(*_PACES[tempo])
     stride = rng.uniform(0.2, 0.34) if tempo != "slow" else rng.uniform(0.16, 0.26)
-    back = rng.random() < 0.15
+    back = rng.random() < 0.15 if back is None else back
     if back:
         stride = -0.8 * stride
-    cycles = max(2, min(round(rng.uniform(2.6, 7.4) / period), 8))
+    cycles = max(2, round(seconds / period) if seconds else min(round(rng.uniform(2.6, 7.4) / period), 8))
     wide, knees = rng.uniform(0.15, 0.22), rng.uniform(0.08, 0.13)
     look, sway, round_back = rng.uniform(-42, -12), rng.uniform(2, 6), rng.uniform(-4, 8)
     elbow: Point = (rng.uniform(0.4, 0.9), 0.2, -0.8)

@@ -1,13 +1,14 @@
-"""Bodies that sit and lie on the floor, and go there and back; see `marey.data.gestures`."""
+"""Bodies that sit and lie on the floor, and go there and back."""
 
 from __future__ import annotations
 
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.data.gesture_sequels import FLOOR_PACES, Sequel, both
+from marey.posing.crawls import on_fours
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.posing.sequels import FLOOR_PACES, Sequel, both
 from marey.posing.standing import LEFT, RIGHT
 
 SUPINE = -85.0
@@ -136,12 +137,13 @@ def _moved_lying(rng: random.Random, lying: Posture, form: str) -> Posture:
     return replace(lying, neck=neck, hands=hands, spine=(rng.uniform(0, 2), 0, 0))
 
 
-def lie(rng: random.Random) -> Gesture:
-    form = rng.choices(["lie-back", "lie-front"], (3, 1))[0]
+def lie(rng: random.Random, form: str = "", *, seconds: float | None = None) -> Gesture:
+    """A body that lies: `form` is lie-back or lie-front, any if empty, for `seconds` or as comes."""
+    form = form or rng.choices(["lie-back", "lie-front"], (3, 1))[0]
     still = rng.random() < 0.45
     lying = _lying(rng, 0.0, form, moves=not still)
     done = Sequel([rng.uniform(0.2, 0.8)], [lying])
-    end = rng.uniform(1.8, 6.5)
+    end = seconds or rng.uniform(1.8, 6.5)
     while done.times[-1] < end:
         done.then(rng.uniform(0.8, 1.5), lying if still else _moved_lying(rng, lying, form), rng.uniform(0.3, 1.5))
     return done.either(rng).gesture(rng, ["lie", form, "lie-still" if still else ""])
@@ -160,8 +162,9 @@ def _prone_way(rng: random.Random, pace: float) -> list[tuple[float, Posture]]:
     return [(0.9 * pace, crouch), (0.5 * pace, half), (0.5 * pace, plank)]
 
 
-def lie_down(rng: random.Random) -> Gesture:
-    form = rng.choices(["lie-back", "lie-front"], (3, 2))[0]
+def lie_down(rng: random.Random, form: str = "") -> Gesture:
+    """A body that stands and lies down: `form` is lie-back or lie-front, any if empty."""
+    form = form or rng.choices(["lie-back", "lie-front"], (3, 2))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
     pace = rng.uniform(*FLOOR_PACES[tempo])
     done = Sequel([rng.uniform(0.15, 0.7)])
@@ -185,11 +188,16 @@ def lie_down(rng: random.Random) -> Gesture:
     return done.either(rng).gesture(rng, ["lie-down", f"{form}-down", f"lie-down-{tempo}" if tempo else ""])
 
 
-def get_up(rng: random.Random) -> Gesture:
-    form = rng.choices(["lie-back", "lie-front"], (3, 2))[0]
+def get_up(rng: random.Random, form: str = "") -> Gesture:
+    """A body that lies and gets up to stand: `form` is lie-back, lie-front, or fours (from hands and knees); one of the
+    first two if empty."""
+    form = form or rng.choices(["lie-back", "lie-front"], (3, 2))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
     pace = rng.uniform(*FLOOR_PACES[tempo])
-    if form == "lie-front":
+    if form == "fours":
+        done = Sequel([rng.uniform(0.2, 0.5)], [on_fours(rng)])
+        done.then(0.9 * pace, _HALF_KNEEL)
+    elif form == "lie-front":
         way = _prone_way(rng, pace)
         lying = _lying(rng, 0.06, form)
         done = Sequel([rng.uniform(0.2, 0.8)], [lying])

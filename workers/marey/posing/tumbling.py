@@ -13,15 +13,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import gaussian_filter1d
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_postures import Point
-from marey.data.part import FPS, GRAVITY
 from marey.motion.rotations import cross, from_rotvec, normalize, rotate
 from marey.posing.bones import two_bones
-from marey.posing.limbs import BONE_LENGTHS, CARRIED, LEVEL
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.limbs import BONE_LENGTHS, CARRIED, FPS, GRAVITY, LEVEL
+from marey.posing.monotone import blurred, monotone
+from marey.posing.postures import Point
 from marey.posing.standing import ARMS, LEFT, LEGS, RIGHT, SIGN, StandingBody
 
 Array = NDArray[np.floating]
@@ -144,8 +142,7 @@ class Tumble:
 
         def track(values: Sequence[Sequence[float]]) -> Array:
             rows = shares @ np.asarray(values, np.float64)
-            t = np.clip(np.arange(len(body.joints)) / FPS, times[0], times[-1])
-            return gaussian_filter1d(PchipInterpolator(times, rows)(t), _SMOOTH, axis=0, mode="nearest")
+            return blurred(monotone(times, rows, np.arange(len(body.joints)) / FPS), _SMOOTH)
 
         def limbs(name: str, side: str) -> dict[str, tuple[Array, Array, Array]]:
             return _by_anchor([getattr(one, name).get(side, Limb(anchor=OWN)) for one in poses], track)
@@ -222,13 +219,13 @@ def tumble(body: StandingBody, motion: WholeMotion) -> None:
     joints[:, CARRIED] += (put - joints[:, 0])[:, None]
     clear = np.min([joints[:, j, 1] - room for j, room in _ROOM.items()], axis=0)
     lift = np.maximum(-clear, 0.0) - motion.rest * np.maximum(clear, 0.0)
-    joints[:, CARRIED, 1] += gaussian_filter1d(lift, _SMOOTH, mode="nearest")[:, None]
+    joints[:, CARRIED, 1] += blurred(lift, _SMOOTH)[:, None]
     pelvis = _pelvis_axes(axes, motion.tilt)
     for _ in range(3):  # a body whose knees would be in the floor is lifted
         for side in SIDES:
             _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * LEVEL))
         sunk = np.maximum(_BEND - joints[:, [4, 5], 1].min(-1), 0.0)
-        joints[:, CARRIED, 1] += gaussian_filter1d(sunk, _SMOOTH, mode="nearest")[:, None]
+        joints[:, CARRIED, 1] += blurred(sunk, _SMOOTH)[:, None]
     for side in SIDES:
         _solve_leg(joints, idle, side, motion, (axes, pelvis, rest * LEVEL))
         _solve_arm(joints, side, motion, (axes, rest * LEVEL))
@@ -307,7 +304,7 @@ def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Arra
     for _ in range(2):  # elbows that would be in the floor are lifted
         joints[:, elbow], joints[:, wrist] = two_bones(joints[:, shoulder], wrists, pole, lengths)
         sunk = np.clip((_BEND - joints[:, elbow, 1]) / _BEND, 0.0, 2.0)
-        pole = normalize(pole) + gaussian_filter1d(sunk, 2.0, mode="nearest")[:, None] * [0.0, 1.0, 0.0]
+        pole = normalize(pole) + blurred(sunk, 2.0)[:, None] * [0.0, 1.0, 0.0]
 
 
 def centre_of_mass(joints: Array) -> Array:

@@ -1,15 +1,16 @@
-"""Bodies that fall dead to the floor and stay there; see `marey.data.gestures`."""
+"""Bodies that fall to the floor and stay there."""
 
 from __future__ import annotations
 
 import random
 from dataclasses import replace
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair
+from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import LEFT, RIGHT
+from marey.posing.tumbling import FLOOR, OWN, Limb, Tumble, Whole, pair
 
-_FORMS = {"back": 4, "front": 3, "knees": 4, "knees-side": 2, "side": 3, "sit": 2, "spin": 2}
+FORMS = {"back": 4, "front": 3, "knees": 4, "knees-side": 2, "side": 3, "sit": 2, "spin": 2}
+"""How a body falls, and how often of 20 times, if that is left open."""
 _TEMPOS = {"quick": (0.8, 0.95), "": (0.95, 1.2), "slow": (1.4, 2.0)}
 """Factors of the seconds before a body falls; the fall itself takes as long as it does under gravity."""
 _CHEST = Limb((-0.12, -0.2, 0.2), towards=(0.9, -0.6, 0.2))
@@ -60,12 +61,21 @@ def _on_right(rng: random.Random, at: tuple[float, float]) -> Whole:
     return Whole(at, 0.16, tilt, spine, (rng.uniform(0, 14), rng.uniform(2, 10), 0), hands, feet, 1.0, 0.05)
 
 
-def die(rng: random.Random) -> Gesture:
-    form = rng.choices(list(_FORMS), list(_FORMS.values()))[0]
-    tempo = rng.choice(["quick", "", "", "slow"])
+def die(rng: random.Random, form: str = "", *, side: str = "", hit: bool | None = None, slow: bool = False) -> Gesture:
+    """A body that falls dead, or faints, or loses its footing.
+
+    Args:
+        rng: decides everything that is not given.
+        form: back, front, knees (then onto the front), knees-side, side, sit (then onto the back) or spin.
+        side: left or right, to which it falls, where the form has a side.
+        hit: something strikes it first.
+        slow: it takes its time to go down.
+    """
+    form = form or rng.choices(list(FORMS), list(FORMS.values()))[0]
+    tempo = "slow" if slow else rng.choice(["quick", "", "", "slow"])
     pace = rng.uniform(*_TEMPOS[tempo])
     done = Tumble(times=[rng.uniform(0.15, 0.8)])
-    hit = rng.random() < 0.55
+    hit = rng.random() < 0.55 if hit is None else hit
     if hit:
         _struck(rng, done, form)
     {
@@ -81,7 +91,7 @@ def die(rng: random.Random) -> Gesture:
     done.then(rng.uniform(0.15, 0.25), replace(rests, neck=(0.6 * rests.neck[0], rests.neck[1], rests.neck[2])))
     done.then(0.3, rests, rng.uniform(0.5, 3.2))
     lies = {"back": "back", "front": "front", "knees": "front", "sit": "back", "spin": "back"}.get(form, "side")
-    turned = done.mirrored() if rng.random() < 0.5 else done
+    turned = done.mirrored() if (side == LEFT if side else rng.random() < 0.5) else done
     kinds = ["die", f"die-{form}", f"die-on-{lies}", "die-hit" if hit else "die-faint", f"die-{tempo}" if tempo else ""]
     untrue = {"back": "forward|face", "front": "back", "side": "back|forward|face"}[lies]
     return turned.gesture(rng, kinds, untrue=rf"\b({untrue})" + ("" if hit else r"|\bshot|kill|knock"))

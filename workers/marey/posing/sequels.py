@@ -1,4 +1,4 @@
-"""Sequences of postures with their times, and small changes of them; see `marey.data.gesture_postures`."""
+"""Sequences of postures with their times, and small changes of them; see `marey.posing.postures`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from marey.data.gesture_drawing import SIDES, Gesture
-from marey.data.gesture_posing import pose
-from marey.data.gesture_postures import STAND, HandPlace, Point, Posture, mirrored
+from marey.posing.gesture import SIDES, Gesture
+from marey.posing.passing import pose
+from marey.posing.postures import STAND, HandPlace, Point, Posture, mirrored
 
 TEMPOS = {"quick": (0.4, 0.6), "": (0.7, 1.1), "slow": (1.2, 1.9)}
 """Seconds of going down or up."""

@@ -1,0 +1,82 @@
+"""Words of which models read another action than is asked for, replaced before a prompt is read (ours)."""
+
+from __future__ import annotations
+
+import re
+
+_UP_TO = re.compile(
+    r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
+    (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
+    (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_DOWN = re.compile(
+    r"""\bdown(?=\ (?:the|a|an|his|her|their|this|that)\ (?:[\w-]+\ ){0,2}
+    (?:road|street|hall|hallway|corridor|aisle|path|catwalk|runway|alley|lane|sidewalk|pavement|avenue|track|beach
+    |boardwalk|river|shore|trail|block|line|row|tunnel)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_GAITS = r"walk|run|jog|stroll|stride|march|sprint|hurry|hurri|trot|wander|trudge|limp|rush"
+_RETURN = re.compile(
+    rf"""\b(?P<way>(?:{_GAITS}|go|head|make(?P<his>s?\ (?:his|her|their|its)\ way)?)(?:e?s|ing)?)\ back
+    (?=\ (?:to|home|into|in|inside|towards?|again|through|across|along|down|up)\b)(?!\ (?:and|to\ back)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A way to where somebody was before: "walks back to his car"."""
+_TURNED_BACK = re.compile(
+    rf"""(?P<turn>\b(?:turns?|turning|spins?|spinning|whirls?|swings?|wheels?|pivots?|does\ an\ about[ -]face)
+    (?:\ (?:around|round|about|back|180(?:\ degrees)?))?(?:,|,?\ (?:and(?:\ then)?|then|to))\ )
+    (?P<way>(?:{_GAITS}|go)(?:e?s|ing)?)\ back(?!wards?\b|\ (?:and|to|home|into|in|inside)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A way behind a turn: "turns around and walks back"."""
+_TO_AND_FRO = re.compile(
+    r"""\b(?P<verb>pace|walk|stride|march|wander|stroll)(?P<end>e?s|ing)?[ ]
+    (?:(?:nervous|anxious|impatient|restless|angr|slow|quick)\w*\ )?
+    (?:back\ and\ forth|to\ and\ fro|up\ and\ down(?!\ (?:the\ )?(?:stairs?|steps|hill)))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A way with turns: "paces back and forth"."""
+_STRUCK = re.compile(
+    r"""\b(?P<is>is|are|gets?|got|getting|being)[ ](?P<how>\w+ly\ )?
+    (?:stabbed|kicked|slashed|slapped|pushed|shoved|bitten|tackled|clubbed|headbutted|elbowed|kneed|whipped|smacked
+    |speared|rammed)\b(?!\ (?:away|off|around|along|through|to|by\ (?:a|the)\ (?:man|woman|person|worker))\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""What another does to the person: "is pushed from behind"."""
+_STRUCK_DOWN = re.compile(
+    r"""\b(?:is|are|gets?|got)[ ](?:\w+ly[ ])?
+    (?:shot|hit|struck|stabbed|punched|kicked|slashed|pushed|shoved|tackled|clubbed|wounded|headbutted)\b
+    [^,.;]{0,40}?(?:,[ ](?:and[ ])?(?:then[ ])?|[ ]and[ ](?:then[ ])?)
+    (?=(?:slowly[ ]|suddenly[ ]|instantly[ ])?(?:falls?|dies?|collapses?|drops?[ ](?:dead|to[ ]the|down)
+    |crumples?|topples?|keels?|goes?[ ]down|slumps?)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""What makes somebody fall: the blow is part of the fall."""
+
+
+def without_misleading(prompt: str) -> str:
+    """Return a prompt without words of which models read another action.
+
+    Who "walks up to the door" goes there, and who "walks down the street" goes along it: of "up" and "down" models read
+    a climb. Who "walks back to his car" or "turns around and walks back" walks ahead, who "paces back and forth" turns
+    on the way, and who "is kicked" is hit. The blow of who "is shot and falls" is part of the fall.
+    """
+    text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
+    text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
+    return _STRUCK.sub(_hit, _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text)))
+
+
+def _with_turns(found: re.Match[str]) -> str:
+    """Return a way to and fro, told as ways and turns."""
+    if (found["end"] or "").endswith("ing"):
+        return f"{found['verb']}ing forward, turning around and walking forward"
+    ending = found["end"] or ""
+    walks, turns = ("walks", "turns around") if ending else ("walk", "turn around")
+    return f"{walks} forward, {turns}, {walks} forward, {turns} and {walks} forward"
+
+
+def _hit(found: re.Match[str]) -> str:
+    """Return what happens to who is struck."""
+    gets = {"is": "gets", "are": "get", "being": "getting"}.get(found["is"].lower(), found["is"])
+    return f"{gets} {found['how'] or ''}hit"

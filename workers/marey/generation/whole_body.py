@@ -1,0 +1,204 @@
+"""Movements of the whole body, drawn from a body that stands, crawls or lies: falls, rolls, flips, crawls, ways to the
+floor and back.
+
+Networks know how such a movement begins; then they roll on, fall twice, turn the other way over, or crawl in place. The
+movements are those of the made clips of the training data, with the direction and the number that the prompt names.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.generation.fine_wish import FineWish
+from marey.posing.crawls import crawl
+from marey.posing.falls import FORMS, die
+from marey.posing.floor import get_up, lie, lie_down
+from marey.posing.gesture import Gesture
+from marey.posing.limbs import FPS
+from marey.posing.rolls import flip, roll
+from marey.posing.standing import StandingBody
+from marey.posing.still import standing_still
+
+Array = NDArray[np.floating]
+Choice = Callable[[FineWish, random.Random, float | None], Gesture]
+"""`(wish, rng, seconds)`: a movement as the prompt asks for; seconds that it has to fill, or None."""
+
+TRIES = 12
+"""Movements of random length, of which the longest is taken that is not too long."""
+QUICKER = 0.7
+"""Share of its length to which a movement is shortened at most."""
+MOST = 4
+"""Times that a movement is done at most, one after the other."""
+_BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
+_FRONT = re.compile(r"\b(?:forwards?|face|face[ -]?(?:first|down)|front|prone|stomach|belly|chest|trip\w*|stumbl\w*)\b")
+_SIDE = re.compile(r"\b(?:side|sides|sideways|left|right|over to (?:one|his|her|the) side)\b")
+_KNEES = re.compile(r"\bknees?\b")
+_SPINS = re.compile(r"\b(?:spins?|spinning|whirls?|twists?)\b")
+_HIT = re.compile(
+    r"\b(?:shot|shots|gunned|hit|struck|stabbed|punched|killed|slain|bullets?|arrow|blow|wound\w*|knocked|headshot|sniper)\b"
+)
+_SLOWLY = re.compile(r"\b(?:slow\w*|gradual\w*|sinks?|slump\w*|crumples?)\b")
+_LOG = re.compile(r"\b(?:side|sideways|log|barrel|pencil|over onto|lateral\w*)\b")
+_SIDE_NAMED = re.compile(r"\b(left|right)\b")
+_CROUCHES = re.compile(r"\b(?:crouch\w*|kneel\w*|knee|squat\w*|stays? low)\b")
+_SHOULDER = re.compile(r"\b(?:shoulder|combat|dodge|tactical|parkour|judo|evad\w*|evasive)\b")
+_IN_BED = re.compile(r"\b(?:bed|sleep\w*|asleep|lying|lies)\b")
+_ON_SIDE = re.compile(r"\b(?:(?:his|her|their|the|its|one|left|right) side|foetal|fetal|curl\w*|sideways)\b")
+_RISES = re.compile(
+    r"\b(?:gets?|getting|stands?|standing|rises?|rising|picks? (?:him|her|them|it)sel\w+) (?:back )?up\b|\brises?\b"
+)
+_CRAWLS = re.compile(r"\bcrawl\w*\b|\bon all fours\b|\bhands and knees\b")
+_ON_FOURS = re.compile(r"\b(?:all fours|hands and knees|a crawl|crawling)\b")
+_ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|chest)\b")
+
+
+def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    knees, aside = bool(_KNEES.search(text)), bool(_SIDE.search(text))
+    forms = [
+        *(["knees-side"] if knees and aside else ["knees"] if knees else []),
+        *(["spin"] if _SPINS.search(text) else []),
+        *(["back", "back", "sit"] if _BACK.search(text) else []),
+        *(["front"] if _FRONT.search(text) else []),
+        *(["side"] if aside else []),
+    ]
+    if _RISES.search(wish.beside[1].lower()):  # from the posture that `_get_up` begins in
+        forms = ["front" if _ends_on_front(text) else "back"]
+    first = forms[:1] if knees else forms  # the knees come first, then what is said beside them
+    form = rng.choice(first) if first else rng.choices(list(FORMS), list(FORMS.values()))[0]
+    named = _SIDE_NAMED.search(text) if form in ("side", "knees-side") else None
+    return die(rng, form, side=named[1] if named else "", hit=bool(_HIT.search(text)), slow=bool(_SLOWLY.search(text)))
+
+
+def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    named = _SIDE_NAMED.search(text)
+    if _LOG.search(text) or (named and not _SHOULDER.search(text)):
+        form = "sideways"
+    elif re.search(r"\b(?:back|backwards?)\b", text):
+        form = "backward"
+    else:
+        form = "shoulder" if _SHOULDER.search(text) else "forward"
+    again = (wish.count or 1) > 1
+    low = not again and _CROUCHES.search(text) is not None
+    return roll(rng, form, side=named[1] if named else "", stands=again, crouches=low)
+
+
+def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    front = re.search(r"\b(?:front|forwards?|front[ -]?flips?|frontflips?)\b", text)
+    back = re.search(r"\b(?:back|backwards?|back[ -]?(?:flip|tuck|somersault)\w*|backflips?)\b", text)
+    form = rng.choice(["back", "front"]) if bool(front) == bool(back) else "front" if front else "back"
+    runs = re.search(r"\b(?:run|runs|running|steps?)\b", text)
+    return flip(rng, form, stands=not runs or (wish.count or 1) > 1)
+
+
+def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    back = bool(re.search(r"\b(?:backwards?|in reverse)\b", wish.prompt.lower()))
+    return crawl(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+
+
+def _lie_down(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return lie_down(rng, "lie-front" if _ONTO_FRONT.search(wish.prompt.lower()) else "lie-back")
+
+
+def _lie(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    return lie(rng, "lie-front" if _ONTO_FRONT.search(wish.prompt.lower()) else "lie-back", seconds=seconds)
+
+
+def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    before, text = wish.beside[0].lower(), wish.prompt.lower()
+    if _CRAWLS.search(before) or _ON_FOURS.search(text):
+        return get_up(rng, "fours")
+    return get_up(rng, "lie-front" if _ends_on_front(before) or _ONTO_FRONT.search(text) else "lie-back")
+
+
+def _ends_on_front(before: str) -> bool:
+    """Return True if a movement ends on the front, so far as its words say."""
+    return bool(_ONTO_FRONT.search(before) or (_FRONT.search(before) and not _BACK.search(before)))
+
+
+CHOICES: Mapping[str, Choice] = {
+    "die": _fall,
+    "roll": _roll,
+    "flip": _flip,
+    "crawl": _crawl,
+    "lie-down": _lie_down,
+    "lie": _lie,
+    "get-up": _get_up,
+}
+"""Movements by action."""
+AGAIN = frozenset({"roll", "flip"})
+"""Actions that begin and end standing, and are done again."""
+LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {"roll": _IN_BED, "lie-down": _ON_SIDE, "lie": _ON_SIDE}
+"""Words of movements that are not drawn."""
+
+
+def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Generator], Array | None]:
+    """Return a function that draws an action in place of a motion; None for a kind that is not drawn, and for a motion
+    that is too short for it."""
+    others = LEFT_TO_NETWORKS.get(action)
+
+    def drawn(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
+        del fps
+        if others is not None and others.search(wish.prompt.lower()):
+            return None
+        chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
+        times = min(wish.count or 1, MOST) if action in AGAIN else 1
+        frames = len(joints) if wish.fixed else None
+        gestures = _fitting(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames)
+        return None if gestures is None else _joined(gestures, frames, chance)
+
+    return drawn
+
+
+def _fitting(draw: Callable[[float | None], Gesture], times: int, frames: int | None) -> list[Gesture] | None:
+    """Return as many movements as are asked for, the longest that have room in so many frames."""
+    if frames is None:
+        return [draw(None) for _ in range(times)]
+    tries = [[draw(frames / FPS) for _ in range(times)] for _ in range(TRIES)]
+    lengths = [_frames(found) for found in tries]
+    room = [length for length in lengths if length <= frames]
+    best = max(room) if room else min(lengths)
+    return tries[lengths.index(best)] if QUICKER * best <= frames else None
+
+
+def _frames(gestures: Sequence[Gesture]) -> int:
+    return sum(max(round(each.seconds * FPS), 2) for each in gestures)
+
+
+def _joined(gestures: Sequence[Gesture], frames: int | None, rng: random.Random) -> Array:
+    """Draw movements one after the other, each where the one before it ends; the last posture is held."""
+    lengths = [max(round(each.seconds * FPS), 2) for each in gestures]
+    if frames is not None:
+        lengths[-1] = max(lengths[-1], frames - sum(lengths[:-1]))
+    idle = standing_still(sum(lengths), rng)
+    parts: list[Array] = []
+    start, moved = 0, np.zeros(3)
+    for gesture, length in zip(gestures, lengths, strict=True):
+        body = StandingBody(idle[start : start + length])
+        gesture.change(body)
+        part = body.solved() + moved
+        parts.append(part)
+        moved = (part[-1, 0] - idle[start + length - 1, 0]) * [1.0, 0.0, 1.0]
+        start += length
+    whole = np.concatenate(parts)
+    return whole if frames is None or len(whole) == frames else _retimed(whole, frames)
+
+
+def _retimed(joints: Array, frames: int) -> Array:
+    """Return as many frames at another pace."""
+    at = np.linspace(0.0, len(joints) - 1.0, frames)
+    low = np.minimum(at.astype(int), len(joints) - 2)
+    share = (at - low)[:, None, None]
+    return (1 - share) * joints[low] + share * joints[low + 1]
