@@ -31,7 +31,7 @@ _TURNED_BACK = re.compile(
 )
 """A way behind a turn: "turns around and walks back"."""
 _TO_AND_FRO = re.compile(
-    r"""\b(?P<verb>pace|walk|stride|march|wander|stroll)(?P<end>e?s|ing)?[ ]
+    r"""\b(?:pace?|walk|strid?e?|march|wander|stroll)(?P<end>e?s|ing)?[ ]
     (?:(?:nervous|anxious|impatient|restless|angr|slow|quick)\w*\ )?
     (?:back\ and\ forth|to\ and\ fro|up\ and\ down(?!\ (?:the\ )?(?:stairs?|steps|hill)))""",
     re.IGNORECASE | re.VERBOSE,
@@ -69,10 +69,10 @@ def without_misleading(prompt: str) -> str:
 
 def _with_turns(found: re.Match[str]) -> str:
     """Return a way to and fro, told as ways and turns."""
-    if (found["end"] or "").endswith("ing"):
-        return f"{found['verb']}ing forward, turning around and walking forward"
-    ending = found["end"] or ""
-    walks, turns = ("walks", "turns around") if ending else ("walk", "turn around")
+    end = found["end"] or ""
+    if end.endswith("ing"):
+        return "walking forward, turning around and walking forward"
+    walks, turns = ("walks", "turns around") if end else ("walk", "turn around")
     return f"{walks} forward, {turns}, {walks} forward, {turns} and {walks} forward"
 
 

@@ -205,3 +205,11 @@ def test_other_shapes_and_numbers_are_refused() -> None:
     for bad in (np.zeros((7, 22, 3)), np.zeros((20, 21, 3)), np.full((20, 22, 3), np.nan)):
         with pytest.raises(InvalidInput, match="joints"):
             Motion(bad, 20.0)
+
+
+def test_a_fall_that_is_told_twice_is_one() -> None:
+    falls, jumps = wanted_of(["he slips on ice and dies", "a person falls"]), wanted_of(["he jumps", "he jumps"])
+    assert falls is not None
+    assert [[each.action for each in step] for step in falls] == [["die"]]
+    assert jumps is not None
+    assert len(jumps) == 2

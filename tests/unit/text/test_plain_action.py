@@ -14,7 +14,7 @@ from marey.text.action_reader import action_reader
 from marey.text.encoders import Encoding
 from marey.text.keys import feature_key
 from marey.text.pipeline import TextPipeline
-from marey.text.plain_action import ALONE, MOST_WORDS, only_action, with_plain_action, without_rise
+from marey.text.plain_action import ALONE, MOST_WORDS, only_action, with_plain_action
 from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.entries import Action, load_vocabulary
 from tests.support.texts import shared_pipeline
@@ -28,21 +28,6 @@ def pipeline() -> TextPipeline:
 def plain_pipeline(pipeline: TextPipeline, **more: bool) -> TextPipeline:
     spec = pipeline.spec.model_copy(update={"plain_action": True, **more})
     return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
-
-
-@pytest.mark.parametrize(
-    ("prompt", "read"),
-    [
-        ("A hero walks up to the door", "A hero walks to the door"),
-        ("runs right up to her", "runs to her"),
-        ("walks up to the second floor", "walks up to the second floor"),
-        ("climbs up to the roof", "climbs up to the roof"),
-        ("goes up to the roof", "goes up to the roof"),
-        ("walks up the hill", "walks up the hill"),
-    ],
-)
-def test_who_walks_up_to_somebody_does_not_rise(prompt: str, read: str) -> None:
-    assert without_rise(prompt) == read
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,206 @@
+"""Falls, rolls, flips, crawls and ways to the floor and back, drawn as their prompt asks."""
+
+from __future__ import annotations
+
+import random
+from functools import partial
+
+import numpy as np
+import pytest
+
+from marey.generation.fine import FINE, drawn_features
+from marey.generation.fine_wish import FineWish
+from marey.generation.whole_body import CHOICES, QUICKER
+from marey.motion.features import HUMANML3D_263
+from marey.posing.still import standing_still
+from marey.selector.motion import Motion
+from marey.selector.rules import RULES
+from tests.support.bodies import Body
+from tests.support.drawn_motions import drawn_on
+
+FPS = HUMANML3D_263.fps
+STANDS = Body(5.0).joints()
+PELVIS, HEAD, CHEST, HIPS, NECK = 0, 15, 9, [1, 2], 12
+SEEDS = range(6)
+
+drawn = partial(drawn_on, STANDS)
+
+
+def front_of(joints: np.ndarray) -> np.ndarray:
+    """Unit vectors (T, 3) that the chest faces."""
+    across, up = joints[:, 16] - joints[:, 17], joints[:, NECK] - joints[:, PELVIS]
+    front = np.cross(across, up)
+    return front / np.linalg.norm(front, axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("action", CHOICES)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_each_shows_its_action_on_the_floor_without_breaks(action: str, seed: int) -> None:
+    joints = drawn(action, seed=seed)
+    assert RULES[action](Motion(joints, FPS), "") >= 0.5
+    assert joints[..., 1].min() > -0.03
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < (0.75 if action == "flip" else 0.5), (
+        "no joint leaps"
+    )
+    assert len(joints) > 2 * FPS
+
+
+@pytest.mark.parametrize(
+    ("prompt", "faces"),
+    [
+        ("a man slips on ice and falls", 1),
+        ("falls backward", 1),
+        ("she trips and falls forward", -1),
+        ("dies, falling face down", -1),
+        ("drops to his knees and falls dead", -1),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_fall_ends_as_its_words_say_and_stays(prompt: str, faces: int, seed: int) -> None:
+    joints = drawn("die", prompt, seed=seed)
+    front = front_of(joints)[-1, 1]
+    assert front * faces > 0.6
+    late = joints[-round(0.3 * FPS) :]
+    assert np.abs(late - late[-1]).max() < 0.05
+    assert late[:, [PELVIS, CHEST, HEAD], 1].max() < 0.35
+
+
+def test_a_fall_over_the_knees_kneels_first() -> None:
+    for seed in SEEDS:
+        joints = drawn("die", "falls to his knees and dies", seed=seed)
+        kneels = (joints[:, [4, 5], 1].max(axis=1) < 0.2) & (joints[:, NECK, 1] > 0.75)
+        assert kneels.sum() >= 4
+
+
+@pytest.mark.parametrize(("prompt", "way"), [("falls to the left", 1), ("falls over to the right side", -1)])
+def test_a_fall_goes_to_the_side_that_is_named(prompt: str, way: int) -> None:
+    for seed in SEEDS:
+        joints = drawn("die", prompt, seed=seed)
+        assert way * (joints[-1, PELVIS, 0] - joints[0, PELVIS, 0]) > 0.3
+
+
+def test_the_wounded_are_hit_before_they_fall() -> None:
+    def hand_at_trunk(prompt: str, seed: int) -> float:
+        joints = drawn("die", prompt, seed=seed)
+        upright = joints[:, NECK, 1] > 1.2
+        return float(np.linalg.norm(joints[:, [20, 21]] - joints[:, [CHEST]], axis=-1).min(1)[upright].min())
+
+    shot = [hand_at_trunk("is shot and falls backward", seed) for seed in SEEDS]
+    faint = [hand_at_trunk("faints and falls backward", seed) for seed in SEEDS]
+    assert np.median(shot) < np.median(faint) - 0.1
+
+
+@pytest.mark.parametrize(
+    ("prompt", "forward"), [("a forward roll", 1), ("rolls backwards", -1), ("a combat roll", 1), ("a dive roll", 1)]
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_roll_goes_where_its_words_say_and_ends_on_the_feet(prompt: str, forward: int, seed: int) -> None:
+    joints = drawn("roll", prompt, seed=seed)
+    assert forward * (joints[-1, PELVIS, 2] - joints[0, PELVIS, 2]) > 1.0
+    assert joints[-1, HEAD, 1] > 1.3
+    assert joints[:, HEAD, 1].min() < 0.35
+
+
+@pytest.mark.parametrize(("prompt", "way"), [("rolls to the left", 1), ("a sideways roll to the right", -1)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_roll_goes_to_the_side_that_is_named(prompt: str, way: int, seed: int) -> None:
+    joints = drawn("roll", prompt, seed=seed)
+    assert way * (joints[-1, PELVIS, 0] - joints[0, PELVIS, 0]) > 0.8
+
+
+def test_a_roll_that_ends_low_stays_low() -> None:
+    assert drawn("roll", "rolls into a crouch")[-1, PELVIS, 1] < 0.7
+
+
+@pytest.mark.parametrize(("prompt", "forward"), [("a front flip", 1), ("a backflip", -1), ("flips backwards", -1)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_flip_turns_over_in_the_direction_that_is_named(prompt: str, forward: int, seed: int) -> None:
+    joints = drawn("flip", prompt, seed=seed)
+    trunk = joints[:, NECK] - joints[:, PELVIS]
+    angle = np.unwrap(np.arctan2(trunk[:, 2], trunk[:, 1]))
+    assert np.degrees(forward * (angle[-1] - angle[0])) == pytest.approx(360, abs=30)
+    assert joints[:, [7, 8, 10, 11], 1].min(axis=1).max() > 0.3
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_flips_are_as_many_as_asked_for(count: int) -> None:
+    joints = drawn("flip", "backflips", count=count)
+    trunk = joints[:, NECK] - joints[:, PELVIS]
+    angle = np.unwrap(np.arctan2(trunk[:, 2], trunk[:, 1]))
+    assert abs(np.degrees(angle[-1] - angle[0])) == pytest.approx(360 * count, abs=30)
+
+
+@pytest.mark.parametrize(("prompt", "forward"), [("crawls forward", 1), ("crawls backward", -1)])
+def test_a_crawl_travels(prompt: str, forward: int) -> None:
+    for seed in SEEDS:
+        joints = drawn("crawl", prompt, seed=seed)
+        assert forward * (joints[-1, PELVIS, 2] - joints[0, PELVIS, 2]) > 0.4
+        assert joints[:, HEAD, 1].max() < 0.8
+
+
+@pytest.mark.parametrize(("prompt", "faces"), [("lies down", 1), ("lies down on his stomach", -1)])
+def test_who_lies_down_lies_as_the_words_say(prompt: str, faces: int) -> None:
+    for action in ("lie-down", "lie"):
+        assert faces * front_of(drawn(action, prompt))[-1, 1] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("before", "prompt", "faces"),
+    [
+        ("", "gets up", 1),
+        ("trips and falls forward", "gets up", -1),
+        ("slips and falls on his back", "gets up", 1),
+        ("lies face down", "stands up", -1),
+        ("", "gets up from his stomach", -1),
+        ("crawls forward", "stands up", -1),
+    ],
+)
+def test_who_gets_up_begins_as_the_movement_before_ends(before: str, prompt: str, faces: int) -> None:
+    wish = FineWish(prompt=prompt, beside=(before, ""))
+    features = drawn_features(HUMANML3D_263.encode(STANDS), HUMANML3D_263, "get-up", wish, 3)
+    assert features is not None
+    joints = HUMANML3D_263.decode(features).astype(np.float64)
+    assert faces * front_of(joints)[0, 1] > 0.6
+    assert joints[-1, HEAD, 1] > 1.4
+    assert (joints[0, PELVIS, 1] > 0.35) == ("crawl" in before)
+
+
+def test_who_falls_and_then_rises_falls_so_that_it_can_be_gone_on_from() -> None:
+    for seed in SEEDS:
+        wish = FineWish(prompt="falls down", beside=("", "gets up again"))
+        features = drawn_features(HUMANML3D_263.encode(STANDS), HUMANML3D_263, "die", wish, seed)
+        assert features is not None
+        assert front_of(HUMANML3D_263.decode(features).astype(np.float64))[-1, 1] > 0.6
+
+
+@pytest.mark.parametrize("action", CHOICES)
+@pytest.mark.parametrize("frames", [70, 120, 190])
+def test_a_length_that_is_fixed_is_kept(action: str, frames: int) -> None:
+    still = standing_still(frames + 1, random.Random(0))
+    wish = FineWish(fixed=True)
+    features = drawn_features(HUMANML3D_263.encode(still), HUMANML3D_263, action, wish, 1)
+    if features is not None:
+        assert len(features) == frames
+    else:
+        assert frames < 120, "there is time for each in six seconds"
+
+
+def test_what_does_not_fit_is_not_drawn() -> None:
+    still = standing_still(24, random.Random(0))
+    features = HUMANML3D_263.encode(still)
+    assert drawn_features(features, HUMANML3D_263, "get-up", FineWish(fixed=True), 1) is None
+    assert 0.5 < QUICKER < 1.0
+
+
+@pytest.mark.parametrize(
+    ("action", "prompt"), [("roll", "rolls over in his sleep"), ("lie", "lies on his side"), ("lie-down", "curls up")]
+)
+def test_kinds_that_are_not_drawn_stay_as_the_network_makes_them(action: str, prompt: str) -> None:
+    wish = FineWish(prompt=prompt)
+    assert FINE[action].draw(STANDS, FPS, wish, np.random.default_rng(0)) is None
+
+
+def test_motions_differ_from_seed_to_seed_and_are_the_same_for_one() -> None:
+    first, again, other = (drawn("die", "dies", seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert first.shape != other.shape or np.abs(first - other).max() > 0.1

@@ -1,0 +1,88 @@
+"""Words of which models read another action than is asked for."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.text.misleading_words import without_misleading
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("A hero walks up to the door", "A hero walks to the door"),
+        ("runs right up to her", "runs to her"),
+        ("walks up to the second floor", "walks up to the second floor"),
+        ("climbs up to the roof", "climbs up to the roof"),
+        ("goes up to the roof", "goes up to the roof"),
+        ("walks up the hill", "walks up the hill"),
+    ],
+)
+def test_who_walks_up_to_somebody_does_not_rise(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("he jogs back to his car", "he jogs to his car"),
+        ("a man walks back home", "a man walks home"),
+        ("she turns around and walks back", "she turns around and walks forward"),
+        ("A guard walks forward, turns and runs back.", "A guard walks forward, turns and runs forward."),
+        ("turns, then walks backwards", "turns, then walks backwards"),
+        ("he steps back", "he steps back"),
+        ("a man walks back three steps", "a man walks back three steps"),
+        ("walks back slowly, watching the door", "walks back slowly, watching the door"),
+        ("he looks back to the house", "he looks back to the house"),
+    ],
+)
+def test_who_returns_walks_ahead(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        (
+            "a man paces back and forth",
+            "a man walks forward, turns around, walks forward, turns around and walks forward",
+        ),
+        ("pace up and down", "walk forward, turn around, walk forward, turn around and walk forward"),
+        ("a father pacing to and fro", "a father walking forward, turning around and walking forward"),
+        ("walks up and down the stairs", "walks up and down the stairs"),
+        ("rocks back and forth", "rocks back and forth"),
+    ],
+)
+def test_a_way_to_and_fro_has_turns(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("she is pushed from behind", "she gets hit from behind"),
+        ("a man gets kicked in the leg", "a man gets hit in the leg"),
+        ("a knight is brutally slashed", "a knight gets brutally hit"),
+        ("a man kicks a ball", "a man kicks a ball"),
+        ("a trolley is pushed along the corridor", "a trolley is pushed along the corridor"),
+        ("a crate is pushed by a man", "a crate is pushed by a man"),
+        ("he is thrown out", "he is thrown out"),
+    ],
+)
+def test_who_is_struck_is_hit(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("a warrior is stabbed and dies", "a warrior dies"),
+        ("he is shot in the chest and falls backward", "he falls backward"),
+        ("gets hit in the back, then falls forward", "falls forward"),
+        ("a man is shot, drops dead", "a man drops dead"),
+        ("is hit and drops his sword", "is hit and drops his sword"),
+        ("is hit and walks on", "is hit and walks on"),
+    ],
+)
+def test_a_blow_is_part_of_the_fall(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
