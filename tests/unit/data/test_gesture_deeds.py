@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from marey.data import gestures
-from marey.data.gesture_flights import flight_height, standing_feet
 from marey.data.gestures import KINDS, made_gestures
 from marey.data.part import GRAVITY, MAX_FRAMES, Part
+from marey.drawing.flights import flight_height, standing_feet
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import StandingBody
 from tests.support.bodies import FPS

@@ -11,9 +11,9 @@ import pytest
 from marey.data import gestures
 from marey.data.gestures import made_gestures
 from marey.data.part import MAX_FRAMES, Part
+from marey.drawing.tumbling import Limb, Tumble, Whole, centre_of_mass, flipped, stood
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import StandingBody
-from marey.posing.tumbling import Limb, Tumble, Whole, centre_of_mass, flipped, stood
 from tests.support.bodies import FPS
 from tests.unit.data.test_gestures import FALLS, OTHER, few, idle, tilt
 

@@ -11,9 +11,9 @@ import pytest
 from marey.data import gestures
 from marey.data.gestures import made_gestures, read_captions
 from marey.data.part import MAX_FRAMES, Part
+from marey.drawing.passing import pose
+from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture, mirrored
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.passing import pose
-from marey.posing.postures import STAND, FootPlace, HandPlace, Posture, mirrored
 from marey.posing.standing import StandingBody
 from tests.support.bodies import FPS
 from tests.unit.data.test_gestures import OTHER, POSTURES, few, idle, tilt

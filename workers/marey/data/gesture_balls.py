@@ -7,10 +7,10 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
-from marey.posing.gesture import SIDES, Gesture
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.stances import settle, step
 from marey.posing.standing import OTHER_SIDE, StandingBody, eased, envelope
 
 Array = NDArray[np.floating]

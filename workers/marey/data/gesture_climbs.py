@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT
+from marey.drawing.gesture import Gesture
 from marey.posing.bones import with_bones
-from marey.posing.gesture import Gesture
 
 Array = NDArray[np.floating]
 

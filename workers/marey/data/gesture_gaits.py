@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
-from marey.data.gesture_drawing import arms_of, respond
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
-from marey.posing.gesture import BOTH, SIDES, Gesture
+from marey.drawing.gesture import BOTH, SIDES, Gesture
+from marey.drawing.parts import arms_of, respond
 from marey.posing.standing import ARMS, StandingBody
 
 Array = NDArray[np.floating]

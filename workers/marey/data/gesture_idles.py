@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.part import Part
-from marey.posing.gesture import SIDES
+from marey.drawing.gesture import SIDES
 from marey.posing.standing import ARMS
 
 Array = NDArray[np.floating]

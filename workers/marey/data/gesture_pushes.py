@@ -7,12 +7,12 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.data.gesture_stances import settle, step
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT
+from marey.drawing.gesture import BOTH, SIDES, Gesture
+from marey.drawing.stances import settle, step
 from marey.posing.bones import with_bones
-from marey.posing.gesture import BOTH, SIDES, Gesture
 from marey.posing.standing import StandingBody, envelope
 
 Array = NDArray[np.floating]

@@ -7,7 +7,7 @@ import random
 import numpy as np
 
 from marey.data.gesture_travel import gentle_bend, straight_gait
-from marey.posing.gesture import SIDES, Gesture
+from marey.drawing.gesture import SIDES, Gesture
 from marey.posing.standing import StandingBody
 
 _PACES = (0.58, 0.9)

@@ -12,9 +12,9 @@ from marey.data.gesture_steps import small_step_spin
 from marey.data.gesture_ways import about_vertical, posed, spine_yaw
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
+from marey.drawing.gesture import SIDES, Gesture
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.bones import with_bones
-from marey.posing.gesture import SIDES, Gesture
 from marey.posing.limbs import LEG_CHAINS, LEVEL
 from marey.posing.standing import LEFT, StandingBody, eased
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import heading, smooth
 from marey.data.gesture_ways import about_vertical, posed, spine_yaw
 from marey.data.part import FPS
+from marey.drawing.gesture import SIDES, Gesture
 from marey.motion.filters import smooth_above
 from marey.motion.rotations import from_rotvec, rotate
-from marey.posing.gesture import SIDES, Gesture
 from marey.posing.limbs import LEG_CHAINS, LEVEL
 from marey.posing.standing import ARMS, LEFT, StandingBody, eased
 

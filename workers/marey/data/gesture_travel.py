@@ -16,8 +16,8 @@ from marey.data.gesture_ways import STRAIGHT, Bending, relaid
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
+from marey.drawing.gesture import SIDES, Gesture
 from marey.posing.bones import with_bones
-from marey.posing.gesture import SIDES, Gesture
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody
 
 Array = NDArray[np.floating]

@@ -21,55 +21,55 @@ from numpy.typing import NDArray
 from marey.data.captions import seeded
 from marey.data.compose import TRIES
 from marey.data.describe import describe_text
-from marey.data.gesture_aims import aim, shoot_basket
-from marey.data.gesture_archery import draw_bow
-from marey.data.gesture_arms import clap, guide, raise_arm, wave
 from marey.data.gesture_balls import dribble
-from marey.data.gesture_bends import bend_over, pick_up, squat
-from marey.data.gesture_blades import slash, stab
-from marey.data.gesture_cheers import cheer
 from marey.data.gesture_climbs import climb_ladder, climb_onto, is_climb_down, is_ladder
-from marey.data.gesture_crouches import crouch
-from marey.data.gesture_crunches import arabesque, knee_to_elbow
-from marey.data.gesture_dodges import dodge, flinch
-from marey.data.gesture_exercises import jumping_jacks, push_ups, sit_ups
-from marey.data.gesture_fights import block, punch
 from marey.data.gesture_gaits import carry, is_plain_walk, is_quick_run
-from marey.data.gesture_guards import fight_stance
-from marey.data.gesture_hands import reach_forward, talk
-from marey.data.gesture_hangs import hang
-from marey.data.gesture_hops import hop, jump, jump_forward
 from marey.data.gesture_idles import is_plain_idle, of_length
-from marey.data.gesture_kicks import balance, kick, kick_ball
-from marey.data.gesture_kneels import kneel
-from marey.data.gesture_laughs import laugh
 from marey.data.gesture_leaps import leap
-from marey.data.gesture_lifts import arm_circles, drink, reach_up
 from marey.data.gesture_pushes import push
-from marey.data.gesture_seats import sit, sit_down, stand_up
-from marey.data.gesture_shots import shoot
-from marey.data.gesture_signs import signal
 from marey.data.gesture_sneaks import sneak
-from marey.data.gesture_spells import cast_spell
 from marey.data.gesture_spins import is_single_jump, jump_turn, spin
 from marey.data.gesture_stairs import climb_stairs
 from marey.data.gesture_steps import sidestep, turn_around
-from marey.data.gesture_swims import swim
-from marey.data.gesture_throws import throw
 from marey.data.gesture_travel import bent_walk, is_plain_gait, run, sprint, starts_backward, turn, walk_backward
-from marey.data.gesture_trunk import bow, nod, shiver
-from marey.data.gesture_twists import twist
-from marey.data.gesture_washes import wash
-from marey.data.gesture_wheels import drive
 from marey.data.part import FPS, Part
 from marey.data.retime import LIMIT
 from marey.data.soundness import is_broken
 from marey.data.spoken import spoken
-from marey.posing.crawls import crawl
-from marey.posing.falls import die
-from marey.posing.floor import get_up, lie, lie_down, sit_floor
-from marey.posing.gesture import Gesture
-from marey.posing.rolls import flip, roll
+from marey.drawing.aims import aim, shoot_basket
+from marey.drawing.archery import draw_bow
+from marey.drawing.arms import clap, guide, raise_arm, wave
+from marey.drawing.bends import bend_over, pick_up, squat
+from marey.drawing.blades import slash, stab
+from marey.drawing.cheers import cheer
+from marey.drawing.crawls import crawl
+from marey.drawing.crouches import crouch
+from marey.drawing.crunches import arabesque, knee_to_elbow
+from marey.drawing.dodges import dodge, flinch
+from marey.drawing.exercises import jumping_jacks, push_ups, sit_ups
+from marey.drawing.falls import die
+from marey.drawing.fights import block, punch
+from marey.drawing.floor import get_up, lie, lie_down, sit_floor
+from marey.drawing.gesture import Gesture
+from marey.drawing.guards import fight_stance
+from marey.drawing.hands import reach_forward, talk
+from marey.drawing.hangs import hang
+from marey.drawing.hops import hop, jump, jump_forward
+from marey.drawing.kicks import balance, kick, kick_ball
+from marey.drawing.kneels import kneel
+from marey.drawing.laughs import laugh
+from marey.drawing.lifts import arm_circles, drink, reach_up
+from marey.drawing.rolls import flip, roll
+from marey.drawing.seats import sit, sit_down, stand_up
+from marey.drawing.shots import shoot
+from marey.drawing.signs import signal
+from marey.drawing.spells import cast_spell
+from marey.drawing.swims import swim
+from marey.drawing.throws import throw
+from marey.drawing.trunk import bow, nod, shiver
+from marey.drawing.twists import twist
+from marey.drawing.washes import wash
+from marey.drawing.wheels import drive
 from marey.posing.standing import StandingBody
 
 Array = NDArray[np.floating]

@@ -22,6 +22,7 @@ from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
+from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -193,10 +194,9 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if layout.skeleton.name == HUMANML3D.name:
-        if wish.action in FINE and not _shows(features, layout, wish, request):
-            drawn = drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
-            if drawn is not None:
-                features, changes["drawn"] = drawn, wish.action
+        drawn = _drawn(features, layout, wish, request)
+        if drawn is not None:
+            features, changes["drawn"] = drawn, wish.action
         for change in (_as_often, _turned, _on_floor, _ended):
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
@@ -204,11 +204,21 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 
 
+def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
+    """Return the motion with what is drawn of its action, or one that is drawn as a whole; None if it stays."""
+    if wish.action not in FINE:
+        return redrawn(features, layout, wish.action, wish.fine(request), request.seed)
+    if _shows(features, layout, wish, request):
+        return None
+    return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
+
+
 def _as_often(
     features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion with as many repetitions as are asked for; `changes` says so, as in all of these."""
-    if wish.count is None or "drawn" in changes or wish.action not in REPETITIONS:  # what is drawn is as often
+    as_drawn = "drawn" in changes and wish.action in FINE  # as often as asked for
+    if wish.count is None or as_drawn or wish.action not in REPETITIONS:
         return features
     as_often = stepped if wish.action in STEPPING else repeated
     often = as_often(features, layout, lambda joints: _repetitions(joints, layout.fps, wish.action), wish.count)

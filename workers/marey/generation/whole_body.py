@@ -14,13 +14,13 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.drawing.crawls import crawl
+from marey.drawing.falls import FORMS, die
+from marey.drawing.floor import get_up, lie, lie_down
+from marey.drawing.gesture import Gesture
+from marey.drawing.rolls import flip, roll
 from marey.generation.fine_wish import FineWish
-from marey.posing.crawls import crawl
-from marey.posing.falls import FORMS, die
-from marey.posing.floor import get_up, lie, lie_down
-from marey.posing.gesture import Gesture
 from marey.posing.limbs import FPS
-from marey.posing.rolls import flip, roll
 from marey.posing.standing import StandingBody
 from marey.posing.still import standing_still
 

@@ -1,0 +1,124 @@
+"""Waves, raised arms, guiding arms and claps."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+
+from marey.drawing.gesture import BOTH, SIDES, Gesture
+from marey.drawing.parts import GesturePace, arms_of, drawn_arm, respond
+from marey.posing.standing import ARMS, StandingBody, swings, swung
+
+_WAVES = {
+    "wave-high": {"upper": ((20, 100), (5, 60)), "fore": ((30, 90), (72, 88)), "swing": (14, 34)},
+    "wave-low": {"upper": ((5, 60), (-72, -40)), "fore": ((10, 50), (35, 70)), "swing": (17, 34)},
+    "wave-whole": {"upper": ((40, 95), (50, 75)), "fore": ((40, 90), (70, 85)), "swing": (10, 18)},
+}
+"""Azimuths and elevations of upper arm and forearm, and the swing of the forearm to each side, degrees."""
+
+
+def wave(rng: random.Random) -> Gesture:
+    form = rng.choices(list(_WAVES), (5, 3, 2))[0]
+    tempo = rng.choice(["slow", "", "fast"])
+    rate = {"slow": rng.uniform(1.2, 1.6), "": rng.uniform(1.6, 2.4), "fast": rng.uniform(2.4, 3.2)}[tempo]
+    length = rng.choice(["brief", "", "", "long"])
+    hold = {"brief": (1.3 / rate, 1.7 / rate), "": (2.0 / rate, 3.4), "long": (4.2, 6.5)}[length]
+    pace = GesturePace.draw(rng, (0.35, 0.9), hold)
+    side = rng.choices([*SIDES, BOTH], (4, 4, 1))[0]
+    arms = {one: drawn_arm(rng, _WAVES[form]) for one in arms_of(side)}
+    whole = rng.uniform(0.5, 0.9) if form == "wave-whole" else rng.uniform(0, 0.15)
+    twist, sway = rng.uniform(-2, 8), rng.uniform(0, 4)
+    inward = rng.choice((-1.0, 1.0))
+
+    def change(body: StandingBody) -> None:
+        way = pace.way(body)
+        swing = inward * swings(way, rate)
+        respond(body, way, side, twist, sway)
+        for one, arm in arms.items():
+            upper = swung(arm.upper, whole * arm.swing * swing)
+            body.move_arm(one, way, upper, swung(arm.fore, arm.swing * (1 + whole) * swing), arm.lag)
+
+    if side == BOTH:
+        return Gesture(pace.total(rng), ("wave-both",), change, side)
+    kinds = ["wave", "wave-low" if form == "wave-low" else "wave-high"]
+    kinds += [f"wave-{word}" for word in (tempo, length) if word]
+    return Gesture(pace.total(rng), tuple(kinds), change, side)
+
+
+_RAISES = {
+    "raise-up": {"upper": ((10, 90), (64, 86)), "fore": ((0, 90), (74, 89))},
+    "raise-side": {"upper": ((76, 102), (14, 50)), "fore": ((70, 100), (22, 62))},
+    "raise-ahead": {"upper": ((-5, 24), (14, 50)), "fore": ((-8, 22), (20, 60))},
+    "raise-bent": {"upper": ((30, 95), (-5, 35)), "fore": ((20, 90), (72, 89))},
+}
+
+
+def raise_arm(rng: random.Random) -> Gesture:
+    side = rng.choices([*SIDES, BOTH], (4, 4, 2))[0]
+    form = "raise-up" if side == BOTH else rng.choice(list(_RAISES))
+    length = rng.choice(["quick", "", "", "long"])
+    rise = {"quick": (0.3, 0.45), "": (0.45, 1.1), "long": (0.5, 1.4)}[length]
+    hold = {"quick": (0.3, 0.5), "": (0.5, 2.0), "long": (2.2, 5.5)}[length]
+    pace = GesturePace.draw(rng, rise, hold)
+    arms = {one: drawn_arm(rng, _RAISES[form]) for one in arms_of(side)}
+    twist, sway = rng.uniform(-2, 6), rng.uniform(0, 5)
+
+    def change(body: StandingBody) -> None:
+        way = pace.way(body)
+        respond(body, way, side, twist, sway)
+        for one, arm in arms.items():
+            body.move_arm(one, way, arm.upper, arm.fore, arm.lag)
+
+    if side == BOTH:
+        return Gesture(pace.total(rng), ("raise-both",), change, side)
+    kinds = ("raise", form, *([f"raise-{length}"] if length else []))
+    return Gesture(pace.total(rng), kinds, change, side)
+
+
+_GUIDES = {
+    "guide-side": {"upper": ((62, 98), (-42, -12)), "fore": ((60, 95), (-14, 18))},
+    "guide-ahead": {"upper": ((0, 32), (-42, -12)), "fore": ((0, 32), (-14, 18))},
+}
+
+
+def guide(rng: random.Random) -> Gesture:
+    form, side = rng.choice(list(_GUIDES)), rng.choice(SIDES)
+    pace = GesturePace.draw(rng, (0.45, 1.1), (0.7, 2.5))
+    arm = drawn_arm(rng, _GUIDES[form])
+    twist, stoop = rng.uniform(0, 14), rng.uniform(0, 14)
+
+    def change(body: StandingBody) -> None:
+        way = pace.way(body)
+        body.lean(stoop * way, "left")
+        respond(body, way, side, twist, 0.0)
+        body.move_arm(side, way, arm.upper, arm.fore, arm.lag)
+
+    return Gesture(pace.total(rng), (form,), change, side)
+
+
+def clap(rng: random.Random) -> Gesture:
+    high = rng.random() < 0.35
+    tempo = rng.choice(["slow", "", "", "fast"])
+    rate = {"slow": rng.uniform(0.8, 1.5), "": rng.uniform(1.7, 2.4), "fast": rng.uniform(2.6, 3.6)}[tempo]
+    pace = GesturePace.draw(rng, (0.4, 0.9), (3.6 / rate, max(5.0, 4.0 / rate)))
+    above = rng.uniform(0.02, 0.46) if high else rng.uniform(-0.34, -0.06)
+    ahead = rng.uniform(0.18, 0.3) if high else rng.uniform(0.25, 0.36)
+    apart = rng.uniform(0.16, 0.34) if tempo == "slow" else rng.uniform(0.09, 0.22)
+    aside, beat, gaze = rng.uniform(-0.05, 0.05), rng.uniform(0.0, 0.035), rng.uniform(-10, 8)
+
+    def change(body: StandingBody) -> None:
+        way = pace.way(body)
+        swing = swings(way, rate)
+        gap = 0.05 + apart * (0.5 - 0.5 * swing)
+        body.lean((gaze if not high else -abs(gaze)) * way, "left", (12,))
+        body.shift(-0.4 * beat * way * (0.5 + 0.5 * swing))
+        middle = body.joints[:, [ARMS[side][1] for side in SIDES]].mean(1)
+        for side in SIDES:
+            seen = body.from_shoulder(side, middle)
+            out = gap + (aside if side == SIDES[0] else -aside)
+            target = np.stack([seen[:, 0] + out, seen[:, 1] + above + beat * swing, seen[:, 2] + ahead], axis=-1)
+            body.move_arm(side, way, *body.reach(side, target), 0.03)
+
+    kinds = ("clap-high" if high else "clap", *([f"clap-{tempo}"] if tempo else []))
+    return Gesture(pace.total(rng), kinds, change, BOTH)

@@ -1,0 +1,92 @@
+"""Bodies that crawl on hands and knees."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
+from marey.drawing.sequels import Sequel
+from marey.posing.standing import LEFT, RIGHT
+
+_PELVIS = 0.47
+"""Metres of the hips over the floor: a thigh over a knee that lies on it."""
+_SHANK = 0.4
+_TILT = 78.0
+"""Degrees by which the hips are tilted; the trunk is about level."""
+_SHOULDERS = 0.47
+"""Metres of the shoulders ahead of the hips."""
+_PACES = {"slow": (1.5, 2.1), "": (1.0, 1.4), "quick": (0.72, 0.92)}
+"""Seconds in which each limb moves once."""
+_LIFT = 0.07
+"""Metres by which a hand is lifted on its way."""
+
+
+def on_fours(rng: random.Random) -> Posture:
+    """On hands and knees, about where a crawl ends."""
+    hand = HandPlace((rng.uniform(0.15, 0.22), 0.05, _SHOULDERS + 0.04), "floor", (0.6, 0.2, -0.8))
+    shank = FootPlace((rng.uniform(0.08, 0.13), 0.085, 0.02 - _SHANK), (0.0, -0.3, -0.95))
+    posture = Posture((0.0, _PELVIS, 0.0), (_TILT, 0, 0), (0, 0, 0), (rng.uniform(-36, -16), 0, 0))
+    poles: Point = (0.1, -0.8, 0.6)
+    return replace(
+        posture, hands=dict.fromkeys(SIDES, hand), feet=dict.fromkeys(SIDES, shank), knees=dict.fromkeys(SIDES, poles)
+    )
+
+
+def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None = None) -> Gesture:
+    """The hand of one side and the knee of the other move together, then the other two.
+
+    Args:
+        rng: decides everything that is not given.
+        back: backward.
+        seconds: for about how long.
+    """
+    tempo = rng.choice(["slow", "", "", "quick"])
+    period = rng.uniform(*_PACES[tempo])
+    stride = rng.uniform(0.2, 0.34) if tempo != "slow" else rng.uniform(0.16, 0.26)
+    back = rng.random() < 0.15 if back is None else back
+    if back:
+        stride = -0.8 * stride
+    cycles = max(2, round(seconds / period) if seconds else min(round(rng.uniform(2.6, 7.4) / period), 8))
+    wide, knees = rng.uniform(0.15, 0.22), rng.uniform(0.08, 0.13)
+    look, sway, round_back = rng.uniform(-42, -12), rng.uniform(2, 6), rng.uniform(-4, 8)
+    elbow: Point = (rng.uniform(0.4, 0.9), 0.2, -0.8)
+    pelvis = _PELVIS - rng.uniform(0.0, 0.03)
+
+    def at(body: float, hands: dict[str, float], feet: dict[str, float], lifted: str, lean: float) -> Posture:
+        """A body with its hips at a place along the way, and each limb at its own; `lifted`: the side of the hand in
+        the air, if any; the knee of the other side slides over the floor."""
+        other = {LEFT: RIGHT, RIGHT: LEFT}.get(lifted, "")
+        places = {
+            side: HandPlace((wide, 0.05 + _LIFT * (side == lifted), hands[side] + _SHOULDERS + 0.04), "floor", elbow)
+            for side in SIDES
+        }
+        shanks = {
+            side: FootPlace((knees, 0.085 + 0.02 * (side == other), feet[side] - _SHANK + 0.02), (0.0, -0.3, -0.95))
+            for side in SIDES
+        }
+        posture = Posture(
+            (0.01 * lean, pelvis, body), (_TILT, 0, 0), (round_back, 0.4 * lean, lean), (look, 0, -0.5 * lean)
+        )
+        return replace(posture, hands=places, feet=shanks, knees=dict.fromkeys(SIDES, (0.1, -0.8, 0.6)))
+
+    side = rng.choice(SIDES)
+    other = {LEFT: RIGHT, RIGHT: LEFT}[side]
+    quarter = 0.25 * stride
+    hands, feet = {side: -quarter, other: quarter}, {side: quarter, other: -quarter}
+    where = 0.0
+    done = Sequel([0.0], [at(where, hands, feet, "", 0.0)])
+    for k in range(2 * cycles):
+        moves, stays = (side, other) if k % 2 == 0 else (other, side)
+        lean = sway * (1.0 if moves == LEFT else -1.0)
+        middle = {moves: hands[moves] + 0.5 * stride, stays: hands[stays]}
+        sliding = {stays: feet[stays] + 0.5 * stride, moves: feet[moves]}
+        done.then(0.25 * period, at(where + quarter, middle, sliding, moves, lean))
+        hands, feet = {**hands, moves: hands[moves] + stride}, {**feet, stays: feet[stays] + stride}
+        where += 0.5 * stride
+        done.then(0.25 * period, at(where, hands, feet, "", 0.0))
+    kinds = ["crawl-back" if back else "crawl", f"crawl-{tempo}" if tempo and not back else ""]
+    untrue = "belly|army|low crawl|forward|along" if back else "belly|army|low crawl"
+    gesture = done.gesture(rng, kinds)
+    return replace(gesture, seconds=done.times[-1], untrue=untrue)

@@ -1,0 +1,264 @@
+"""Hops on one foot, jumps on the spot and ahead."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import replace
+
+from marey.drawing.flights import StandingFoot, fly, on_feet
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
+from marey.drawing.sequels import Sequel, both, near
+from marey.posing.standing import LEFT, RIGHT
+
+_LONGEST = 7.6
+"""Seconds of all hops or jumps."""
+_LEAVES = 45.0
+"""Degrees by which a foot points down when it leaves the floor; the ankle moves by less than a step does."""
+_FAR = 0.95
+"""Metres of a jump that is called long."""
+_FREE = {
+    "hop-behind": (FootPlace((0.09, 0.36, -0.32), (0, -0.75, -0.6)), (0.1, -0.3, 1.0)),
+    "hop-bent": (FootPlace((0.1, 0.26, -0.12), (0, -0.9, 0.25)), (0.1, 0.1, 1.0)),
+    "hop-knee": (FootPlace((0.08, 0.44, 0.16), (0, -0.6, 0.8)), (0.1, 0.5, 1.0)),
+}
+"""Where the lifted foot is, and where its knee points."""
+_ARMS = {
+    "out": HandPlace((0.44, -0.12, 0.06), "shoulder", (0.1, -0.9, -0.4)),
+    "low": HandPlace((0.3, -0.38, 0.04), "shoulder", (0.4, -0.2, -0.9)),
+    "bent": HandPlace((0.12, -0.26, 0.22), "shoulder", (0.5, -0.5, -0.8)),
+}
+
+
+def hop(rng: random.Random) -> Gesture:
+    """Drawn for the right foot and mirrored for the left one; the left foot is lifted."""
+    drawn = _Hops(rng)
+    times, form, stride = drawn.times, drawn.form, drawn.stride
+    kinds = ["hop", "hop-ahead" if stride else "hop-place", "hop-once" if times == 1 else "hop-many", form]
+    if form == "hop-bent":
+        kinds.pop()
+    untrue = "bunny|place" if stride else "bunny|around|along"
+    side = drawn.side
+    gesture = on_feet(drawn.sequel, kinds, drawn.after, side=side, mirror=side == LEFT, times=times)
+    return replace(gesture, untrue=untrue)
+
+
+class _Hops:
+    """Hops on the right foot.
+
+    Attributes:
+        side: of the foot that is hopped on once the gesture is mirrored.
+        form: key of `_FREE`, for the lifted foot, which is at `free`, its knee toward `knee`.
+        times, stride: number of hops, and metres of each.
+        flight, more, ground: seconds of a flight, a factor of it for each hop, and seconds on the floor between.
+        arms, swing: key of `_ARMS`, and metres by which the hands go up and down.
+        dip, deep, lean: metres by which the hips go down at a hop and at a landing more, and degrees of the trunk.
+        starts, lift, after: seconds of standing before, of lifting the foot, and of standing after it.
+    """
+
+    def __init__(self, rng: random.Random) -> None:
+        self.side = rng.choice(SIDES)
+        self.flight, self.ground = rng.uniform(0.22, 0.36), rng.uniform(0.24, 0.4)
+        self.times = rng.randint(1, min(9, int(_LONGEST / (self.flight + self.ground)) - 2))
+        self.stride = rng.choice((0.0, rng.uniform(0.2, 0.55)))
+        self.form = rng.choices(list(_FREE), (4, 3, 2))[0]
+        free, self.knee = _FREE[self.form]
+        self.free = replace(free, at=near(rng, free.at, 0.03))
+        self.arms, self.swing = rng.choice(list(_ARMS)), rng.uniform(0.02, 0.1)
+        self.dip, self.deep = rng.uniform(0.05, 0.09), rng.uniform(0.0, 0.03)
+        self.lean = rng.uniform(2, 9) + 8 * self.stride
+        self.starts, self.lift = rng.uniform(0.15, 0.7), rng.uniform(0.3, 0.5)
+        self.more = [rng.uniform(0.93, 1.07) for _ in range(self.times)]
+        self.after = rng.uniform(0.3, 0.7)
+
+    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+        """The postures over the feet of an idle."""
+        on, done = feet[RIGHT], Sequel([self.starts])
+        low = 0.92 - self.dip
+        done.then(self.lift, Posture((-on.out + 0.02, 0.92, on.forward - 0.02), (2, 0, 0), (3, 0, 0)))
+        done.then(self.lift, self._at(on, 0.92, 0.0, on.flat(), 0.0), 0.1)
+        done.then(0.6 * self.ground, self._at(on, low, 0.0, on.flat(), -1.0))
+        for k in range(self.times):
+            there, last = (k + 1) * self.stride, k == self.times - 1
+            self._hop(done, on, k)
+            done.then(0.08, self._at(on, 0.91, there - 0.08 * self.stride, on.flat(there), 0.0))
+            landed = self._at(on, low - self.deep, there, on.flat(there), -1.0)
+            done.then(0.47 * self.ground, landed, 0.15 if last else 0.0)
+        end = self.times * self.stride
+        done.then(0.35, self._at(on, 0.92, end, on.flat(end), 0.0), 0.1)
+        down = {one: foot.flat(end) for one, foot in feet.items()}
+        done.then(0.45, Posture((0.0, 0.93, end), feet=down) if self.stride else STAND)
+        return done
+
+    def _hop(self, done: Sequel, on: StandingFoot, k: int) -> None:
+        """Add the way up to the toes and the flight of hop `k`."""
+        stride = self.stride
+        here, there = k * stride, (k + 1) * stride
+        leaving = self._at(on, 0.955, here + 0.22 * stride, on.tiptoe(_LEAVES, here), 1.0)
+        landing = self._at(on, 0.94, there - 0.2 * stride, on.tiptoe(38, there), 0.4)
+
+        def shaped(share: float, rise: float) -> Posture:
+            """The foot hangs with its toes down and goes ahead."""
+            moved = here + share * stride
+            foot = on.tiptoe(58 - 18 * share, moved, rise + 0.03 * (1 - abs(2 * share - 1)))
+            return self._at(on, 0.95 + rise, moved, foot, 1.0)
+
+        done.then(0.45 * self.ground, leaving)
+        fly(done, self.flight * self.more[k], leaving, landing, shaped)
+
+    def _at(self, on: StandingFoot, up: float, where: float, foot: FootPlace, high: float) -> Posture:
+        """The posture with the hips `up` over the floor and `where` ahead; `high`: share of the hands' swing."""
+        hand, free = _ARMS[self.arms], self.free
+        lifted = replace(hand, at=(hand.at[0], hand.at[1] + self.swing * high, hand.at[2]))
+        raised = replace(free, at=(free.at[0], free.at[1] + up - 0.9, free.at[2] + where))
+        return Posture(
+            (-on.out + 0.02, up, on.forward + where - 0.02),
+            (self.lean, 2, 0),
+            (self.lean, 0, 0),
+            hands=both(lifted),
+            feet={LEFT: raised, RIGHT: foot},
+            knees={LEFT: self.knee},
+        )
+
+
+_REACH = HandPlace((0.16, 0.42, 0.14), "shoulder", (0.8, 0.2, 0.2))
+_SWUNG = {
+    "back": HandPlace((0.2, -0.36, -0.26), "shoulder", (0.4, -0.2, -0.9)),
+    "bent": HandPlace((0.12, -0.24, 0.26), "shoulder", (0.6, -0.6, -0.6)),
+    "ahead": HandPlace((0.1, 0.04, 0.46), "shoulder", (0.6, -0.7, 0.0)),
+    "up": _REACH,
+    "side": HandPlace((0.44, -0.04, 0.12), "shoulder", (0.1, -0.9, -0.4)),
+}
+
+
+def jump(rng: random.Random) -> Gesture:
+    return _jump(rng, ahead=0.0)
+
+
+def jump_forward(rng: random.Random) -> Gesture:
+    return _jump(rng, ahead=rng.choice((rng.uniform(0.68, _FAR), rng.uniform(_FAR, 1.5))))
+
+
+def _jump(rng: random.Random, ahead: float) -> Gesture:
+    form = rng.choices(["jump-small", "jump-mid", "jump-high"], (3, 4, 3) if not ahead else (0, 3, 2))[0]
+    flight = rng.uniform(*{"jump-small": (0.32, 0.37), "jump-mid": (0.38, 0.47), "jump-high": (0.48, 0.56)}[form])
+    times = rng.choices((1, 2, 3, 5), (5, 2, 2, 2 if form != "jump-high" and not ahead else 0))[0]
+    flight = min(max(flight, ahead / 2.9), 0.58)
+    tuck = rng.uniform(0.12, 0.24) if flight > 0.44 and rng.random() < 0.35 else rng.uniform(0.0, 0.04)
+    name = "ahead" if ahead else "jump"
+    size = "ahead-far" if ahead > _FAR else ("" if ahead else form)
+    kinds = [name, size, f"{name}-many" if times > 1 else f"{name}-once", f"{name}-tuck" if tuck > 0.1 else ""]
+    untrue = "onto|lunge|possible" if ahead else "joy"
+    untrue += "|down|bounce|hop" if times == 1 and not ahead else ""
+    untrue += "|high" if form != "jump-high" else ""
+    untrue += "|long|broad|far" if 0 < ahead < _FAR else ""
+    return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
+
+
+def jumps(
+    rng: random.Random,
+    kinds: Sequence[str],
+    starts: float,
+    flight: float,
+    times: int,
+    *,
+    ahead: float = 0.0,
+    tuck: float = 0.0,
+) -> Gesture:
+    """Jumps of both feet.
+
+    Args:
+        rng: draws the rest.
+        kinds: see `Gesture`.
+        starts: seconds of standing before.
+        flight: seconds of each flight.
+        times: number of jumps.
+        ahead: metres of each.
+        tuck: metres by which the feet are drawn up.
+    """
+    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
+    return on_feet(drawn.sequel, kinds, drawn.after, times=times)
+
+
+class _Jumps:
+    """Jumps of both feet; see `jumps`.
+
+    Attributes:
+        dip, land: metres by which the hips go down before a jump, and when they land.
+        back, arms: where the hands are before a flight, and in it; keys of `_SWUNG`.
+        crouch, rise, absorb, straighten, after: seconds of going down, of leaving the floor, of landing, of standing
+            up, and of standing after it.
+        gaze: degrees of the neck.
+    """
+
+    def __init__(
+        self, rng: random.Random, starts: float, flight: float, times: int, *, ahead: float, tuck: float
+    ) -> None:
+        self.starts, self.flight, self.times, self.ahead, self.tuck = starts, flight, times, ahead, tuck
+        self.dip = 0.1 + 0.75 * (flight - 0.3) + rng.uniform(0.0, 0.06)
+        self.land = 0.12 + 0.5 * (flight - 0.3) + rng.uniform(0.0, 0.05)
+        self.arms = rng.choice(["up", "ahead", "bent", "side"] if flight < 0.45 else ["up", "up", "ahead"])
+        self.crouch, self.rise = rng.uniform(0.32, 0.6), rng.uniform(0.17, 0.22)
+        self.absorb, self.after = rng.uniform(0.16, 0.24), rng.uniform(0.3, 0.9)
+        self.back = rng.choice(("back", "bent")) if times == 1 or self.arms != "bent" else "bent"
+        self.gaze, self.straighten = rng.uniform(-6, 4), rng.uniform(0.4, 0.7)
+
+    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+        """The postures over the feet of an idle."""
+        done = Sequel([self.starts])
+        done.then(self.crouch, self._crouched(0.0, _flat(feet, 0.0), 0.8), 0.04)
+        for k in range(self.times):
+            here, there = k * self.ahead, (k + 1) * self.ahead
+            self._jump(done, feet, here, there)
+            flat, land = _flat(feet, there), self.land
+            touch = self._at(0.915 - 0.35 * land, there - 0.1 * self.ahead, flat, _SWUNG["bent"], 40 * land, 20 * land)
+            done.then(0.07, touch)
+            if k < self.times - 1:
+                done.then(self.absorb, self._crouched(there, flat, 0.6))
+            else:
+                soft = self._at(0.92 - land, there - 0.3 * land, flat, _SWUNG["bent"], 70 * land, 50 * land)
+                done.then(self.absorb, soft, 0.05)
+        end = self.times * self.ahead
+        done.then(self.straighten, Posture((0.0, 0.935, end), feet=_flat(feet, end)) if self.ahead else STAND)
+        return done
+
+    def _jump(self, done: Sequel, feet: dict[str, StandingFoot], here: float, there: float) -> None:
+        """Add the way up to the toes and the flight from one place to another, metres ahead of the idle's."""
+        ahead, arms = self.ahead, _SWUNG[self.arms]
+        lean = 4 + 16 * ahead
+        leaving = self._at(0.975 - 0.05 * ahead, here + 0.26 * ahead, _tiptoe(feet, _LEAVES, here), arms, lean)
+        landing = self._at(
+            0.93 - 0.05 * ahead, there - 0.16 * ahead, _tiptoe(feet, 36, there), _SWUNG["bent"], 0.6 * lean
+        )
+
+        def shaped(share: float, up: float) -> Posture:
+            drawn = self.tuck * (1 - (2 * share - 1) ** 2)
+            where = here + ahead * (share + 0.25 * share * (1 - share))
+            pointed = 66 - 26 * share - 20 * min(ahead, 1.0) * share
+            hands = arms if share < 0.6 else _SWUNG["side" if self.arms != "bent" else "bent"]
+            toes = _tiptoe(feet, pointed, where, up + drawn)
+            return self._at(0.95 + up, where, toes, hands, lean * (1 - share), 4 + 40 * drawn)
+
+        done.then(self.rise, leaving)
+        fly(done, self.flight, leaving, landing, shaped)
+
+    def _crouched(self, where: float, feet: dict[str, FootPlace], bent: float) -> Posture:
+        """The posture before a jump; `bent`: share of the hips' lean that the spine leans too."""
+        lean = 60 * self.dip
+        return self._at(0.92 - self.dip, where - 0.3 * self.dip, feet, _SWUNG[self.back], lean, bent * lean)
+
+    def _at(
+        self, up: float, where: float, feet: dict[str, FootPlace], hands: HandPlace, lean: float, spine: float = 0.0
+    ) -> Posture:
+        return Posture(
+            (0.0, up, where), (lean, 0, 0), (spine, 0, 0), (self.gaze - 0.5 * lean, 0, 0), hands=both(hands), feet=feet
+        )
+
+
+def _flat(feet: dict[str, StandingFoot], where: float) -> dict[str, FootPlace]:
+    return {side: foot.flat(where) for side, foot in feet.items()}
+
+
+def _tiptoe(feet: dict[str, StandingFoot], degrees: float, where: float, up: float = 0.0) -> dict[str, FootPlace]:
+    return {side: foot.tiptoe(degrees, where, up) for side, foot in feet.items()}

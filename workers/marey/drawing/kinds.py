@@ -1,0 +1,87 @@
+"""Movements by the action that they show, each of a body that stands at first."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+
+from marey.drawing.aims import aim, shoot_basket
+from marey.drawing.archery import draw_bow
+from marey.drawing.arms import clap, guide, raise_arm
+from marey.drawing.bends import bend_over, pick_up, squat
+from marey.drawing.blades import slash, stab
+from marey.drawing.cheers import cheer
+from marey.drawing.crouches import crouch
+from marey.drawing.crunches import arabesque, knee_to_elbow
+from marey.drawing.dodges import flinch
+from marey.drawing.exercises import jumping_jacks, push_ups, sit_ups
+from marey.drawing.fights import block
+from marey.drawing.floor import sit_floor
+from marey.drawing.gesture import Gesture
+from marey.drawing.guards import fight_stance
+from marey.drawing.hands import reach_forward, talk
+from marey.drawing.hangs import hang
+from marey.drawing.hops import hop, jump, jump_forward
+from marey.drawing.kicks import balance, kick
+from marey.drawing.kneels import kneel
+from marey.drawing.laughs import laugh
+from marey.drawing.lifts import arm_circles, drink, reach_up
+from marey.drawing.seats import sit, sit_down, stand_up
+from marey.drawing.shots import shoot
+from marey.drawing.signs import signal
+from marey.drawing.spells import cast_spell
+from marey.drawing.swims import swim
+from marey.drawing.trunk import bow
+from marey.drawing.twists import twist
+from marey.drawing.washes import wash
+from marey.drawing.wheels import drive
+
+DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
+    "aim": aim,
+    "arabesque": arabesque,
+    "arm-circles": arm_circles,
+    "balance": balance,
+    "bend-over": bend_over,
+    "block": block,
+    "bow": bow,
+    "cast-spell": cast_spell,
+    "cheer": cheer,
+    "clap": clap,
+    "crouch": crouch,
+    "draw-bow": draw_bow,
+    "drink": drink,
+    "drive": drive,
+    "fight-stance": fight_stance,
+    "flinch": flinch,
+    "guide": guide,
+    "hang": hang,
+    "hop": hop,
+    "jump": jump,
+    "jump-forward": jump_forward,
+    "jumping-jacks": jumping_jacks,
+    "kick": kick,
+    "knee-to-elbow": knee_to_elbow,
+    "kneel": kneel,
+    "laugh": laugh,
+    "pick-up": pick_up,
+    "push-ups": push_ups,
+    "raise-arm": raise_arm,
+    "reach-forward": reach_forward,
+    "reach-up": reach_up,
+    "shoot": shoot,
+    "shoot-basket": shoot_basket,
+    "signal": signal,
+    "sit": sit,
+    "sit-down": sit_down,
+    "sit-floor": sit_floor,
+    "sit-ups": sit_ups,
+    "slash": slash,
+    "squat": squat,
+    "stab": stab,
+    "stand-up": stand_up,
+    "swim": swim,
+    "talk": talk,
+    "twist": twist,
+    "wash": wash,
+}
+"""Functions of a random generator that draw one movement of an action."""
