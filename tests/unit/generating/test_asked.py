@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ class OneMotion:
 
     layout = HUMANML3D_263
     limits = Limits(16, 400, 20.0, 4)
+    bundle = SimpleNamespace(manifest=SimpleNamespace(draws_bearings=False))
 
     def __init__(self, joints: np.ndarray[Any, Any]) -> None:
         self.made = RawMotion(self.layout.encode(joints))
@@ -268,3 +270,12 @@ def test_a_glance_turns_the_head_and_leaves_the_pace_of_the_action() -> None:
     assert made.changes["gaze"] == ["around"]
     assert "turn" not in made.changes
     assert made.changes["speed"] > 1
+
+
+def test_a_motion_that_does_not_show_its_action_is_drawn_by_bundles_that_draw() -> None:
+    generator = OneMotion(Body(4.0).joints())
+    generator.bundle = SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True))
+    (made,) = generate_as_asked(generator, [ask("a man kneels")])  # type: ignore[arg-type]
+    assert isinstance(made, AskedMotion)
+    assert made.changes == {"drawn": "kneel"}
+    assert isinstance(make(Body(4.0).joints(), ask("a man kneels")), RawMotion)

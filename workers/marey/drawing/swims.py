@@ -63,11 +63,20 @@ _FROG = (
 """Ankles before the pelvis at even parts of a breaststroke."""
 
 
-def swim(rng: random.Random) -> Gesture:
-    form = rng.choices(list(_FORMS), list(_FORMS.values()))[0]
+def swim(rng: random.Random, form: str = "", *, seconds: float | None = None, moves: bool | None = None) -> Gesture:
+    """A body that swims.
+
+    Args:
+        rng: decides everything that is not given.
+        form: freestyle, breaststroke, backstroke, under (water) or tread (water, upright).
+        seconds: for how long.
+        moves: it gets ahead.
+    """
+    form = form or rng.choices(list(_FORMS), list(_FORMS.values()))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
-    rate, start, seconds = rng.uniform(*_RATES[tempo]), rng.random(), rng.uniform(2.5, 8.5)
-    moves = form != "tread" and rng.random() < 0.6
+    rate, start = rng.uniform(*_RATES[tempo]), rng.random()
+    lasts = rng.uniform(2.5, 8.5) if seconds is None else seconds
+    moves = (form != "tread" and rng.random() < 0.6) if moves is None else moves
     speed = rng.uniform(0.5, 0.95) * rate / 0.7 if moves else 0.0
     shape = {
         "height": rng.uniform(0.75, 1.1),
@@ -90,7 +99,7 @@ def swim(rng: random.Random) -> Gesture:
         "under": "crawl|freestyle|back|butterfly|tread|paddle",
         "tread": "crawl|freestyle|breast|back|butterfly|forward",
     }
-    return Gesture(seconds, tuple(filter(None, kinds)), change, untrue=rf"({strokes[form]})")
+    return Gesture(lasts, tuple(filter(None, kinds)), change, untrue=rf"({strokes[form]})")
 
 
 def _motion(form: str, phase: Array, speed: float, rate: float, shape: dict[str, float]) -> WholeMotion:

@@ -57,14 +57,14 @@ class AskedMotion:
 
     Attributes:
         features: (T, D), in the layout's own units.
-        changes: for the manifest: `mirrored`, true where left and right are exchanged; `drawn`, the action whose small
-            movement is drawn on what the network made (`marey.generation.fine`); `repetitions`, how often the
-            network `made` and the prompt `asked` for the action; `turn`, degrees from the first frame to the last,
-            positive to the left, as the network `made` them and as they are `shown`; `speed`, how many times as fast
-            the motion is played as the network made it; `gaze`, where the head turns (`marey.generation.gazing`);
-            `grounded`, true where the body was let down to the floor; `flights`, by how many seconds its flights are
-            shorter than the network made them; `left_out`, how many seconds of its end came after the action;
-            `footed`, true where a run was held back by the slide of its feet.
+        changes: for the manifest: `mirrored`, true where left and right are exchanged; `drawn`, the action whose
+            movement is drawn on what the network made or in its place (`marey.generation.fine`, `redrawn`);
+            `repetitions`, how often the network `made` and the prompt `asked` for the action; `turn`, degrees from
+            the first frame to the last, positive to the left, as the network `made` them and as they are `shown`;
+            `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
+            turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
+            by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
+            its end came after the action; `footed`, true where a run was held back by the slide of its feet.
     """
 
     features: Float32 = field(repr=False)
@@ -177,16 +177,27 @@ def generate_as_asked(
         InvalidInput: as `Limits.check`.
     """
     wishes = [_Wish.of(request) for request in requests]
+    redraws = generator.bundle.manifest.draws_bearings
     drawn = [wish.drawn(request, generator.limits) for wish, request in zip(wishes, requests, strict=True)]
     made = generator.generate(drawn, settings, control=control)
     return [
-        None if motion is None else _as_asked(generator.layout, request, wish, motion)
+        None if motion is None else _as_asked(generator.layout, request, wish, motion, redraws=redraws)
         for request, wish, motion in zip(requests, wishes, made, strict=True)
     ]
 
 
-def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: MotionFeatures) -> MotionFeatures:
-    """Return the motion, changed where the wish is not fulfilled and can be."""
+def _as_asked(
+    layout: FeatureLayout, request: Request, wish: _Wish, motion: MotionFeatures, *, redraws: bool
+) -> MotionFeatures:
+    """Return the motion, changed where the wish is not fulfilled and can be.
+
+    Args:
+        layout: of the features.
+        request: for the motion.
+        wish: what its prompt asks for.
+        motion: as the network made it.
+        redraws: one that does not show its action is drawn instead.
+    """
     features: Float32 = motion.features
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
     one_side = bool(wish.limb or wish.side)
@@ -194,7 +205,7 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if layout.skeleton.name == HUMANML3D.name:
-        drawn = _drawn(features, layout, wish, request)
+        drawn = _drawn(features, layout, wish, request, redraws=redraws)
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
         for change in (_as_often, _turned, _on_floor, _ended):
@@ -204,10 +215,10 @@ def _as_asked(layout: FeatureLayout, request: Request, wish: _Wish, motion: Moti
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 
 
-def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
+def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request, *, redraws: bool) -> Float32 | None:
     """Return the motion with what is drawn of its action, or one that is drawn as a whole; None if it stays."""
     if wish.action not in FINE:
-        return redrawn(features, layout, wish.action, wish.fine(request), request.seed)
+        return redrawn(features, layout, wish.action, wish.fine(request), request.seed) if redraws else None
     if _shows(features, layout, wish, request):
         return None
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)

@@ -131,8 +131,10 @@ def _kinds(wish: FineWish, rng: np.random.Generator) -> list[tuple[_Strike, str]
     """Return ways and hands in the order of the prompt; a jab and a cross where it names no kind."""
     found: list[tuple[_Strike, str]] = []
     last = str(rng.choice([LEFT, RIGHT]))
-    for own, kind in _KIND.findall(wish.prompt.lower()):
+    named = _KIND.findall(wish.prompt.lower())
+    side = "" if any(own for own, _ in named) else wish.side  # of "jab, cross, left hook" only the hook is left
+    for own, kind in named:
         strike, usual = _KINDS[kind]
-        last = own or wish.side or usual or OTHER_SIDE[last]
+        last = own or side or usual or OTHER_SIDE[last]
         found.append((strike, last))
     return found or [(_STRAIGHT, side) for side in ([wish.side] if wish.side else [LEFT, RIGHT])]

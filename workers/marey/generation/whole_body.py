@@ -1,5 +1,5 @@
-"""Movements of the whole body, drawn from a body that stands, crawls or lies: falls, rolls, flips, crawls, ways to the
-floor and back.
+"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, crawls, ways to the floor
+and back, strokes of swimmers.
 
 Networks know how such a movement begins; then they roll on, fall twice, turn the other way over, or crawl in place. The
 movements are those of the made clips of the training data, with the direction and the number that the prompt names.
@@ -19,6 +19,7 @@ from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
 from marey.drawing.gesture import Gesture
 from marey.drawing.rolls import flip, roll
+from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.posing.limbs import FPS
 from marey.posing.standing import StandingBody
@@ -123,11 +124,26 @@ def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gestur
     return get_up(rng, "lie-front" if _ends_on_front(before) or _ONTO_FRONT.search(text) else "lie-back")
 
 
+def _swim(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    text = wish.prompt.lower()
+    form = next((form for form, words in _STROKES.items() if words.search(text)), "")
+    form = form or rng.choice(["freestyle", "freestyle", "breaststroke"])
+    return swim(rng, form, seconds=seconds or rng.uniform(4.0, 7.0), moves=form != "tread")
+
+
 def _ends_on_front(before: str) -> bool:
     """Return True if a movement ends on the front, so far as its words say."""
     return bool(_ONTO_FRONT.search(before) or (_FRONT.search(before) and not _BACK.search(before)))
 
 
+_STROKES: Mapping[str, re.Pattern[str]] = {
+    "backstroke": re.compile(r"\bback[ -]?stroke\b|\bon (?:his|her|their|the) back\b"),
+    "breaststroke": re.compile(r"\bbreast|\bfrog\b"),
+    "under": re.compile(r"\bunder[ -]?water\b|\bunder\b|\bdiv(?:er?s?|ing)\b|\bbelow\b|\bmermaid\b"),
+    "tread": re.compile(r"\btread|\bafloat\b|\bfloat|\bupright\b"),
+    "freestyle": re.compile(r"\bfree[ -]?style\b|\bcrawl\b"),
+}
+"""Words of strokes; the first that fits counts."""
 CHOICES: Mapping[str, Choice] = {
     "die": _fall,
     "roll": _roll,
@@ -136,6 +152,7 @@ CHOICES: Mapping[str, Choice] = {
     "lie-down": _lie_down,
     "lie": _lie,
     "get-up": _get_up,
+    "swim": _swim,
 }
 """Movements by action."""
 AGAIN = frozenset({"roll", "flip"})

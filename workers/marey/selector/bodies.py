@@ -40,7 +40,7 @@ def hang(m: Motion, side: str) -> float:
 
 def swim(m: Motion, side: str) -> float:
     """Sweep arms and kick legs in water."""
-    free = (m.feet.min(axis=1) > 0.05) & (m.tilt > 15)
+    free = ((m.feet.min(axis=1) > 0.05) | (m.tilt > 45)) & (m.tilt > 15)
     arms = max(len(swings(m.reach[:, k, c], 0.25)) for k in (0, 1) for c in range(3))
     gap = m.joints[:, ANKLES[0]] - m.joints[:, ANKLES[1]]
     apart = np.linalg.norm(gap, axis=-1)
