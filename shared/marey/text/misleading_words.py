@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 _UP_TO = re.compile(
     r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
@@ -53,6 +54,33 @@ _STRUCK_DOWN = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """What makes somebody fall: the blow is part of the fall."""
+
+_THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
+OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
+    "roll": re.compile(
+        rf"\broll(?:s|ed|ing)? (?:(?:up|out|back) )?(?:{_THING}|out|dough|dice|sleeves)\b", re.IGNORECASE
+    ),
+    "flip": re.compile(
+        rf"\bflip(?:s|ped|ping)? (?:(?:up|open|over|off) )?(?:{_THING}|through)\b(?! (?:fence|wall|back|front))",
+        re.IGNORECASE,
+    ),
+    "die": re.compile(
+        rf"""\b(?:almost|nearly)\ (?:falls?|trips?|dies?|slips?|collapses?)\b
+        |\bfall(?:s|ing)?\ (?:asleep|silent|in\ love|behind|for)\b|\bdies\ of\ (?:laughter|laughing|shame|boredom)\b
+        |\b(?:falls?|collapses?|drops?|slumps?)\ (?:down\ |back\ )?(?:in|into|on|onto)[ ]
+        (?:{_THING}\ )?(?:\w+\ )?(?:chair|seat|sofa|couch|armchair|bench|throne)\b""",
+        re.IGNORECASE | re.VERBOSE,
+    ),
+    "lie": re.compile(r"\blie?(?:s|d|ying)? (?:about|to (?:a|an|his|her|the|them|him|me|you))\b", re.IGNORECASE),
+    "lie-down": re.compile(r"\blie?(?:s|d|ying)? about\b", re.IGNORECASE),
+}
+"""Words of other actions than that which prompts with them are read as: "rolls up his sleeves", "almost falls"."""
+
+
+def has_other_sense(action: str | None, prompt: str) -> bool:
+    """Return True if a prompt that is read as an action says one of its words in another sense."""
+    words = None if action is None else OTHER_SENSE.get(action)
+    return words is not None and words.search(prompt) is not None
 
 
 def without_misleading(prompt: str) -> str:

@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from marey.text.action_reader import AGREED, RISING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import AGREED, OUTSIDE, RISING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
 from marey.text.encoders import Encoding
+from marey.text.misleading_words import has_other_sense
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
 from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_rest
@@ -136,7 +137,8 @@ class TrainedReaders:
 
     def _read_action(self, text: str) -> ReadAction:
         if text not in self._actions:
-            self._actions[text] = action_reader().read(text, self._pooled([text])[0])
+            read = action_reader().read(text, self._pooled([text])[0])
+            self._actions[text] = ReadAction(OUTSIDE, 1.0, read.least) if has_other_sense(read.action, text) else read
         return self._actions[text]
 
     def _read_bare(self, bare: BarePrompt) -> ReadAction:

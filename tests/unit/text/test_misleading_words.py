@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from marey.text.misleading_words import without_misleading
+from marey.text.misleading_words import has_other_sense, without_misleading
 
 
 @pytest.mark.parametrize(
@@ -86,3 +86,28 @@ def test_who_is_struck_is_hit(prompt: str, read: str) -> None:
 )
 def test_a_blow_is_part_of_the_fall(prompt: str, read: str) -> None:
     assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("action", "prompt", "other"),
+    [
+        ("roll", "he rolls up his sleeves", True),
+        ("roll", "a woman rolls out dough", True),
+        ("roll", "he rolls forward", False),
+        ("roll", "rolls down the hill", False),
+        ("flip", "she flips her hair", True),
+        ("flip", "flips open a notebook", True),
+        ("flip", "he does a flip", False),
+        ("flip", "flips over the fence", False),
+        ("die", "he falls into a chair exhausted", True),
+        ("die", "a drunk man almost falls", True),
+        ("die", "falls asleep", True),
+        ("die", "falls to the ground", False),
+        ("lie", "a man lies about his age", True),
+        ("lie", "lies on the floor", False),
+        ("walk", "walks and rolls his eyes", False),
+        (None, "rolls up his sleeves", False),
+    ],
+)
+def test_words_in_another_sense_are_known(action: str | None, prompt: str, other: bool) -> None:
+    assert has_other_sense(action, prompt) == other

@@ -27,8 +27,8 @@ from marey.selector.rules import RULES
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
 
-FAILS = 0.3
-"""Grade of the selector below which a motion does not show its action."""
+FAILS = SHOWN
+"""Grade of the selector below which a motion does not show its action, and has the flag `off-prompt`."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
 DRAWN = 6
