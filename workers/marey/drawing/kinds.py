@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from marey.drawing.aims import aim, shoot_basket
 from marey.drawing.archery import draw_bow
 from marey.drawing.arms import clap, guide, raise_arm
-from marey.drawing.bends import bend_over, pick_up
+from marey.drawing.bends import bend_over, pick_up, squat
 from marey.drawing.blades import slash, stab
 from marey.drawing.cheers import cheer
 from marey.drawing.crouches import crouch
@@ -22,6 +22,7 @@ from marey.drawing.hands import reach_forward, talk
 from marey.drawing.hops import hop, jump, jump_forward
 from marey.drawing.kicks import balance, kick
 from marey.drawing.kneels import kneel
+from marey.drawing.laughs import laugh
 from marey.drawing.lifts import arm_circles, drink, reach_up
 from marey.drawing.seats import sit, sit_down, stand_up
 from marey.drawing.shots import shoot
@@ -56,6 +57,7 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "kick": kick,
     "knee-to-elbow": knee_to_elbow,
     "kneel": kneel,
+    "laugh": laugh,
     "pick-up": pick_up,
     "push-ups": push_ups,
     "raise-arm": raise_arm,
@@ -69,11 +71,12 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "sit-floor": sit_floor,
     "sit-ups": sit_ups,
     "slash": slash,
+    "squat": squat,
     "stab": stab,
     "stand-up": stand_up,
     "talk": talk,
     "twist": twist,
     "wash": wash,
 }
-"""Functions of a random generator that draw one movement of an action. Left out are `flinch`, `hang`, `laugh` and
-`squat`: of what is drawn of them in place of a failed motion, less passes the referee on development prompts."""
+"""Functions of a random generator that draw one movement of an action. `flinch` and `hang` are left out: what is drawn
+of them in place of a failed motion passes the referee less often, on development prompts."""
