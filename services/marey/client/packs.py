@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tarfile
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -84,14 +85,15 @@ def _member(tar: tarfile.TarFile, member: tarfile.TarInfo, wanted: dict[str, Fil
     return file, content.read()
 
 
-class _Reader:
+class _Reader(io.RawIOBase):
     """The body of an answer as a file to read from, up to a limit."""
 
     def __init__(self, chunks: Iterator[bytes], limit: int) -> None:
+        super().__init__()
         self._chunks, self._left = chunks, limit
         self._ready = bytearray()
 
-    def read(self, size: int) -> bytes:
+    def read(self, size: int = -1, /) -> bytes:
         """Return the next bytes, fewer at the end.
 
         Raises:

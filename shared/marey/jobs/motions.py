@@ -67,7 +67,7 @@ def read_motions(
     return [_motion(row, files[row["id"]]) for row in rows]
 
 
-def _all_motions() -> sa.Select[Any]:
+def _all_motions() -> sa.Select[*tuple[Any, ...]]:
     """Return the query of all motions with their items."""
     motion, item = tables.motion.c, tables.item.c
     later = tables.item.alias("later")

@@ -30,7 +30,7 @@ class MiniLMEncoder:
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 256 are left out."""
         ids, offsets = self._ids(text)
-        return _encoding(self._model.states(ids)[-1].numpy(), offsets)
+        return _encoding(self._model.last([ids])[0].numpy(), offsets)
 
     @one_thread()
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:

@@ -23,7 +23,7 @@ _RETURN = re.compile(
     (?=\ (?:to|home|into|in|inside|towards?|again|through|across|along|down|up)\b)(?!\ (?:and|to\ back)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
-"""A way to where somebody was before: "walks back to his car"."""
+"""A way to where the person was before: "walks back to his car"."""
 _TURNED_BACK = re.compile(
     rf"""(?P<turn>\b(?:turns?|turning|spins?|spinning|whirls?|swings?|wheels?|pivots?|does\ an\ about[ -]face)
     (?:\ (?:around|round|about|back|180(?:\ degrees)?))?(?:,|,?\ (?:and(?:\ then)?|then|to))\ )
@@ -44,7 +44,7 @@ _STRUCK = re.compile(
     |speared|rammed)\b(?!\ (?:away|off|around|along|through|to|by\ (?:a|the)\ (?:man|woman|person|worker))\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
-"""What another does to the person: "is pushed from behind"."""
+"""A blow that the person takes: "is pushed from behind"."""
 _STRUCK_DOWN = re.compile(
     r"""\b(?:is|are|gets?|got)[ ](?:\w+ly[ ])?
     (?:shot|hit|struck|stabbed|punched|kicked|slashed|pushed|shoved|tackled|clubbed|wounded|headbutted)\b
@@ -53,8 +53,15 @@ _STRUCK_DOWN = re.compile(
     |crumples?|topples?|keels?|goes?[ ]down|slumps?)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
-"""What makes somebody fall: the blow is part of the fall."""
+"""A blow before a fall, which is part of it."""
 
+_TURNS_IN_AIR = re.compile(
+    r"""\b(?P<jump>jumps?|jumping|leaps?|leaping|hops?)(?:\ (?:up|into\ the\ air|straight\ up))?
+    (?:\ (?P<degrees>\d{2,3})(?:\ degrees?|°)|(?:,|\ and|,\ and)?\ land(?:s|ing)?\ facing\ (?:the\ (?:other|opposite)\ (?:way|direction)
+    |backwards?))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Jumps with a turn: "jumps 360 degrees", "jumps and lands facing the other way"."""
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -92,6 +99,7 @@ def without_misleading(prompt: str) -> str:
     """
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
+    text = _TURNS_IN_AIR.sub(_with_turn, text)
     return _STRUCK.sub(_hit, _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text)))
 
 
@@ -102,6 +110,13 @@ def _with_turns(found: re.Match[str]) -> str:
         return "walking forward, turning around and walking forward"
     walks, turns = ("walks", "turns around") if end else ("walk", "turn around")
     return f"{walks} forward, {turns}, {walks} forward, {turns} and {walks} forward"
+
+
+def _with_turn(found: re.Match[str]) -> str:
+    """Return a jump with the turn that it makes."""
+    jump = found["jump"]
+    turn = "turning" if jump.lower().endswith("ing") else "turns" if jump.lower().endswith("s") else "turn"
+    return f"{jump} and {turn} {found['degrees'] or 180} degrees in the air"
 
 
 def _hit(found: re.Match[str]) -> str:

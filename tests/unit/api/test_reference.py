@@ -23,6 +23,7 @@ from marey.api.jobs.schemas import JobPatch, NewJobBody
 from marey.api.reference import EXAMPLES
 from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
 from marey.api.streams.schemas import EndStreamBody, NewStreamBody
+from marey.api.takes.packs import NewPackBody
 from marey.api.takes.schemas import NewRerollBody, NewReviewBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.characters import LINE_PATTERN, TEXT_PATTERN
@@ -38,7 +39,17 @@ from marey.text_service.routes import ParseBody
 BODIES = {
     model.__name__: model
     for model in (
-        *(NewJobBody, JobPatch, NewReviewBody, NewRerollBody, NewEditBody, NewStreamBody, EndStreamBody, ParseBody),
+        *(
+            NewJobBody,
+            JobPatch,
+            NewReviewBody,
+            NewRerollBody,
+            NewPackBody,
+            NewEditBody,
+            NewStreamBody,
+            EndStreamBody,
+            ParseBody,
+        ),
         *(NewEvaluationBody, NewScheduleBody, SchedulePatch, NewWebhookBody, WebhookPatch),
     )
 }

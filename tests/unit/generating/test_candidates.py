@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ class FakeGenerator:
 
     limits = Limits(16, 196, 20.0, 4)
     layout = HUMANML3D_263
+    bundle = SimpleNamespace(manifest=SimpleNamespace(draws_bearings=False))
 
     def __init__(self) -> None:
         self.seeds: list[list[int]] = []

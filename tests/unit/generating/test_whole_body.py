@@ -204,3 +204,21 @@ def test_motions_differ_from_seed_to_seed_and_are_the_same_for_one() -> None:
     first, again, other = (drawn("die", "dies", seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert first.shape != other.shape or np.abs(first - other).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("prompt", "degrees"),
+    [("a 180 degree jump to the left", 180), ("jumps and turns 360 degrees to the right", -360), ("jump turn", None)],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_jump_turns_in_the_air_as_far_as_it_says(prompt: str, degrees: int | None, seed: int) -> None:
+    joints = drawn("jump-turn", prompt, seed=seed)
+    across = joints[:, 1] - joints[:, 2]
+    yaw = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+    turned = yaw[-1] - yaw[0]
+    assert turned == pytest.approx(degrees, abs=8) if degrees else abs(turned) > 90
+    lowest = joints[:, [7, 8, 10, 11], 1].min(axis=1)
+    flies = lowest > 0.05
+    assert abs(yaw[flies][-1] - yaw[flies][0]) > 0.5 * abs(turned)
+    still = joints[-5:, [7, 8, 10, 11]]
+    assert np.abs(still - still[-1]).max() < 0.01

@@ -40,9 +40,10 @@ def check_alignment(encoding: Encoding, text: str, word: str) -> None:
     assert np.allclose(span, encoding.tokens[rows].mean(axis=0))
 
 
-def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
+def test_minilm_gives_what_transformers_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     from transformers import BertConfig, BertModel
 
+    monkeypatch.setenv("MAREY_BF16", "0")
     bundle = find_encoder("minilm")
     config = BertConfig(hidden_size=WIDTH, num_hidden_layers=LAYERS, intermediate_size=4 * WIDTH)
     model = BertModel(config, add_pooling_layer=False).eval()
@@ -55,7 +56,22 @@ def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
     for mine, theirs in zip(states, reference, strict=True):
         assert torch.allclose(mine, theirs[0], atol=2e-5)
     mean = reference[-1][0].mean(0)
-    assert np.allclose(minilm.encode(TEXT).pooled, (mean / mean.norm()).numpy(), atol=2e-6)
+    assert np.allclose(MiniLMEncoder(bundle).encode(TEXT).pooled, (mean / mean.norm()).numpy(), atol=2e-6)
+
+
+def test_minilm_in_bfloat16_is_close_and_no_text_depends_on_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle = find_encoder("minilm")
+    texts = [TEXT, "a person bows", "wave", LONG]
+    vectors = {}
+    for fast in (False, True):
+        monkeypatch.setattr("marey.text.minilm.fast_bf16", lambda _, fast=fast: fast)
+        encoder = MiniLMEncoder(bundle)
+        vectors[fast] = encoder.pooled(texts)
+        alone = [encoder.pooled([text])[0] for text in texts]
+        np.testing.assert_allclose(np.stack(vectors[fast]), np.stack(alone), atol=2e-6)
+    cosines = [float(exact @ near) for exact, near in zip(vectors[False], vectors[True], strict=True)]
+    assert min(cosines) > 0.9998
+    assert max(abs(exact - near).max() for exact, near in zip(vectors[False], vectors[True], strict=True)) > 1e-5
 
 
 def test_minilm_int8_is_close_but_not_equal() -> None:

@@ -89,6 +89,19 @@ def test_a_blow_is_part_of_the_fall(prompt: str, read: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("he jumps 360 degrees", "he jumps and turns 360 degrees in the air"),
+        ("jump up and land facing the other way", "jump and turn 180 degrees in the air"),
+        ("she jumps 2 metres", "she jumps 2 metres"),
+        ("jumps and lands on both feet", "jumps and lands on both feet"),
+    ],
+)
+def test_a_jump_that_ends_in_another_direction_turns(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
     ("action", "prompt", "other"),
     [
         ("roll", "he rolls up his sleeves", True),

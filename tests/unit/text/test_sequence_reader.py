@@ -110,8 +110,8 @@ def test_prompts_beside_each_other_are_encoded_in_few_passes_and_as_if_alone(
 
 
 def test_a_blow_in_a_sequence_is_short(reading: TextPipeline) -> None:
-    (prompt,) = reading.explain(["gets hit in the stomach and falls to the ground"])
-    (text,) = reading.features(["gets hit in the stomach and falls to the ground"])
+    (prompt,) = reading.explain(["gets hit in the stomach and sits down on the ground"])
+    (text,) = reading.features(["gets hit in the stomach and sits down on the ground"])
     assert [each.seconds for each in text.movements] == [DRAWN_S, None]
     assert prompt.movements[0] == load_vocabulary().need("flinch").plain_words
 

@@ -1,4 +1,4 @@
-"""What is drawn on a body: a length and a change."""
+"""Drawn movements: a length, and a change of a body."""
 
 from __future__ import annotations
 

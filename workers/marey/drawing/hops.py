@@ -6,11 +6,18 @@ import random
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from marey.drawing.flights import StandingFoot, fly, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.posing.standing import LEFT, RIGHT
+from marey.motion.rotations import from_rotvec, rotate
+from marey.posing.limbs import LEVEL
+from marey.posing.standing import LEFT, RIGHT, StandingBody, eased
+
+Array = NDArray[np.floating]
 
 _LONGEST = 7.6
 """Seconds of all hops or jumps."""
@@ -18,6 +25,8 @@ _LEAVES = 45.0
 """Degrees by which a foot points down when it leaves the floor; the ankle moves by less than a step does."""
 _FAR = 0.95
 """Metres of a jump that is called long."""
+_FEET, _OFF = [7, 8, 10, 11], 0.02
+"""Joints of the feet, and metres by which all are higher than at first in a flight."""
 _FREE = {
     "hop-behind": (FootPlace((0.09, 0.36, -0.32), (0, -0.75, -0.6)), (0.1, -0.3, 1.0)),
     "hop-bent": (FootPlace((0.1, 0.26, -0.12), (0, -0.9, 0.25)), (0.1, 0.1, 1.0)),
@@ -154,6 +163,29 @@ def _jump(rng: random.Random, ahead: float) -> Gesture:
     untrue += "|high" if form != "jump-high" else ""
     untrue += "|long|broad|far" if 0 < ahead < _FAR else ""
     return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
+
+
+def jump_turned(rng: random.Random, degrees: float) -> Gesture:
+    """A jump of both feet on the spot, in which the body turns by `degrees`, positive to the left."""
+    flight = rng.uniform(0.46, 0.52) + 0.06 * min(abs(degrees) / 360, 1.0)
+    gesture = jumps(rng, ["jump-turn"], rng.uniform(0.25, 0.6), flight, 1, tuck=rng.uniform(0.02, 0.1))
+
+    def change(body: StandingBody) -> None:
+        gesture.change(body)
+        _turn_in_flight(body.joints, degrees)
+
+    return replace(gesture, change=change, side=LEFT if degrees > 0 else RIGHT)
+
+
+def _turn_in_flight(joints: Array, degrees: float) -> None:
+    """Turn a body (T, 22, 3) about itself while both feet are off the floor, and everything after it as far."""
+    feet = joints[:, _FEET, 1]
+    flies = np.flatnonzero((feet - feet[0]).min(axis=1) > _OFF)
+    first, last = (int(flies[0]) - 1, int(flies[-1]) + 1) if len(flies) else (0, len(joints) - 1)
+    share = eased((np.arange(len(joints)) - first) / max(last - first, 1))
+    pivots = joints[np.minimum(np.arange(len(joints)), last), 0] * LEVEL
+    turned = from_rotvec(np.array([0.0, 1.0, 0.0]) * np.radians(degrees * share)[:, None])
+    joints[:] = rotate(turned[:, None], joints - pivots[:, None]) + pivots[:, None]
 
 
 def jumps(

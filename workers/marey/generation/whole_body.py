@@ -18,12 +18,14 @@ from marey.drawing.crawls import crawl
 from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
 from marey.drawing.gesture import Gesture
+from marey.drawing.hops import jump_turned
 from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.posing.limbs import FPS
-from marey.posing.standing import StandingBody
+from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody
 from marey.posing.still import standing_still
+from marey.vocabulary.turns import stated_turn
 
 Array = NDArray[np.floating]
 Choice = Callable[[FineWish, random.Random, float | None], Gesture]
@@ -33,6 +35,8 @@ TRIES = 12
 """Movements of random length, of which the longest is taken that is not too long."""
 QUICKER = 0.7
 """Share of its length to which a movement is shortened at most."""
+IN_AIR = 95.0, 540.0
+"""Degrees by which a body turns in one jump, at least and at most."""
 MOST = 4
 """Times that a movement is done at most, one after the other."""
 _BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
@@ -124,6 +128,15 @@ def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gestur
     return get_up(rng, "lie-front" if _ends_on_front(before) or _ONTO_FRONT.search(text) else "lie-back")
 
 
+def _jump_turn(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    turn, named = stated_turn(text, "jump-turn"), _SIDE_NAMED.search(text)
+    degrees = turn.least if turn is not None and turn.is_exact else rng.choice((180.0, 180.0, 360.0))
+    side = (named[1] if named else wish.side) or rng.choice((LEFT, RIGHT))
+    return jump_turned(rng, SIGN[side] * float(np.clip(degrees, *IN_AIR)))
+
+
 def _swim(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     text = wish.prompt.lower()
     form = next((form for form, words in _STROKES.items() if words.search(text)), "")
@@ -153,9 +166,10 @@ CHOICES: Mapping[str, Choice] = {
     "lie": _lie,
     "get-up": _get_up,
     "swim": _swim,
+    "jump-turn": _jump_turn,
 }
 """Movements by action."""
-AGAIN = frozenset({"roll", "flip"})
+AGAIN = frozenset({"roll", "flip", "jump-turn"})
 """Actions that begin and end standing, and are done again."""
 LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {"roll": _IN_BED, "lie-down": _ON_SIDE, "lie": _ON_SIDE}
 """Words of movements that are not drawn."""

@@ -190,7 +190,7 @@ class _Row(_Strand):
     def __init__(self, timeline: _Timeline, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
         super().__init__(timeline, part, timed.text, (limits.max_frames, limits.max_frames - CONTEXT))
         self.open = timed.open
-        self.beside = "", ""
+        self.beside: tuple[str, str] = ("", "")
         self.features: Float32 | None = None
         self.changes: Mapping[str, Any] = {}
 
