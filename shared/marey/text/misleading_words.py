@@ -57,8 +57,8 @@ _STRUCK_DOWN = re.compile(
 
 _TURNS_IN_AIR = re.compile(
     r"""\b(?P<jump>jumps?|jumping|leaps?|leaping|hops?)(?:\ (?:up|into\ the\ air|straight\ up))?
-    (?:\ (?P<degrees>\d{2,3})(?:\ degrees?|°)|(?:,|\ and|,\ and)?\ land(?:s|ing)?\ facing\ (?:the\ (?:other|opposite)\ (?:way|direction)
-    |backwards?))""",
+    (?:\ (?P<degrees>\d{2,3})(?:\ degrees?|°)
+    |(?:,|\ and|,\ and)?\ land(?:s|ing)?\ facing\ (?:the\ (?:other|opposite)\ (?:way|direction)|backwards?))""",
     re.IGNORECASE | re.VERBOSE,
 )
 """Jumps with a turn: "jumps 360 degrees", "jumps and lands facing the other way"."""
