@@ -54,7 +54,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "PATCH /v1/webhooks/{webhook}": {"name": "another"},
     "PATCH /v1/jobs/{job}": {"priority": 5, "comment": "x"},
     "PATCH /v1/schedules/{schedule}": {"paused": True},
-    "POST /v1/motions/files": {"motions": ["<motion>"], "formats": ["npz"]},
+    "POST /v1/motions/files": {"motions": ["<motion>"], "formats": ["bvh"]},
     "POST /v1/motions/review": {"motions": ["<motion>"], "verdict": "kept"},
     "POST /v1/motions/reroll": {"motions": ["<motion>"]},
     "POST /v1/motions/{motion}/edits": {"ops": [{"op": "mirror"}]},
@@ -65,6 +65,8 @@ NOBODYS = {
     "/", "/livez", "/readyz", "/live", "/live/{file}", "/v1/models", "/v1/models/{name}", "/v1/texts/parse",
 }  # fmt: skip
 """Paths that tell the same to everybody."""
+READ_BY_POST = {"/v1/motions/files"}
+"""Paths of POST requests that change nothing."""
 OF_ALL = {"/metrics"}
 """Paths that tell of all tenants, and want a scope that no other holds."""
 RIG, RIG_FILE = "unreleased-hero", exporter_of("bvh").encode(walker(seconds=0.5), Coordinates())
@@ -241,7 +243,8 @@ def test_every_request_that_changes_something_is_on_record(place: Studio, mine: 
             before = audited(place)
             status = Mine({**mine.ids, "job": job}, "").send(http, method, template).status_code
             noted = audited(place)[: len(audited(place)) - len(before)]
-            assert len(noted) == (method != "GET" and status < 300), f"{method} {template}: {status}, {noted}"
+            changes = method != "GET" and template not in READ_BY_POST
+            assert len(noted) == (changes and status < 300), f"{method} {template}: {status}, {noted}"
             if noted:
                 noun = template.split("/")[2].removesuffix("s")
                 assert noted[0][0].startswith(f"{noun}."), (template, noted)

@@ -48,9 +48,9 @@ def download_all(
             missing.append(download)
 
     def fetch(pack: list[FileToFetch]) -> None:
-        arrived = _unpack(client, pack, overwrite=overwrite, done=done) if len(pack) > 1 else set[FileToFetch]()
+        arrived = _unpack(client, pack, overwrite=overwrite, done=done) if len(pack) > 1 else set[Path]()
         for download in pack:
-            if download in arrived:
+            if download.path in arrived:
                 continue
             if download.asked is None:
                 _download(client, download, overwrite=overwrite)
@@ -109,13 +109,13 @@ def _finish(download: FileToFetch, part: Path, overwrite: bool) -> None:
 
 def _unpack(
     client: Transport, pack: Sequence[FileToFetch], *, overwrite: bool, done: Callable[[FileToFetch], None]
-) -> set[FileToFetch]:
-    """Fetch files by one request, and return those that arrived.
+) -> set[Path]:
+    """Fetch files by one request, and return the paths of those that arrived.
 
     A request that fails, or that an older server does not know, leaves the others, which are then fetched one by one,
     with retries, and with an error of their own.
     """
-    arrived: set[FileToFetch] = set()
+    arrived: set[Path] = set()
     received = receive_pack(client, pack)
     while (found := _next_of(received)) is not None:
         download, content = found
@@ -127,7 +127,7 @@ def _unpack(
                 os.fsync(stream.fileno())
             _finish(download, part, overwrite)
             done(download)
-            arrived.add(download)
+            arrived.add(download.path)
     return arrived
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import csv
 import itertools
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
 
 from marey.cli.commands.fetch import fetch_job
-from marey.client import Client
+from marey.client import Client, downloads
 from marey.client.manifest import RECORD, remove_left, write_manifest
-from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
@@ -157,19 +157,16 @@ def test_names_of_a_manifest_do_not_lead_out_of_the_folder(marey: Command, job: 
 
 @contextmanager
 def breaking(error: BaseException) -> Iterator[None]:
-    """In here a command is interrupted, or its server is lost, at its twelfth file."""
+    """In here a command is interrupted, or the disk is full, at its twelfth file."""
     left = itertools.count(11, -1)
-    real = Transport.stream
 
-    @contextmanager
-    def stream(self: Transport, path: str, *more: Any, **options: Any) -> Iterator[Any]:
+    def fsync(file: int) -> None:
         if next(left) <= 0:
             raise error
-        with real(self, path, *more, **options) as response:
-            yield response
+        os.fsync(file)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Transport, "stream", stream)
+        patch.setattr(downloads, "os", SimpleNamespace(fsync=fsync))
         yield
 
 

@@ -2,8 +2,8 @@
 
 One action: the sentences of `sayings.toml`, the vocabulary's own words, and the captions of known sets whose terms
 allow commercial use. Several: two and three of these, joined, and `several.toml`, which also has texts of one action
-that sound like several. None: `outside.toml`. `manner.toml` has texts of one action that say how fast or how often. The
-authors of these files saw the definitions and no prompts.
+that sound like several. None: `outside.toml`. `manner.toml` has texts of one action that say how fast or how often,
+`wordings.toml` of one action in words of many kinds. The authors of these files saw the definitions and no prompts.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from marey.vocabulary.paces import Pace
 SEQUENCES = 4000
 """Number of texts of several actions that are made of those of single ones."""
 WRITTEN = 3.0
-"""Weight of the texts of `several.toml`, `manner.toml` and `outside.toml`."""
+"""Weight of the texts of `several.toml`, `manner.toml`, `wordings.toml` and `outside.toml`."""
 LONGEST = 45
 """Most words of them."""
 _OF_THREE, _OF_ONE_SUBJECT = 0.2, 0.6
@@ -107,9 +107,9 @@ def held_out() -> set[str]:
 @cache
 def several_texts() -> tuple[tuple[str, str], ...]:
     """Return the texts of `several.toml` with bars, and what their parts ask for, as it stands there; and those of
-    `manner.toml`, which have one part."""
-    several = ((text, asks) for text, asks in _written("several"))
-    return (*several, *((each.text, each.action) for each in manner_texts()))
+    `manner.toml` and `wordings.toml`, which have one part."""
+    written = ((text, asks) for kind in ("several", "wordings") for text, asks in _written(kind))
+    return (*written, *((each.text, each.action) for each in manner_texts()))
 
 
 @cache
