@@ -213,3 +213,12 @@ def test_a_fall_that_is_told_twice_is_one() -> None:
     assert [[each.action for each in step] for step in falls] == [["die"]]
     assert jumps is not None
     assert len(jumps) == 2
+
+
+def test_the_turn_of_a_jump_is_part_of_it() -> None:
+    steps = wanted_of(["a person turns in the air, he jumps", "a person turns 180 degrees"])
+    assert steps is not None
+    assert [[each.action for each in step] for step in steps] == [["jump-turn"]]
+    two = wanted_of(["a person turns around", "he jumps and turns in the air"])
+    assert two is not None
+    assert len(two) == 2

@@ -55,6 +55,8 @@ Step = tuple[WantedAction, ...]
 """Actions of one stretch of time."""
 ONCE = frozenset({"die", "lie", "lie-down", "get-up"})
 """Actions that cannot be done again where they end: "he slips and falls" is one fall."""
+PARTS: Mapping[str, frozenset[str]] = {"jump-turn": frozenset({"turn", "turn-around", "spin"})}
+"""Actions that are part of one: "jumps and turns around"."""
 
 
 def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
@@ -66,17 +68,21 @@ def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
 
     Returns:
         One step a sentence, none for a sentence that names only what is not done; None if a sentence names no action,
-        or one that has no rule. Sentences behind each other that name one action of `ONCE` are one step.
+        or one that has no rule. Sentences behind each other that name one action of `ONCE` are one step, and so is an
+        action with its `PARTS` behind it.
     """
     steps = [step for step in map(_step, sentences) if step != ()]
     found = tuple(step for step in steps if step is not None)
     if not found or len(found) < len(steps):
         return None
-    return tuple(step for before, step in zip((None, *found), found, strict=False) if step != before or not _once(step))
+    return tuple(step for before, step in zip(((), *found), found, strict=False) if not _is_told(before, step))
 
 
-def _once(step: Step) -> bool:
-    return all(each.action in ONCE for each in step)
+def _is_told(before: Step, step: Step) -> bool:
+    """Return True if a step tells again what the one before it tells."""
+    again = step == before and all(each.action in ONCE for each in step)
+    parts = frozenset[str]().union(*(PARTS.get(each.action, frozenset()) for each in before))
+    return again or all(each.action in parts for each in step)
 
 
 def wanted_by_meaning(scope: Mapping[str, Any] | None) -> tuple[Step, ...] | None:
