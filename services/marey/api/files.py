@@ -121,11 +121,12 @@ def _sent(opened: Opened, length: int, file: FileView, headers: dict[str, str], 
     changes threads twice, which costs more than the read."""
     headers["Content-Length"] = str(length)
     if length <= CHUNK:
-        return Response(b"".join(_read(opened)), status, headers, file.media_type)
-    return StreamingResponse(_read(opened), status, headers, file.media_type)
+        return Response(b"".join(read_chunks(opened)), status, headers, file.media_type)
+    return StreamingResponse(read_chunks(opened), status, headers, file.media_type)
 
 
-def _read(opened: Opened) -> Iterator[bytes]:
+def read_chunks(opened: Opened) -> Iterator[bytes]:
+    """Yield the content of an open object, and close it."""
     try:
         yield from opened.chunks
     finally:

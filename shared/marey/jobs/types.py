@@ -250,6 +250,10 @@ class MotionRow:
     edited_from: tuple[UUID, ...]
     """Sources of an edit: the edited motion, then the others; empty if the motion was generated."""
 
+    def file(self, format: str) -> MotionFile | None:
+        """Return the stored file of a format; None if there is none."""
+        return next((file for file in self.files if file.format == format), None)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ItemRow(ItemSpec):

@@ -72,5 +72,5 @@ def edit_input(engine: sa.Engine, store: AssetStore, claim: Claim) -> EditInput:
 
 
 def _stored(row: MotionRow) -> StoredSource | None:
-    npz = next((file.sha256 for file in row.files if file.format == CANONICAL), None)
-    return None if npz is None else StoredSource(npz, row.licence)
+    npz = row.file(CANONICAL)
+    return None if npz is None else StoredSource(npz.sha256, row.licence)

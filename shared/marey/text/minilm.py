@@ -61,6 +61,7 @@ class MiniLM:
         layers = _Layers([_Layer(weights, f"encoder.layer.{i}.", int8=int8) for i in range(LAYERS)])
         self._layers = layers
         self._often = CompiledLater(layers) if int8 else None
+        self._rows = ROWS if _dtype(self._words.device) == torch.bfloat16 else 1  # few rows have other bits in bfloat16
 
     @torch.inference_mode()
     def states(self, ids: list[int]) -> list[Tensor]:
@@ -82,7 +83,7 @@ class MiniLM:
         order = sorted(range(len(texts)), key=lambda row: len(texts[row]))
         lengths = [len(texts[row]) for row in order]
         groups = [(len(list(same)), length) for length, same in itertools.groupby(lengths)]
-        more = -sum(lengths) % ROWS  # few rows have other bits in bfloat16
+        more = -sum(lengths) % self._rows
         places = torch.cat([*(torch.arange(length) for length in lengths), torch.zeros(more, dtype=torch.long)])
         tokens = torch.tensor([*(token for row in order for token in texts[row]), *[0] * more])
         hidden = self._embed(tokens, self._positions[places])
@@ -171,7 +172,12 @@ def _linear(weight: Tensor, bias: Tensor) -> nn.Module:
     linear.weight, linear.bias = nn.Parameter(weight, False), nn.Parameter(bias, False)
     if not can_pack(linear):
         return linear
-    return PackedLinear(linear, torch.bfloat16 if fast_bf16(linear.weight.device) else torch.float32)
+    return PackedLinear(linear, _dtype(weight.device))
+
+
+def _dtype(device: torch.device) -> torch.dtype:
+    """Return the type of the matrices of node features."""
+    return torch.bfloat16 if fast_bf16(device) else torch.float32
 
 
 class _Int8Linear(nn.Module):

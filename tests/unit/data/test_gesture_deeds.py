@@ -12,9 +12,10 @@ import pytest
 
 from marey.data import gestures
 from marey.data.gestures import KINDS, made_gestures
-from marey.data.part import GRAVITY, MAX_FRAMES, Part
+from marey.data.part import MAX_FRAMES, Part
 from marey.drawing.flights import flight_height, standing_feet
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.limbs import GRAVITY
 from marey.posing.standing import StandingBody
 from tests.support.bodies import FPS
 from tests.unit.data.test_gesture_acts import swings

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.generation.flights import GRAVITY, LONGER, UP_M, fallen, on_floor
+from marey.generation.flights import LONGER, UP_M, fallen, on_floor
 from marey.motion.features import HUMANML3D_263
+from marey.posing.limbs import GRAVITY
 from tests.support.bodies import Body, walker
 from tests.unit.generating.test_asked import ask, make
 

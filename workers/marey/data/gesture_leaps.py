@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.data.gesture_gaits import speed_of
-from marey.data.part import FPS, GRAVITY, Part
+from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.data.retime import LIMIT, loop
 from marey.drawing.gesture import Gesture
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.bones import with_bones
-from marey.posing.limbs import LEG_CHAINS
+from marey.posing.limbs import GRAVITY, LEG_CHAINS
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody
 
 Array = NDArray[np.floating]

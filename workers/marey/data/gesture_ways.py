@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
-from marey.data.part import FPS, GRAVITY
+from marey.data.part import FPS
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.bones import knee_poles, with_bones
-from marey.posing.limbs import CARRIED, LEG_CHAINS, PARENTS
+from marey.posing.limbs import CARRIED, GRAVITY, LEG_CHAINS, PARENTS
 from marey.posing.standing import eased
 
 Array = NDArray[np.floating]

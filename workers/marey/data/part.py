@@ -11,7 +11,6 @@ from marey.data.describe import Facts
 from marey.data.pack import PackClip
 
 FPS = 20.0
-GRAVITY = 9.81  # m/s²
 MAX_FRAMES = 196  # feature frames; HumanML3D's limit
 MIN_FRAMES = 20
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import smooth
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.feet import runs
+from marey.posing.limbs import GRAVITY
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -23,7 +24,6 @@ JUMPS = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn"})
 """Actions whose flights are looked at."""
 ON_FEET = JUMPS | {"walk", "walk-backward", "run", "sprint", "turn", "sidestep", "jumping-jacks"}
 """Actions on the floor."""
-GRAVITY = 9.81
 ANKLES, TOES, ANKLE_M = [7, 8], [10, 11], 0.06
 """Joints, and metres of an ankle over the sole."""
 UP_M = 0.04

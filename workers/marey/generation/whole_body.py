@@ -23,7 +23,7 @@ from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody
+from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody, way_through
 from marey.posing.still import standing_still
 from marey.vocabulary.turns import stated_turn
 
@@ -230,6 +230,6 @@ def _joined(gestures: Sequence[Gesture], frames: int | None, rng: random.Random)
 def _retimed(joints: Array, frames: int) -> Array:
     """Return as many frames at another pace."""
     at = np.linspace(0.0, len(joints) - 1.0, frames)
-    low = np.minimum(at.astype(int), len(joints) - 2)
-    share = (at - low)[:, None, None]
-    return (1 - share) * joints[low] + share * joints[low + 1]
+    return way_through(at, np.arange(float(len(joints))), joints.reshape(len(joints), -1)).reshape(
+        frames, *joints.shape[1:]
+    )

@@ -276,7 +276,9 @@ def stations(frames: int, times: Sequence[float], points: Array | Sequence[Seque
     return (1 - w) * through[k] + w * through[k + 1]
 
 
-def way_through(t: Array, times: Sequence[float] | Array, points: Sequence[float] | Sequence[Sequence[float]]) -> Array:
+def way_through(
+    t: Array, times: Sequence[float] | Array, points: Array | Sequence[float] | Sequence[Sequence[float]]
+) -> Array:
     """Numbers (T,), or path (T, K), in straight lines through points (n,) or (n, K); ends are held.
 
     Unlike `stations` it stops nowhere; callers smooth it.

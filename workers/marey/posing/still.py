@@ -7,9 +7,10 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.limbs import BONE_LENGTHS, FPS, PARENTS
-from marey.posing.standing import ARMS, LEFT, LEGS, SIGN, StandingBody, direction
+from marey.posing.standing import ARMS, LEGS, SIGN, StandingBody, direction
 
 Array = NDArray[np.floating]
 
@@ -45,8 +46,7 @@ def standing_still(frames: int, rng: random.Random) -> Array:
 
 def _hanging(out: float, ahead: float) -> Array:
     """Direction (3,) of an arm: outward, up and forward."""
-    vector = np.array([np.tan(np.radians(out)), -1.0, np.tan(np.radians(ahead))])
-    return vector / np.linalg.norm(vector)
+    return normalize(np.array([np.tan(np.radians(out)), -1.0, np.tan(np.radians(ahead))]))
 
 
 def _upright(rng: random.Random) -> Array:
@@ -65,7 +65,7 @@ def _upright(rng: random.Random) -> Array:
     for side, (hip, knee, ankle, toe) in LEGS.items():
         joints[ankle] = SIGN[side] * apart, _ANKLE, _BEHIND
         joints[knee] = 0.5 * (joints[hip] + joints[ankle]) + np.array([0.0, 0.0, 0.04])
-        way = direction(SIGN[side] * SIGN[LEFT] * turned, 0.0)
+        way = direction(SIGN[side] * turned, 0.0)
         level = np.sqrt(BONE_LENGTHS[toe] ** 2 - (_ANKLE - _TOE) ** 2)
         joints[toe] = joints[ankle] + level * way - np.array([0.0, _ANKLE - _TOE, 0.0])
     return joints

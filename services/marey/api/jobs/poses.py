@@ -177,7 +177,7 @@ def _npz(shared: Context, row: MotionRow) -> bytes:
         Conflict: it has none: its prompt is being erased.
         NotFound: it was deleted since.
     """
-    file = next((file for file in row.files if file.format == CANONICAL), None)
+    file = row.file(CANONICAL)
     if file is None:
         raise Conflict(f"the motion has no {CANONICAL} to read", hint="If its prompt is being erased, wait a moment.")
     return shared.store.get(asset_key(row.tenant, file.sha256))

@@ -80,7 +80,7 @@ def recipe(
         InvalidInput: options that contradict each other, or that the format does not have.
     """
     exporter = exporters().get(format)
-    if exporter is None and not any(file.format == format for file in row.files):
+    if exporter is None and row.file(format) is None:
         raise _no_file(row, format)
     export = export_options(given)
     if exporter is not None:
@@ -95,7 +95,7 @@ def stored_file(row: jobs.MotionRow, wanted: FileRecipe) -> MotionFile | None:
     Raises:
         NotFound: it cannot be made, because its format is not installed here.
     """
-    file = next((file for file in row.files if file.format == wanted.format), None)
+    file = row.file(wanted.format)
     if wanted.plain and file is not None:
         return file
     if wanted.format not in exporters():
@@ -109,7 +109,7 @@ def source_of(row: jobs.MotionRow) -> str:
     Raises:
         NotFound: there is none.
     """
-    source = next((file for file in row.files if file.format == CANONICAL), None)
+    source = row.file(CANONICAL)
     if source is None:
         hint = "If its prompt is being erased, wait a moment."
         raise NotFound(f"the motion has no {CANONICAL} to make the file of", where=str(row.id), hint=hint)

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey import jobs
 from marey.api.context import Context
+from marey.api.files import read_chunks
 from marey.core.disposition import attachment
 from marey.core.errors import NotFound, TooLarge
 from marey.core.validation import worded
@@ -82,7 +83,7 @@ def packed_files(shared: Context, tenant: str, body: NewPackBody) -> list[Packed
 
 
 def _packed(row: jobs.MotionRow, format: str) -> PackedFile:
-    file = next((file for file in row.files if file.format == format), None)
+    file = row.file(format)
     if file is None:
         have = ", ".join(each.format for each in row.files)
         hint = f"It has {have}; GET /v1/motions/{{motion}}/files/{{format}} makes others."
@@ -103,10 +104,7 @@ def _tar(store: AssetStore, tenant: str, files: Sequence[PackedFile]) -> Iterato
         except NotFound:
             continue
         yield each.head
-        try:
-            yield from opened.chunks
-        finally:
-            opened.close()
+        yield from read_chunks(opened)
         yield bytes(each.padding)
     yield END
 
