@@ -16,6 +16,7 @@ from marey.core.arrays import parse_safetensors
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile
 from marey.text.graph import SemanticGraph
+from marey.vocabulary.take_names import as_words
 
 FORMAT = 1
 MAX_HEADER_BYTES = 2**20
@@ -34,6 +35,11 @@ class TextFeatures:
     action_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
     seconds: float | None = None  # length of the motion that the rewriter proposes
     movements: tuple[TextFeatures, ...] = ()  # its movements in the order of time, if there are several
+
+    @property
+    def said(self) -> str:
+        """The prompt, with names of takes as words."""
+        return as_words(self.prompt)
 
     @property
     def sentence(self) -> NDArray[np.float16]:

@@ -64,7 +64,7 @@ class MeaningJudge:
         scope = match_scope(prompt, lists)
         if scope.left is None:
             return scope
-        (vector,) = self._pooled([prompt])
+        (vector,) = self._pooled([as_words(prompt)])
         if scope.left == "noun":
             names = [each.action for each in scope.actions if each.action is not None]
             is_thing = self.noun_cosine(vector, names) < NOUN_LIMIT

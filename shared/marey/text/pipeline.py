@@ -35,6 +35,7 @@ from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
 from marey.text.words import EDGE_PUNCTUATION
+from marey.vocabulary.take_names import as_words
 
 if TYPE_CHECKING:
     from marey.text.spelling import Speller
@@ -237,7 +238,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_misleading(text) for text in texts]
+        texts = [without_misleading(as_words(text)) for text in texts]
         if not self._reads_actions:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
         return TrainedReaders(self.pooled, self._encoded, movements=self.spec.movements).read(texts)

@@ -21,6 +21,7 @@ from marey.vocabulary.movements import Movements
 from marey.vocabulary.negation import Negations, Span, denies
 from marey.vocabulary.phrase_roles import PhraseRoles
 from marey.vocabulary.phrases import Match, PhraseFinder, Word
+from marey.vocabulary.take_names import as_words
 from marey.vocabulary.word_lists import load_word_lists
 
 Verdict = Literal["known", "close", "tried", "unknown"]
@@ -201,6 +202,7 @@ class ScopeMatcher:
 
     def match(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt relative to what a bundle supports."""
+        prompt = as_words(prompt)
         bare = BarePrompt.of(prompt) if lists.drawn else as_written(prompt)
         return (self._borne(bare, lists) if bare.stated else None) or self._match(prompt, lists)
 

@@ -110,7 +110,7 @@ class _Wish:
         text = request.text
         steps = wanted_of(text.actions or (text.rewritten,))
         action = _action_of(text, steps) or _row_of_blows(steps or ())
-        prompt, gaze = text.prompt, stated_gaze(text.prompt)
+        prompt, gaze = text.said, stated_gaze(text.said)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
         count = stated_count(prompt, action) if action in REPETITIONS or action in AGAIN else None
@@ -127,7 +127,7 @@ class _Wish:
     def fine(self, request: Request) -> FineWish:
         """Return what is asked for of a movement that is drawn."""
         fixed = request.frames is not None and not request.open
-        return FineWish(self.count, self.side, request.text.prompt, fixed, request.beside)
+        return FineWish(self.count, self.side, request.text.said, fixed, request.beside)
 
     def drawn(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is

@@ -101,12 +101,12 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         return []
     if request.timeline is None:
         action = action_of(request.text)
-        stated = fitting([*stated_bearings(request.text.prompt), *_drawn_as(action)], action)
+        stated = fitting([*stated_bearings(request.text.said), *_drawn_as(action)], action)
         return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
-    whole = [each for each in stated_bearings(request.text.prompt) if each.whole] if request.is_sequence else []
+    whole = [each for each in stated_bearings(request.text.said) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
-        action, own = action_of(row.text), stated_bearings(row.text.prompt)
+        action, own = action_of(row.text), stated_bearings(row.text.said)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
         stated = fitting([*whole, *kept, *own, *_drawn_as(action)], action)
         if request.is_sequence:

@@ -31,7 +31,7 @@ def resolved_length(generator: Generator[Any], request: Request) -> Request:
 
 def _least(text: TextFeatures) -> float:
     """Return the seconds that the bearings of a text take that are done, one gesture after the other."""
-    if not (stated := stated_bearings(text.prompt)):
+    if not (stated := stated_bearings(text.said)):
         return 0.0  # most prompts: their action need not be read
     done = [each.bearing for each in fitting(stated, action_of(text))]
     gestures = [_seconds(bearing) for bearing in done if bearing.gesture]

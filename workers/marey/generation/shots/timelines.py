@@ -262,7 +262,7 @@ class _Timeline:
         self.seed = request.seed
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
-        prompts = ["", *(row.text.prompt for row in request.timeline), ""]
+        prompts = ["", *(row.text.said for row in request.timeline), ""]
         for number, (strand, row) in enumerate(zip(self.rows, request.timeline, strict=True)):
             strand.beside = prompts[number], prompts[number + 2]
             if row.made is not None:

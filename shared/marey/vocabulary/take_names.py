@@ -1,0 +1,75 @@
+"""Names of takes in shot lists, such as "LOCO_walk_limp_L" or "DEATH_BACKWARD_01", as the words that they stand for."""
+
+from __future__ import annotations
+
+import itertools
+import re
+
+_NAME = re.compile(r"(?<![\w/.@])\w*[^\W_]_[^\W_]\w*(?![\w/@])")
+"""A word with an underscore inside."""
+_PARTS = re.compile(r"\d+deg|[A-Z]{2,}(?=[A-Z][a-z])|[A-Z]?[a-z']+|[A-Z]+|\d+")
+_ABBREVIATED = {
+    "l": "left",
+    "lt": "left",
+    "lft": "left",
+    "r": "right",
+    "rt": "right",
+    "rgt": "right",
+    "f": "forward",
+    "fw": "forward",
+    "fwd": "forward",
+    "b": "backward",
+    "bw": "backward",
+    "bwd": "backward",
+    "bk": "backward",
+    "bck": "backward",
+    "cw": "clockwise",
+    "ccw": "counterclockwise",
+    "atk": "attack",
+    "crch": "crouch",
+}
+_SAID_NOTHING = frozenset(
+    """anim animation anims char character clip cine cinematic cycle enemy final fullbody generic hero inplace ip
+    loco locomotion loop lp mc mixamo mocap mvmt mvt new npc pc player ref rm root rootmotion sc scene seq temp
+    test tk unarmed v var variant variation ver wip""".split()  # noqa: SIM905 - a list of words
+)
+"""Parts that say who, which or how it is kept, but not what is done."""
+_SLASHED = re.compile(r"(?<!\w)w/o?(?=\s|\w)", re.IGNORECASE)
+_NUMBERED = re.compile(r"^(?:v|tk|take|sc|shot|var|seq)?\d+[a-z]?$")
+_ANGLE = re.compile(r"^(45|90|135|180|270|360)(?:deg)?$")
+_COUNTED = frozenset({"take", "shot", "clip", "scene"})
+"""Parts that a number comes behind, with which they say nothing: "take_02", but "take_cover"."""
+
+
+def as_words(text: str) -> str:
+    """Return a prompt with names of takes in it as words: "idle injured" for "idle_injured", "walk limp left" for
+    "LOCO_walk_limp_L", "with" for "w/". Any other text is returned as it is.
+
+    Numbers of takes, and parts that say who it is or how it is kept (`NPC`, `loop`), are left out; angles stay.
+    """
+    said = _SLASHED.sub(lambda found: "without " if found[0][-1] in "oO" else "with ", text)
+    said = _NAME.sub(_words_of, said)
+    return text if said == text else " ".join(said.split()).lstrip(" -,:;") or text
+
+
+def _words_of(name: re.Match[str]) -> str:
+    parts = [part for piece in name[0].split("_") for part in _pieces(piece)]
+    words = [_word(part, after) for part, after in itertools.pairwise([*parts, ""])]
+    return " ".join(word for word in words if word) or name[0].replace("_", " ")
+
+
+def _pieces(piece: str) -> list[str]:
+    """Return the words of a part between underscores, in lower case: "walk" and "fwd" of "WalkFwd"."""
+    lowered = piece.lower()
+    return [lowered] if _NUMBERED.match(lowered) else [found.lower() for found in _PARTS.findall(piece)]
+
+
+def _word(part: str, after: str) -> str:
+    """Return what a part says; `after`: the part behind it, empty behind the last."""
+    if angle := _ANGLE.match(part):
+        return f"{angle[1]} degrees"
+    if _NUMBERED.match(part) or (part in _COUNTED and _NUMBERED.match(after)):
+        return ""
+    if not after and part in "abc":
+        return ""
+    return "" if part in _SAID_NOTHING else _ABBREVIATED.get(part, part)
