@@ -8,7 +8,9 @@ from marey.bundles import TextSpec
 from marey.text.encoders import TextEncoder
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
+from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
+from marey.text.reading_encoder import reading_encoder
 from marey.text.roles import RoleLabeller
 
 
@@ -22,6 +24,14 @@ def shared_labeller() -> RoleLabeller:
 def shared_encoder() -> TextEncoder:
     """The shipped encoder."""
     return load_encoder("minilm")
+
+
+@functools.cache
+def shared_reading_encoder() -> MiniLMEncoder:
+    """The shipped encoder as the readers read texts."""
+    encoder = shared_encoder()
+    assert isinstance(encoder, MiniLMEncoder)
+    return reading_encoder(encoder)
 
 
 def shared_pipeline(rewriter: str = "none") -> TextPipeline:

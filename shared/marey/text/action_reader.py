@@ -58,7 +58,11 @@ class ReadAction:
     @property
     def action(self) -> str | None:
         """Return the id of the action; None = several, none, or in doubt."""
-        return None if self.name in (SEVERAL, OUTSIDE) or self.probability < self.least else self.name
+        return self.likely(self.least)
+
+    def likely(self, least: float) -> str | None:
+        """Return the id of the action from a probability of `least` on; None = several, none, or in doubt."""
+        return None if self.name in (SEVERAL, OUTSIDE) or self.probability < least else self.name
 
 
 class ActionReader(Reader):
@@ -97,15 +101,22 @@ class ActionReader(Reader):
 
 
 def inputs_of(prompt: str, vector: Float32, classes: Sequence[str]) -> Float32:
-    """Return the input (W + C + 2,) of the network: the sentence vector (W,), a mark of each class that the words name,
-    and marks of prompts whose words name several actions, and that join clauses in time."""
-    named = named_actions(prompt)
-    marks = [
-        *(name in named for name in classes),
-        len(load_vocabulary().without_implied(named)) > 1,
-        _JOINTS.search(prompt.lower()) is not None,
-    ]
-    return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE])
+    """Return the input (W + C + 2,) of the network: the sentence vector (W,) and the marks of the words."""
+    return np.concatenate([np.asarray(vector, np.float32) * VECTOR_SCALE, word_marks(prompt, classes)])
+
+
+def word_marks(text: str, classes: Sequence[str]) -> Float32:
+    """Return marks (C + 2,) of a text: of each class that its words name, of words that name several actions, and of
+    words that join clauses in time."""
+    named = named_actions(text)
+    several = len(load_vocabulary().without_implied(named)) > 1
+    joined = _JOINTS.search(text.lower()) is not None
+    return np.array([*(name in named for name in classes), several, joined], np.float32) * WORD_SCALE
+
+
+def joins_clauses(text: str) -> bool:
+    """Return True if a text has words or signs that may join clauses."""
+    return "," in text or _JOINTS.search(text.lower()) is not None
 
 
 def named_actions(text: str, *, surely: bool = False) -> set[str]:

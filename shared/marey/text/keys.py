@@ -10,6 +10,7 @@ from marey.core.errors import InvalidBundle
 from marey.core.settings import Settings, settings
 from marey.text.action_reader import reader_sha256
 from marey.text.plain_action import VERSION as PLAIN_ACTION_VERSION
+from marey.text.reading_encoder import reading_encoder_sha256
 from marey.text.sequence_reader import VERSION as SEQUENCE_VERSION
 from marey.text.sequence_reader import sequence_reader_sha256
 from marey.vocabulary.bearings import bearings_sha256
@@ -53,7 +54,7 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
     ]
     if spec.plain_action:
         words = [load_vocabulary().sha256, bearings_sha256()]
-        parts.append(["plain_action", PLAIN_ACTION_VERSION, *words, reader_sha256()])
+        parts.append(["plain_action", PLAIN_ACTION_VERSION, *words, reader_sha256(), reading_encoder_sha256()])
     if spec.movements:
         parts.append(["movements", SEQUENCE_VERSION, load_vocabulary().sha256, sequence_reader_sha256()])
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()

@@ -12,6 +12,7 @@ a CPU the matrices are packed, and a token's bits do not depend on the texts bes
 
 from __future__ import annotations
 
+import copy
 import itertools
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -62,6 +63,19 @@ class MiniLM:
         self._layers = layers
         self._often = CompiledLater(layers) if int8 else None
         self._rows = ROWS if _dtype(self._words.device) == torch.bfloat16 else 1  # few rows have other bits in bfloat16
+
+    def tuned(self, updates: Mapping[str, Tensor]) -> MiniLM:
+        """Return this encoder with low-rank updates beside matrices of its layers, all of which are shared (Hu et al.
+        2021, arXiv 2106.09685).
+
+        Args:
+            updates: `<layer>.<matrix>.down` (rank, in) and `.up` (out, rank); matrices are `project`, which is query,
+                key and value, `attended`, `inner` and `outer`.
+        """
+        other = copy.copy(self)
+        other._often = None
+        other._layers = _Layers([layer.tuned(updates, f"{i}.") for i, layer in enumerate(self._layers.layers)])
+        return other
 
     @torch.inference_mode()
     def states(self, ids: list[int]) -> list[Tensor]:
@@ -140,6 +154,16 @@ class _Layer(nn.Module):
         self.outer = linear("output.dense")
         self.outer_norm = norm("output")
 
+    def tuned(self, updates: Mapping[str, Tensor], prefix: str) -> _Layer:
+        """Return a layer with the same parts, and updates beside some of its matrices."""
+        other = _Layer.__new__(_Layer)
+        nn.Module.__init__(other)
+        other.heads = self.heads
+        for name, part in self.named_children():
+            down, up = (updates.get(f"{prefix}{name}.{end}") for end in ("down", "up"))
+            setattr(other, name, part if down is None or up is None else _Updated(part, down, up))
+        return other
+
     def forward(self, hidden: Tensor, groups: list[tuple[int, int]]) -> Tensor:
         """Apply the layer to states (N, 384).
 
@@ -159,6 +183,19 @@ class _Layer(nn.Module):
         attended = self.attended(mixed[0] if len(mixed) == 1 else torch.cat(mixed))
         hidden = self.attended_norm(hidden + attended)
         return self.outer_norm(hidden + self.outer(F.gelu(self.inner(hidden))))
+
+
+class _Updated(nn.Module):
+    """A matrix with a low-rank update beside it, in products of their own: the matrix is packed."""
+
+    def __init__(self, matrix: nn.Module, down: Tensor, up: Tensor) -> None:
+        super().__init__()
+        self.matrix = matrix
+        self.down, self.up = (_linear(weight, torch.zeros(len(weight))) for weight in (down, up))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, in) to (N, out)."""
+        return self.matrix(x) + self.up(self.down(x))
 
 
 def _attend(projected: Tensor, texts: int, tokens: int, heads: int) -> Tensor:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import copy
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from marey.bundles import Bundle
 from marey.nn.threads import one_thread
@@ -25,6 +27,12 @@ class MiniLMEncoder:
     def __init__(self, bundle: Bundle) -> None:
         self.sha256 = bundle.weights_sha256
         self._model = MiniLM(bundle)
+
+    def tuned(self, updates: Mapping[str, Tensor]) -> MiniLMEncoder:
+        """Return this encoder with low-rank updates beside its matrices, which are shared (`MiniLM.tuned`)."""
+        other = copy.copy(self)
+        other._model = self._model.tuned(updates)
+        return other
 
     @one_thread()
     def encode(self, text: str) -> Encoding:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import threading
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
@@ -20,6 +18,7 @@ from marey.items.prompts import check_prompt
 from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
+from marey.text.encoded_texts import EncodedTexts
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
@@ -30,6 +29,7 @@ from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject
+from marey.text.reading_encoder import reading_encoder
 from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
 TOGETHER = 64
 """Prompts whose texts are encoded together."""
 
@@ -73,8 +72,8 @@ class TextPipeline:
         self.labeller = labeller
         self.encoder = encoder
         self._speller: Speller | None = None
-        self._pooled: OrderedDict[str, NDArray[np.float32]] = OrderedDict()
-        self._lock = threading.Lock()
+        self._texts = EncodedTexts(encoder)
+        self._texts_to_read = self._encoded_for_readers()
 
     @classmethod
     def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
@@ -153,8 +152,8 @@ class TextPipeline:
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Get ready to read these prompts one by one."""
         self.rewriter.prefetch(prompts)
-        if self._reads_actions and self.spec.rewriter == "none":
-            self.pooled(prompts)  # together, in half the time
+        if self._texts_to_read is not None and self.spec.rewriter == "none":
+            self._texts_to_read.pooled(prompts)  # together, in half the time
 
     def _rewritten(self, prompts: Sequence[str]) -> list[Rewrite]:
         if len(prompts) > 1:
@@ -239,18 +238,19 @@ class TextPipeline:
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
         texts = [without_misleading(as_words(text)) for text in texts]
-        if not self._reads_actions:
+        encoded = self._texts_to_read
+        if encoded is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
-        return TrainedReaders(self.pooled, self._encoded, movements=self.spec.movements).read(texts)
+        return TrainedReaders(encoded.pooled, encoded.encodings, movements=self.spec.movements).read(texts)
 
-    def _encoded(self, texts: Sequence[str]) -> list[Encoding]:
-        with self._lock:
-            return self.encoder.encodings(texts)
+    def _encoded_for_readers(self) -> EncodedTexts | None:
+        """Return the texts as the readers read them; None if prompts are read by their words alone, as with encoders
+        that the readers were not trained for."""
+        if not self.spec.plain_action or action_reader().encoder_sha256 != self.encoder.sha256:
+            return None
+        from marey.text.minilm_encoder import MiniLMEncoder
 
-    @property
-    def _reads_actions(self) -> bool:
-        """True if prompts are read by the vectors of this encoder."""
-        return self.spec.plain_action and action_reader().encoder_sha256 == self.encoder.sha256
+        return EncodedTexts(reading_encoder(self.encoder)) if isinstance(self.encoder, MiniLMEncoder) else None
 
     def _read(self, readings: Sequence[ReadPrompt]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
@@ -283,28 +283,14 @@ class TextPipeline:
         if self.spec.node_features == "pooled":
             rows = self.pooled([node.text for node in graph.nodes])
         else:
-            with self._lock:
-                sentence = self.encoder.encode(without_punctuation(graph.text))
+            sentence = self._texts.encode(without_punctuation(graph.text))
             starts = _word_starts(graph)
             rows = [self._span(sentence, graph, starts, node) for node in graph.nodes]
         return np.stack(rows).astype(np.float16)
 
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-        """Pooled encodings (W,) of texts without the punctuation at their ends; the latest few thousand are kept."""
-        with self._lock:
-            return self._pooled_of([without_punctuation(text) for text in texts])
-
-    def _pooled_of(self, stripped: Sequence[str]) -> list[NDArray[np.float32]]:
-        found = {text: self._pooled[text] for text in stripped if text in self._pooled}
-        missing = [text for text in dict.fromkeys(stripped) if text not in found]
-        if missing:
-            found.update(zip(missing, self.encoder.pooled(missing), strict=True))
-        for text, vector in found.items():
-            self._pooled[text] = vector
-            self._pooled.move_to_end(text)
-        while len(self._pooled) > CACHED_TEXTS:
-            self._pooled.popitem(last=False)
-        return [found[text] for text in stripped]
+        """Return the sentence vectors (W,) of texts without the punctuation at their ends."""
+        return self._texts.pooled(texts)
 
     def _graphs(self, texts: Sequence[str]) -> list[SemanticGraph]:
         frames = self.labeller.label([text.split() for text in texts])

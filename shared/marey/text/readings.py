@@ -6,7 +6,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from marey.text.action_reader import AGREED, OUTSIDE, RISING, SURE_OF_SEVERAL, ReadAction, action_reader, named_actions
+from marey.text.action_reader import (
+    AGREED,
+    OUTSIDE,
+    RISING,
+    SURE_OF_SEVERAL,
+    ReadAction,
+    action_reader,
+    joins_clauses,
+    named_actions,
+)
 from marey.text.encoders import Encoding
 from marey.text.misleading_words import has_other_sense
 from marey.text.plain_action import with_plain_action
@@ -19,6 +28,8 @@ from marey.vocabulary.scope import STANDING
 
 SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
+UNSPLIT = 0.35
+"""Probability from which on a prompt that is no sequence asks for one action."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
@@ -85,12 +96,24 @@ class TrainedReaders:
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
         if only_gaze(bare.prompt):
             return ReadPrompt.of(bare.prompt, STANDING, surely=True)
+        if self._movements and (movements := self._after_gaze(bare.prompt)):
+            return ReadPrompt(bare.prompt, movements)
         read = self._read_bare(bare)
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
             return ReadPrompt(bare.prompt, movements)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
-        return ReadPrompt.of(bare.prompt, read.action, surely=surely)
+        return ReadPrompt.of(bare.prompt, read.likely(UNSPLIT) if self._movements else read.action, surely=surely)
+
+    def _after_gaze(self, prompt: str) -> tuple[ReadMovement, ...]:
+        """Return the movements of a prompt that has the head turn first, and then asks for one action; else none."""
+        acts = without_gaze(prompt)
+        said = acts.removeprefix("and ").removeprefix("then ")
+        looks = prompt[: prompt.rfind(acts)].strip(" ,;")
+        if said == acts or not only_gaze(looks):
+            return ()
+        action = self._read_action(said).likely(UNSPLIT)
+        return () if action is None else (ReadMovement(looks, STANDING), ReadMovement(said, action))
 
     def _is_surely_one(self, bare: BarePrompt, read: ReadAction) -> bool:
         """Return True if a prompt is not looked at for several movements."""
@@ -139,7 +162,8 @@ class TrainedReaders:
 
     def _read_action(self, text: str) -> ReadAction:
         if text not in self._actions:
-            read = action_reader().read(text, self._pooled([text])[0])
+            acts = text if joins_clauses(text) else without_gaze(text) or text
+            read = action_reader().read(acts, self._pooled([acts])[0])
             self._actions[text] = ReadAction(OUTSIDE, 1.0, read.least) if has_other_sense(read.action, text) else read
         return self._actions[text]
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.hashing import sha256_of
-from marey.text.action_reader import OUTSIDE, RISING, named_actions
+from marey.text.action_reader import OUTSIDE, RISING, word_marks
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
@@ -35,8 +35,8 @@ from marey.vocabulary.scope import STANDING, every_action, match_scope
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
 VERSION = 5
 """Raise it when the same prompt and file give other movements."""
-STATE_SCALE, VECTOR_SCALE, WORD_SCALE = 6.0, 10.0, 3.0
-"""Factors of token states, of sentence vectors, and of the marks of actions that the words name."""
+STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
+"""Factors of token states and of sentence vectors."""
 KERNEL = 5
 """Tokens that a convolution sees."""
 CONTEXT = "no movement"
@@ -82,6 +82,7 @@ _JOINING = re.compile(
 
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
+RUNS, JUMPS = frozenset({"run", "sprint"}), frozenset({"jump", "jump-forward"})
 ON_FEET = WAYS | RISING | {"jump", "jump-forward", "leap", "hop", "climb-stairs", "climb-ladder", "climb-onto", "dance"}
 """Actions behind which a body is on its feet, though it sat before."""
 DRAWN_S = 1.8
@@ -92,6 +93,17 @@ _MANNER = re.compile(
     r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
 )
 """Words that say how something is done, though one of them names an action."""
+_END = re.compile(
+    r"""(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?(?:
+    lands?(?:\s(?:softly|safely|on\s(?:both|his|her|their|the)\s(?:\w+\s)?feet))?
+    |straightens?(?:\s(?:back|again|up|out))*
+    |(?:recovers?|relaxes|relax)
+    |(?:returns?|comes?|goes|go|gets?)\s(?:back\s)?(?:up\s)?to\s(?:a\s|the\s)?(?:neutral|rest|upright|standing)(?:\s\w+)?
+    |lowers?\s(?:it|them|the\sarms?|(?:his|her|their)\s(?:arms?|hands?))(?:\s(?:back|again|down))*
+    )""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Clauses of the end of a movement, which comes by itself."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -99,6 +111,7 @@ _STOP = re.compile(
     (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
     re.IGNORECASE | re.VERBOSE,
 )
+_ACROSS = re.compile(r"\b(?:over|across)\b", re.IGNORECASE)
 _STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
 _STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
 """Beginning of a clause that ends the way before it."""
@@ -270,11 +283,9 @@ def clause_inputs(
         span: its first character in the prompt, and the one after its last.
         classes: ids of the actions, and the classes behind them.
     """
-    named = named_actions(text)
-    marks = [*(name in named for name in classes), len(load_vocabulary().without_implied(named)) > 1]
     within = encoding.span(*span)
     around = np.zeros_like(vector) if within is None else within
-    parts = vector * VECTOR_SCALE, np.array(marks, np.float32) * WORD_SCALE, around * STATE_SCALE
+    parts = vector * VECTOR_SCALE, word_marks(text, classes)[:-1], around * STATE_SCALE
     return np.concatenate(parts).astype(np.float32)
 
 
@@ -364,11 +375,12 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
 
 
 def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
-    """Return clauses; what comes behind "from", or says how, belongs to the one before: "gets up from | lying on the
-    ground", "sneaks ahead | in a crouch"."""
+    """Return clauses; what comes behind "from", says how, or is the end of a movement belongs to the one before: "gets
+    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"."""
     found: list[ReadClause] = []
     for clause in clauses:
-        if found and (found[-1].text.lower().endswith(" from") or _MANNER.match(clause.text)):
+        belongs = _MANNER.match(clause.text) or _END.fullmatch(without_joints(clause.text))
+        if found and (belongs or found[-1].text.lower().endswith(" from")):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:
             found.append(clause)
@@ -376,8 +388,8 @@ def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
 
 
 def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
-    """Yield movements that begin where the one before has ended: who sat down and waits sits, and who stands up does so
-    from there."""
+    """Yield movements that begin as the one before has ended: who sat down and waits sits, who stands up does so from
+    there, and who runs and jumps over something leaps."""
     before = down = None
     for movement in movements:
         action = movement.action
@@ -387,6 +399,8 @@ def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
             action = "get-up" if down in FLOOR else "stand-up"
         elif action in RISING and before is not None:
             action = STANDING
+        elif action in JUMPS and before in RUNS and _ACROSS.search(movement.text):
+            action = "leap"
         yield replace(movement, action=action)
         before = action
         if action in FLOOR | SEAT:

@@ -45,9 +45,10 @@ def test_no_more_is_left_out_than_may_be() -> None:
     [
         ("a person walks forward", True),
         ("a person runs", True),
+        ("a person leaps", True),
         ("a person bows", False),
         ("a person walks and turns", False),
     ],
 )
-def test_a_way_is_a_walk_or_a_run_alone(words: str, is_one: bool) -> None:
+def test_a_way_is_a_walk_a_run_or_a_leap_alone(words: str, is_one: bool) -> None:
     assert is_way(replace(no_text(4), prompt=words, rewritten=words)) is is_one

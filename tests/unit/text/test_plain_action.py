@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from marey.bundles import TextSpec
 from marey.selector.matching import wanted_of
 from marey.text.action_reader import action_reader
-from marey.text.encoders import Encoding
 from marey.text.keys import feature_key
+from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
 from marey.text.plain_action import ALONE, MOST_WORDS, only_action, with_plain_action
 from marey.vocabulary.bearings import DRAWN_AS
@@ -123,27 +121,17 @@ def test_where_the_reader_knows_another_encoder_the_words_decide(
     plain = plain_pipeline(pipeline)
     assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "a person crouches,"]
     monkeypatch.setattr(action_reader(), "encoder_sha256", "0" * 64)
-    assert [each.graph.text[:18] for each in plain.explain(prompts)] == ["a person bows, the", "A young deer hunte"]
+    by_words = plain_pipeline(pipeline)
+    assert [each.graph.text[:18] for each in by_words.explain(prompts)] == ["a person bows, the", "A young deer hunte"]
 
 
-def test_prompts_that_are_read_one_by_one_are_encoded_together(pipeline: TextPipeline) -> None:
+def test_prompts_that_are_read_one_by_one_are_encoded_together(
+    pipeline: TextPipeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked: list[Sequence[str]] = []
-
-    class Watched:
-        name, width, sha256 = pipeline.encoder.name, pipeline.encoder.width, pipeline.encoder.sha256
-
-        def encode(self, text: str) -> Encoding:
-            return pipeline.encoder.encode(text)
-
-        def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
-            asked.append(texts)
-            return pipeline.encoder.pooled(texts)
-
-        def encodings(self, texts: Sequence[str]) -> list[Encoding]:
-            return pipeline.encoder.encodings(texts)
-
-    spec = pipeline.spec.model_copy(update={"plain_action": True})
-    watched = TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=Watched())
+    pooled = MiniLMEncoder.pooled
+    monkeypatch.setattr(MiniLMEncoder, "pooled", lambda self, texts: asked.append(texts) or pooled(self, texts))
+    watched = plain_pipeline(pipeline)
     prompts = ["The waiter takes a bow", "A goblin hunkers low"]
     watched.prefetch(prompts)
     assert asked == [prompts]

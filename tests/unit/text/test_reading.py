@@ -9,12 +9,18 @@ import pytest
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.reading import train as training
+from marey.reading import train_encoder as encoder_training
 from marey.reading import train_sequences as sequence_training
 from marey.reading.sequences import parted_texts, written_parts
 from marey.reading.texts import LabelledText, labelled_texts
 from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
 from marey.referee.prompts import sequence_prompts as referee_sequences
 from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
+from marey.text.encoders import find_encoder
+from marey.text.minilm import MiniLM
+from marey.text.minilm_bundle import load_weights
+from marey.text.minilm_encoder import MiniLMEncoder
+from marey.text.reader_file import Float32
 from marey.text.sequence_reader import CONTEXT, SequenceReader
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
@@ -50,6 +56,28 @@ def test_a_reader_learns_its_texts(texts: list[LabelledText], monkeypatch: pytes
     vectors = encoder.pooled([training.without_punctuation(each.text) for each in some])
     right = [reader.read(each.text, vector).name == each.asks for each, vector in zip(some, vectors, strict=True)]
     assert np.mean(right) > 0.9
+
+
+def test_vectors_of_the_reading_encoder_tell_actions_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(encoder_training, "EPOCHS", 10)
+    monkeypatch.setattr(encoder_training, "BATCH", 16)
+    monkeypatch.setattr(encoder_training, "WARMUP", 5)
+    monkeypatch.setattr(encoder_training, "UPDATED", 1)
+    known = [text for text in parted_texts(0) if len(text.parts) == 1 and text.parts[0].asks in ("walk", "run")]
+    bundle = find_encoder("minilm")
+    updates = encoder_training.train(known[::5], MiniLM(bundle), load_weights(bundle), 0)
+    assert {name.partition(".")[0] for name in updates} == {"5"}
+    encoder = MiniLMEncoder(bundle)
+    other = known[4::45]
+    same = np.equal.outer(*[[text.parts[0].asks == "run" for text in other]] * 2)
+
+    def gap(vectors: list[Float32]) -> float:
+        cosines = np.stack(vectors) @ np.stack(vectors).T
+        return float(cosines[same].mean() - cosines[~same].mean())
+
+    texts = [text.text for text in other]
+    tuned = encoder.tuned({name: part.detach() for name, part in updates.items()})
+    assert gap(tuned.pooled(texts)) > gap(encoder.pooled(texts)) + 0.1
 
 
 def test_texts_in_parts_are_whole_and_none_is_a_prompt_for_measuring() -> None:

@@ -14,8 +14,9 @@ from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
 from marey.generation.asked import action_of
 from marey.referee.prompts import development_prompts
-from marey.text.action_reader import OUTSIDE
+from marey.text.action_reader import OUTSIDE, action_reader
 from marey.text.keys import feature_key
+from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
     CONTEXT,
@@ -33,7 +34,7 @@ from marey.text.sequence_reader import (
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import STANDING
-from tests.support.texts import shared_encoder, shared_pipeline
+from tests.support.texts import shared_encoder, shared_pipeline, shared_reading_encoder
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,8 @@ def reading() -> TextPipeline:
 
 
 def read(prompt: str) -> tuple[ReadMovement, ...]:
-    return sequence_reader().read(as_written(prompt), shared_encoder().encode(prompt), shared_encoder().pooled)
+    encoder = shared_reading_encoder()
+    return sequence_reader().read(as_written(prompt), encoder.encode(prompt), encoder.pooled)
 
 
 def test_it_knows_every_action_and_the_shipped_encoder() -> None:
@@ -96,12 +98,12 @@ def test_prompts_beside_each_other_are_encoded_in_few_passes_and_as_if_alone(
 ) -> None:
     passes: list[Sequence[str]] = []
 
-    def count(encode: Callable[[Sequence[str]], object]) -> Callable[[Sequence[str]], object]:
-        return lambda texts: passes.append(texts) or encode(texts)
+    def count(encode: Callable[..., object]) -> Callable[..., object]:
+        return lambda self, texts: passes.append(texts) or encode(self, texts)
 
     fresh = TextPipeline(reading.spec, rewriter=reading.rewriter, labeller=reading.labeller, encoder=reading.encoder)
     for name in ("pooled", "encodings"):
-        monkeypatch.setattr(reading.encoder, name, count(getattr(reading.encoder, name)))
+        monkeypatch.setattr(MiniLMEncoder, name, count(getattr(MiniLMEncoder, name)))
     prompts = [text for text, _ in sequence_prompts()[:12]]
     together = fresh.features(prompts)
     assert sum(bool(each.movements) for each in together) > 6
@@ -210,6 +212,7 @@ def test_a_way_to_a_stop_is_read_though_the_whole_is_in_doubt(reading: TextPipel
         ("touches toes then stands up", ["bend-over", STANDING]),
         ("crouches behind a box, waits, then stands up and runs", ["crouch", "crouch", STANDING, "run"]),
         ("look over the right shoulder, then continue walking", [STANDING, "walk"]),
+        ("jogs up, then jumps over the fence, then keeps running", ["run", "leap", "run"]),
     ],
 )
 def test_a_movement_begins_where_the_one_before_ends(reading: TextPipeline, prompt: str, actions: list[str]) -> None:
@@ -239,6 +242,14 @@ def test_movements_around_a_stop_a_place_and_an_origin(
 ) -> None:
     (read,) = reading.features([prompt])
     assert [each.prompt for each in read.movements] == movements
+
+
+def test_a_prompt_that_is_no_sequence_is_read_as_the_likeliest_action(reading: TextPipeline) -> None:
+    prompt = "hop your legs apart and swing your arms up"
+    read = action_reader().read(prompt, shared_reading_encoder().pooled([prompt])[0])
+    assert (read.name, read.action) == ("jumping-jacks", None)
+    (features,) = reading.features([prompt])
+    assert action_of(features) == "jumping-jacks"
 
 
 def test_one_action_is_one_text(reading: TextPipeline) -> None:

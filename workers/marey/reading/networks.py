@@ -18,6 +18,7 @@ from marey.motion.files import write_atomically
 from marey.text.encoders import find_encoder
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.reader_file import Float32
+from marey.text.reading_encoder import reading_encoder
 
 Trained = tuple[list[str], dict[str, Float32]]
 """Classes and weights of a reader."""
@@ -115,7 +116,7 @@ def train_and_write(
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args()
     torch.set_num_threads(1)
-    encoder = MiniLMEncoder(find_encoder("minilm"))
+    encoder = reading_encoder(MiniLMEncoder(find_encoder("minilm")))
     classes, weights = train(encoder, chosen.seed)
     facts = {"classes": json.dumps(classes), "encoder_sha256": encoder.sha256}
     write_atomically(chosen.output, save({name: part.astype(np.float16) for name, part in weights.items()}, facts))

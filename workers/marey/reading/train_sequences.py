@@ -6,8 +6,9 @@ It writes `sequence_reader.safetensors`, and prints how many of the development 
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -38,6 +39,7 @@ from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 
 CUT_UNITS, CUT_EPOCHS, CUT_BATCH, CUT_DROPOUT = 160, 8, 128, 0.35
+T = TypeVar("T")
 RATE, DECAY, SMOOTHING, WARMUP = 2e-3, 0.02, 0.05, 100
 """Sizes and training of the network of beginnings; the others have its rate, decay and smoothing."""
 ACTIONS = NetworkRecipe(
@@ -49,7 +51,7 @@ ACTION_MEMBERS = 2
 
 
 @dataclass(frozen=True)
-class _Labelled:
+class LabelledTokens:
     """Token states of a text with labels of each token.
 
     Attributes:
@@ -82,15 +84,15 @@ class _Cuts(nn.Module):
 
     def forward(self, states: Tensor, real: Tensor) -> tuple[Tensor, Tensor]:
         """(B, T, W) states and (B, T) marks of tokens to (B, T, 2) beginnings and (B, T, C) classes."""
-        shown = real[..., None]
-        hidden = F.relu(self.states(self._some(states * STATE_SCALE))) * shown
+        rows = real[..., None]
+        hidden = F.relu(self.states(self._some(states * STATE_SCALE))) * rows
         for layer in (self.first, self.second):
-            hidden = hidden + F.relu(layer(self._most(hidden).transpose(1, 2)).transpose(1, 2)) * shown
+            hidden = hidden + F.relu(layer(self._most(hidden).transpose(1, 2)).transpose(1, 2)) * rows
         hidden = self._most(hidden)
         return self.begins(hidden), self.asks(hidden)
 
 
-def labelled(text: PartedText, encoding: Encoding, classes: Sequence[str]) -> _Labelled:
+def labelled(text: PartedText, encoding: Encoding, classes: Sequence[str]) -> LabelledTokens:
     """Return the labels of the tokens of a text."""
     count = len(encoding.offsets)
     asks, at_once = np.full(count, -1, np.int64), np.full(count, -1, np.int64)
@@ -106,10 +108,10 @@ def labelled(text: PartedText, encoding: Encoding, classes: Sequence[str]) -> _L
             begun.add(number)
             begins[place] = 1
             at_once[place] = int(text.parts[number].at_once) if number else -1
-    return _Labelled(encoding.tokens, asks, begins, at_once, text.weight)
+    return LabelledTokens(encoding.tokens, asks, begins, at_once, text.weight)
 
 
-def fit_cuts(texts: Sequence[_Labelled], classes: int, seed: int) -> _Cuts:
+def fit_cuts(texts: Sequence[LabelledTokens], classes: int, seed: int) -> _Cuts:
     """Train the network of beginnings."""
     torch.manual_seed(seed)
     network = _Cuts(texts[0].states.shape[1], classes)
@@ -117,10 +119,10 @@ def fit_cuts(texts: Sequence[_Labelled], classes: int, seed: int) -> _Cuts:
     rng = seeded("cuts", str(seed))
     total, step = CUT_EPOCHS * -(-len(texts) // CUT_BATCH), 0
     for _ in range(CUT_EPOCHS):
-        for batch in _batches(texts, rng):
+        for batch in batches(texts, rng, CUT_BATCH, lambda each: len(each.states)):
             for group in optimizer.param_groups:
                 group["lr"] = RATE * min(1, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
-            loss = _cut_loss(network, batch)
+            loss = cut_loss(*network(*shown(batch)), batch)
             optimizer.zero_grad()
             loss.backward()  # pyright: ignore[reportUnknownMemberType]
             nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -129,33 +131,40 @@ def fit_cuts(texts: Sequence[_Labelled], classes: int, seed: int) -> _Cuts:
     return network.eval()
 
 
-def _batches(texts: Sequence[_Labelled], rng: random.Random) -> Iterator[list[_Labelled]]:
+def batches(texts: Sequence[T], rng: random.Random, size: int, length: Callable[[T], int]) -> Iterator[list[T]]:
     """Yield all texts in random batches of nearly one length."""
     order = rng.sample(range(len(texts)), len(texts))
-    reach = 20 * CUT_BATCH
-    batches: list[list[int]] = []
+    reach = 20 * size
+    found: list[list[int]] = []
     for low in range(0, len(order), reach):
-        near = sorted(order[low : low + reach], key=lambda row: len(texts[row].states))
-        batches += [near[start : start + CUT_BATCH] for start in range(0, len(near), CUT_BATCH)]
-    rng.shuffle(batches)
-    yield from ([texts[row] for row in batch] for batch in batches)
+        near = sorted(order[low : low + reach], key=lambda row: length(texts[row]))
+        found += [near[start : start + size] for start in range(0, len(near), size)]
+    rng.shuffle(found)
+    yield from ([texts[row] for row in batch] for batch in found)
 
 
-def _cut_loss(network: _Cuts, batch: Sequence[_Labelled]) -> Tensor:
-    def padded(rows: Sequence[NDArray[np.generic]], value: float) -> Tensor:
-        return nn.utils.rnn.pad_sequence([torch.from_numpy(row) for row in rows], True, value)
+def padded(rows: Sequence[NDArray[np.generic]], value: float) -> Tensor:
+    """Return rows of different lengths as one tensor."""
+    return nn.utils.rnn.pad_sequence([torch.from_numpy(row) for row in rows], True, value)
 
+
+def shown(batch: Sequence[LabelledTokens]) -> tuple[Tensor, Tensor]:
+    """Return (B, T, W) states and (B, T) marks of tokens."""
+    real = padded([np.ones(len(each.states), np.bool_) for each in batch], 0)
+    return padded([each.states.astype(np.float32) for each in batch], 0), real
+
+
+def cut_loss(begins: Tensor, named: Tensor, batch: Sequence[LabelledTokens], asks_weight: float = 1.0) -> Tensor:
+    """Return the loss of (B, T, 2) scores of beginnings and (B, T, C) of classes."""
     asks = padded([each.asks for each in batch], -1)
     at_once = padded([each.at_once for each in batch], -1)
-    real = padded([np.ones(len(each.states), np.float32) for each in batch], 0)
-    begins, named = network(padded([each.states.astype(np.float32) for each in batch], 0), real)
     words = (asks >= 0).float()
     of_begins = F.binary_cross_entropy_with_logits(
         begins[..., 0], padded([each.begins for each in batch], 0), reduction="none"
     )
     of_asks = F.cross_entropy(named.transpose(1, 2), asks, ignore_index=-1, reduction="none", label_smoothing=SMOOTHING)
     of_order = F.binary_cross_entropy_with_logits(begins[..., 1], at_once.clamp(min=0).float(), reduction="none")
-    means = ((2 * of_begins + of_asks) * words).sum(1) / words.sum(1).clamp(min=1)
+    means = ((2 * of_begins + asks_weight * of_asks) * words).sum(1) / words.sum(1).clamp(min=1)
     weights = torch.tensor([each.weight for each in batch])
     return ((means + 0.3 * (of_order * (at_once >= 0)).sum(1)) * weights).sum() / weights.sum()
 

@@ -17,6 +17,8 @@ from marey.text.features import TextFeatures
 
 Float32 = NDArray[np.float32]
 
+GOES_ON = WAYS | {"leap"}
+"""Actions of a body that may go on from them into the next one: who leaps runs up and on."""
 GOING = 0.7
 """Share of its median speed under which a way begins or ends."""
 MOST_S, LEAST_S = 1.5, 1.0
@@ -24,9 +26,9 @@ MOST_S, LEAST_S = 1.5, 1.0
 
 
 def is_way(text: TextFeatures) -> bool:
-    """Return True if a text asks for a walk or run ahead, and for nothing else."""
+    """Return True if a text asks for a walk, a run or a leap ahead, and for nothing else."""
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
-    return len(steps) == 1 and {each.action for each in steps[0]} <= WAYS
+    return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON
 
 
 def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tuple[Float32, Float32]:

@@ -1,0 +1,242 @@
+"""Train the encoder of the readers: `python -m marey.reading.train_encoder`, some half an hour of one core.
+
+It writes `reading_encoder.safetensors`: low-rank updates (Hu et al. 2021, arXiv 2106.09685) of the last layers of
+MiniLM, which are trained to tell where movements begin and what each part of a prompt asks for. The heads that say so
+are not kept: the readers are trained anew on what the updated encoder gives.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from safetensors.numpy import save
+from torch import Tensor, nn
+
+from marey.data.captions import seeded
+from marey.motion.files import write_atomically
+from marey.reading.networks import as_arrays
+from marey.reading.sequences import PartedText, TextPart, parted_texts
+from marey.reading.train_sequences import LabelledTokens, batches, cut_loss, labelled, shown
+from marey.text.action_reader import OUTSIDE, SEVERAL, word_marks
+from marey.text.encoders import Encoding, find_encoder
+from marey.text.minilm import EPS, HEADS, MiniLM
+from marey.text.minilm_bundle import LAYERS, WIDTH, load_weights
+from marey.text.reading_encoder import FILE
+from marey.text.sequence_reader import CONTEXT, without_joints
+from marey.vocabulary.entries import load_vocabulary
+
+UPDATED, RANK = 2, 16
+"""Layers that get updates, from the last one on, and the rank of these."""
+EPOCHS, BATCH, CLIPPED = 7, 96, 1.0
+RATE, HEAD_RATE, DECAY, HEAD_DECAY, WARMUP = 1e-3, 2e-3, 0.01, 0.02, 200
+DROPOUT, INPUT_DROPOUT, HEAD_DROPOUT = 0.1, 0.15, 0.4
+UNITS, VECTOR_SCALE, SMOOTHING = 256, 10.0, 0.05
+CUT_WEIGHT = 0.5
+"""Weight of the beginnings beside what the parts ask for."""
+MATRICES = {
+    "project": ("attention.self.query", "attention.self.key", "attention.self.value"),
+    "attended": ("attention.output.dense",),
+    "inner": ("intermediate.dense",),
+    "outer": ("output.dense",),
+}
+"""Matrices of a layer, by those of BERT that are rows of each."""
+
+
+@dataclass(frozen=True)
+class _Span:
+    """Tokens `first` to `last` of a text with the class of what they ask for, and the marks of its words."""
+
+    first: int
+    last: int
+    asks: int
+    marks: Tensor
+    weight: float
+
+
+@dataclass(frozen=True)
+class _Text:
+    """States of a text below the updated layers, with labels, and its spans."""
+
+    tokens: LabelledTokens
+    spans: list[_Span]
+
+
+class _Linear(nn.Module):
+    """Frozen matrices of BERT, one behind the other, each with a low-rank update."""
+
+    def __init__(self, weights: Mapping[str, Tensor], names: Sequence[str]) -> None:
+        super().__init__()
+        self.weight, self.bias = (
+            torch.cat([weights[f"{name}.{part}"] for name in names]) for part in ("weight", "bias")
+        )
+        out, width = self.weight.shape
+        self.downs = nn.Parameter(torch.randn(len(names) * RANK, width) * width**-0.5)
+        self.ups = nn.Parameter(torch.zeros(out, RANK))
+        self._many = len(names)
+
+    def up(self) -> Tensor:
+        """Return the second factor (out, rank), in which the rows of a matrix read the columns of its own update."""
+        return torch.block_diag(*self.ups.chunk(self._many))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(…, in) to (…, out)."""
+        return F.linear(x, self.weight, self.bias) + F.linear(F.linear(x, self.downs), self.up())
+
+
+class _Layer(nn.Module):
+    """A layer of BERT with updates."""
+
+    def __init__(self, weights: Mapping[str, Tensor], number: int) -> None:
+        super().__init__()
+        prefix = f"encoder.layer.{number}."
+        parts = {name: _Linear(weights, [prefix + part for part in of]) for name, of in MATRICES.items()}
+        self.parts = nn.ModuleDict(parts)
+        self.drop = nn.Dropout(DROPOUT)
+        self._norms = [
+            tuple(weights[f"{prefix}{name}.LayerNorm.{part}"] for part in ("weight", "bias"))
+            for name in ("attention.output", "output")
+        ]
+
+    def forward(self, hidden: Tensor, real: Tensor) -> Tensor:
+        """(B, T, W) states and (B, T) marks of tokens to (B, T, W) states."""
+        many, tokens, width = hidden.shape
+        projected = self.parts["project"](hidden).view(many, tokens, 3, HEADS, -1).permute(2, 0, 3, 1, 4)
+        mixed = F.scaled_dot_product_attention(*projected.unbind(), attn_mask=real[:, None, None, :])
+        attended = self.parts["attended"](mixed.transpose(1, 2).reshape(many, tokens, width))
+        hidden = F.layer_norm(hidden + self.drop(attended), (width,), *self._norms[0], EPS)
+        outer = self.parts["outer"](F.gelu(self.parts["inner"](hidden)))
+        return F.layer_norm(hidden + self.drop(outer), (width,), *self._norms[1], EPS)
+
+
+class _Network(nn.Module):
+    """The updated layers, and heads that say where movements begin and what spans of tokens ask for."""
+
+    def __init__(self, weights: Mapping[str, Tensor], classes: int) -> None:
+        super().__init__()
+        self.layers = nn.ModuleList(_Layer(weights, LAYERS - UPDATED + number) for number in range(UPDATED))
+        self.drop = nn.Dropout(HEAD_DROPOUT)
+        self.begins, self.asks = nn.Linear(WIDTH, 2), nn.Linear(WIDTH, classes)
+        self.hidden, self.out = nn.Linear(WIDTH + classes + 2, UNITS), nn.Linear(UNITS, classes)
+
+    def forward(self, states: Tensor, real: Tensor) -> Tensor:
+        """(B, T, W) states below, and (B, T) marks of tokens, to (B, T, W) states."""
+        for layer in self.layers:
+            states = layer(states, real)
+        return states
+
+    def spans(self, means: Tensor, marks: Tensor) -> Tensor:
+        """(N, W) mean states of spans and (N, M) marks of their words to (N, C) classes."""
+        inputs = torch.cat([F.normalize(means, dim=-1) * VECTOR_SCALE, marks], 1)
+        return self.out(self.drop(F.relu(self.hidden(F.dropout(inputs, INPUT_DROPOUT, self.training)))))
+
+
+def train(texts: Sequence[PartedText], encoder: MiniLM, weights: Mapping[str, Tensor], seed: int) -> dict[str, Tensor]:
+    """Return the updates of the last layers, by their names in the file."""
+    torch.manual_seed(seed)
+    classes = [*load_vocabulary().actions, OUTSIDE, CONTEXT, SEVERAL]
+    read = [_text(each, encoder, classes) for each in texts]
+    counts = Counter(span.asks for each in read for span in each.spans)
+    shares = {asks: count**-0.5 for asks, count in counts.items()}
+    network = _Network(weights, len(classes))
+    layers, heads = list(network.layers.parameters()), [network.begins, network.asks, network.hidden, network.out]
+    groups = [
+        {"params": layers, "lr": RATE, "weight_decay": DECAY},
+        {"params": [part for head in heads for part in head.parameters()], "lr": HEAD_RATE, "weight_decay": HEAD_DECAY},
+    ]
+    optimizer = torch.optim.AdamW(groups)
+    total = EPOCHS * -(-len(read) // BATCH)
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda step: min(1.0, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
+    )
+    rng = seeded("encoder", str(seed))
+    for _ in range(EPOCHS):
+        for batch in batches(read, rng, BATCH, lambda each: len(each.tokens.states)):
+            loss = _loss(network, batch, shares)
+            optimizer.zero_grad()
+            loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            nn.utils.clip_grad_norm_(network.parameters(), CLIPPED)
+            optimizer.step()
+            schedule.step()
+    return _updates(network)
+
+
+def _text(text: PartedText, encoder: MiniLM, classes: Sequence[str]) -> _Text:
+    encoded = encoder.tokenizer.encode(text.text)
+    below = encoder.states(encoded.ids)[LAYERS - UPDATED].numpy()
+    encoding = Encoding(below[0], below.astype(np.float16), tuple(encoded.offsets))
+    return _Text(labelled(text, encoding, classes), _spans(text, encoding.offsets, classes))
+
+
+def _spans(text: PartedText, offsets: Sequence[tuple[int, int]], classes: Sequence[str]) -> list[_Span]:
+    """Return the spans of a text: each part, two parts together if there are more, and the whole."""
+    parts, edges = text.parts, np.cumsum([0, *(len(part.text) for part in text.parts)]).tolist()
+    places = [(low, low + 1, parts[low].asks) for low in range(len(parts))] if len(parts) > 1 else []
+    if len(parts) > 2:
+        both = [(low, low + 2, _asks_of(pair)) for low, pair in enumerate(pairwise(parts))]
+        places += [place for place in both if parts[place[0]].asks != parts[place[0] + 1].asks]
+    places.append((0, len(parts), _asks_of(parts)))
+    found: list[_Span] = []
+    for low, high, asks in places:
+        begin, end = edges[low], edges[high]
+        tokens = [at for at, (first, last) in enumerate(offsets) if last > first and first < end and last > begin]
+        if tokens:
+            words = without_joints(text.text[begin:end])
+            marks = torch.from_numpy(word_marks(words, classes))
+            found.append(_Span(tokens[0], tokens[-1] + 1, classes.index(asks), marks, text.weight))
+    return found
+
+
+def _asks_of(parts: Sequence[TextPart]) -> str:
+    """Return what parts ask for together."""
+    asks = {part.asks for part in parts if part.asks != CONTEXT}
+    return SEVERAL if len(asks) > 1 else next(iter(asks), CONTEXT)
+
+
+def _loss(network: _Network, batch: Sequence[_Text], shares: Mapping[int, float]) -> Tensor:
+    tokens = [each.tokens for each in batch]
+    states = network(*shown(tokens))
+    spans = [(row, span) for row, each in enumerate(batch) for span in each.spans]
+    means = torch.stack([states[row, span.first : span.last].mean(0) for row, span in spans])
+    asked = network.spans(means, torch.stack([span.marks for _, span in spans]))
+    weights = torch.tensor([span.weight * shares[span.asks] for _, span in spans])
+    wanted = torch.tensor([span.asks for _, span in spans])
+    losses = F.cross_entropy(asked, wanted, reduction="none", label_smoothing=SMOOTHING)
+    cuts = cut_loss(network.begins(network.drop(states)), network.asks(network.drop(states)), tokens, 0.5)
+    return (losses * weights).sum() / weights.sum() + CUT_WEIGHT * cuts
+
+
+def _updates(network: _Network) -> dict[str, Tensor]:
+    found: dict[str, Tensor] = {}
+    for number, layer in enumerate(network.layers, LAYERS - UPDATED):
+        assert isinstance(layer, _Layer)
+        for name, part in layer.parts.items():
+            assert isinstance(part, _Linear)
+            found |= {f"{number}.{name}.down": part.downs, f"{number}.{name}.up": part.up()}
+    return found
+
+
+def main() -> None:
+    """Train and write the updates."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=FILE)
+    parser.add_argument("--seed", type=int, default=0)
+    chosen = parser.parse_args()
+    torch.set_num_threads(1)
+    bundle = find_encoder("minilm")
+    updates = as_arrays(train(parted_texts(chosen.seed), MiniLM(bundle), load_weights(bundle), chosen.seed))
+    facts = {"encoder_sha256": bundle.weights_sha256}
+    write_atomically(chosen.output, save({name: part.astype(np.float16) for name, part in updates.items()}, facts))
+    sys.stdout.write(f"{chosen.output}: train the readers anew now\n")
+
+
+if __name__ == "__main__":
+    main()
