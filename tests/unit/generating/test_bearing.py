@@ -104,6 +104,43 @@ def test_crossed_arms_are_held_all_along_in_front_of_the_chest() -> None:
     assert right.min() > -0.03
 
 
+def test_a_phone_comes_to_the_ear_and_goes_down_when_the_call_ends() -> None:
+    words = "answers a phone call, talks, and hangs up"
+    joints = drawn(standing(6.0), StatedBearing("phone-call", words=words))
+    away = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)
+    assert away.min() < 0.22
+    assert min(away[0], away[-1]) > 0.45
+    held = drawn(standing(6.0), StatedBearing("phone-call", words="talking on the phone"))
+    assert np.linalg.norm(held[:, 21] - held[:, HEAD], axis=1).max() < 0.25
+
+
+def test_a_suitcase_hangs_from_a_straight_arm_and_the_trunk_leans_away() -> None:
+    for side, wrist, elbow, shoulder in (("right", 21, 19, 17), ("left", 20, 18, 16)):
+        before, after = drawn(standing()), drawn(standing(), named("bag-carried", side))
+        bones = np.linalg.norm(after[:, [elbow, wrist]] - after[:, [shoulder, elbow]], axis=-1).sum(1)
+        assert (np.linalg.norm(after[:, wrist] - after[:, shoulder], axis=1) / bones).min() > 0.97
+        aside = (after[:, NECK, 0] - before[:, NECK, 0]).mean()
+        assert (aside > 0.02) if side == "right" else (aside < -0.02)  # +X is the left
+
+
+def test_a_box_is_held_before_the_belly_by_both_hands() -> None:
+    joints = drawn(walker(), named("box-carried"))
+    hands = joints[:, WRISTS] - joints[:, [PELVIS]]
+    assert hands[..., 1].min() > 0.1
+    assert hands[..., 1].max() < 0.32
+    assert hands[..., 2].min() > 0.15
+
+
+def test_who_carries_has_the_load_that_is_named_or_one_before_the_belly() -> None:
+    for prompt, name in (
+        ("a person walks with a load", "load"),
+        ("he carries a sack over his shoulder", "sack-carried"),
+    ):
+        request = Request(text=text_of(prompt, 8), seed=3)
+        (span,) = borne_spans(request, FPS, 80)
+        assert [each.name for each in span.stated] == [name]
+
+
 def test_two_gestures_share_the_time() -> None:
     joints = drawn(standing(6.0), named("salute"), named("shrug"))
     brow = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)
