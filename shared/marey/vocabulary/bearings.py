@@ -17,7 +17,7 @@ from typing import Any, Literal, cast
 from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
-Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", ""]
+Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", "stomp", "shuffle", "rope", ""]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 
@@ -31,7 +31,7 @@ UPRIGHT = frozenset(
     {"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep", *DRAWN_AS, *DRAWN_ON}
 )
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
-ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
+ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel", "laugh"})
 """Other actions in which the arms do nothing."""
 ARMS_HELD = frozenset({"jump", "jump-forward", "hop", "squat", "crouch", "balance"})
 """Actions beside which arms can be held, and nothing else of a bearing be drawn."""
@@ -119,6 +119,7 @@ class Bearing:
     roll_hz: float = 0.0
     heave: float = 0.0
     heave_hz: float = 0.0
+    sob: float = 0.0
     gait: Gait = ""
     pace: Pace = ""
     raise_s: float = 0.5

@@ -12,7 +12,16 @@ import pytest
 from marey.bundles import Bundle
 from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, with_bearing
 from marey.generation.export import finish
-from marey.generation.gaits import limping, skipping, staggering, tapping, with_high_knees
+from marey.generation.gaits import (
+    limping,
+    over_rope,
+    shuffling,
+    skipping,
+    staggering,
+    stomping,
+    tapping,
+    with_high_knees,
+)
 from marey.generation.port import MotionFeatures, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.motion.capsules import depth
@@ -139,6 +148,76 @@ def test_who_carries_has_the_load_that_is_named_or_one_before_the_belly() -> Non
         request = Request(text=text_of(prompt, 8), seed=3)
         (span,) = borne_spans(request, FPS, 80)
         assert [each.name for each in span.stated] == [name]
+
+
+def gait(joints: np.ndarray, draws: Any, side: str = "") -> np.ndarray:
+    return draws(joints, LAYOUT, 0, len(joints), side, np.random.default_rng(1))
+
+
+def test_dragged_feet_stay_near_the_floor() -> None:
+    before = walker()
+    after = gait(before, shuffling)
+    assert np.ptp(after[10:-10, TOES, 1], axis=0).max() < 0.4 * np.ptp(before[10:-10, TOES, 1], axis=0).max()
+    np.testing.assert_allclose(after[:, PELVIS, [0, 2]], before[:, PELVIS, [0, 2]], atol=1e-6)
+
+
+def test_who_stomps_lifts_the_knees_and_drops_on_the_feet() -> None:
+    before = walker()
+    after = gait(before, stomping)
+    lifted = [each[:, [4, 5], 1].max(0) for each in (before, after)]
+    assert (lifted[1] - lifted[0]).min() > 0.08
+    assert (before[:, PELVIS, 1] - after[:, PELVIS, 1]).max() > 0.02
+
+
+def test_who_stands_stamps_with_the_foot_that_is_named_or_both() -> None:
+    before = standing()
+    one, both = gait(before, stomping, "left"), gait(before, stomping)
+    assert np.ptp(one[:, 7, 1]) > 0.1
+    assert np.ptp(one[:, 8, 1]) < 0.02
+    assert np.ptp(both[:, [7, 8], 1], axis=0).min() > 0.1
+    assert not ((both[:, 7, 1] > 0.25) & (both[:, 8, 1] > 0.25)).any()
+
+
+def test_who_skips_rope_leaves_the_floor_with_both_feet_over_and_over() -> None:
+    before = standing(5.0)
+    after = gait(before, over_rope)
+    up = (after[:, [7, 8], 1] - before[:, [7, 8], 1]).min(1)
+    assert 0.05 < up.max() < 0.15
+    leaves = np.flatnonzero((up[:-1] < 0.02) & (up[1:] >= 0.02))
+    assert 9 <= len(leaves) <= 13
+    np.testing.assert_allclose(after[:, TOES][..., [0, 2]], before[:, TOES][..., [0, 2]], atol=0.01)
+
+
+def test_who_stands_drunk_sways_on_feet_that_stay() -> None:
+    before = standing(6.0)
+    after = drawn(before, named("drunk"))
+    assert np.ptp(after[:, HEAD, 0]) > 0.15
+    assert np.ptp(after[20:-20, TOES][..., [0, 2]], axis=0).max() < 0.05
+
+
+def test_a_gait_is_drawn_once_on_the_side_that_is_named() -> None:
+    once, twice = drawn(walker(), named("limp", "left")), drawn(walker(), named("limp", "left"), named("injured"))
+    assert abs(once[:, PELVIS, 1].min() - twice[:, PELVIS, 1].min()) < 0.03
+
+
+def test_fingers_type_and_do_not_sweep() -> None:
+    joints = drawn(standing(), named("typing"))
+    hands = joints[:, WRISTS] - joints[:, [PELVIS]]
+    assert 0.01 < np.ptp(hands[20:], axis=0).max() < 0.06
+
+
+def test_sobs_heave_the_shoulders() -> None:
+    joints = drawn(standing(), named("face-covered"))
+    lifted = joints[:, SHOULDERS, 1].mean(1) - joints[:, NECK, 1]
+    assert np.ptp(lifted) > 0.02
+
+
+def test_what_is_worked_at_on_the_knees_begins_on_them() -> None:
+    made: MotionFeatures = OnceMade(standing(6.0))
+    spans = [BorneSpan(0, len(made.features), (named("lace-tying"),), action="kneel", seed=3)]
+    lean = pitch(LAYOUT.decode(borne(made, LAYOUT, spans)))
+    assert lean[:40].max() < 10
+    assert lean[80:].min() > 25
 
 
 def test_two_gestures_share_the_time() -> None:

@@ -124,3 +124,16 @@ def test_a_jump_that_ends_in_another_direction_turns(prompt: str, read: str) -> 
 )
 def test_words_in_another_sense_are_known(action: str | None, prompt: str, other: bool) -> None:
     assert has_other_sense(action, prompt) == other
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("driving a car, both hands on the wheel", "driving a car"),
+        ("a man drives a truck with his hands on the steering wheel", "a man drives a truck"),
+        ("drives with both hands firmly on the wheel", "drives"),
+        ("puts his hands on the wheel", "puts his hands on the wheel"),
+    ],
+)
+def test_the_hands_of_a_driver_are_not_said(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read

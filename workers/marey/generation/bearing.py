@@ -25,7 +25,17 @@ from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.bearings import DRAWN_AS, DRAWN_ON, ArmPose, Bearing, Keys, StatedBearing, Vector, load_bearings
+from marey.vocabulary.bearings import (
+    DRAWN_AS,
+    DRAWN_ON,
+    ArmPose,
+    Bearing,
+    Gait,
+    Keys,
+    StatedBearing,
+    Vector,
+    load_bearings,
+)
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -163,13 +173,21 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
     joints = layout.decode(features).astype(np.float64)
     for span in spans:
         rng = np.random.default_rng([span.seed, span.begin])
-        for each in span.stated:
-            if each.bearing.gait and each.shown_in(span.action) == "body":
-                joints = GAITS[each.bearing.gait](joints, layout, span.begin, span.end, each.side, rng)
+        for gait, side in _gaits_of(span).items():
+            joints = GAITS[gait](joints, layout, span.begin, span.end, side, rng)
     body = StandingBody(joints)
     for stated, ways, rng in _drawn(spans, len(features), layout.fps):
         _Drawing(body, stated, ways, layout.fps, rng).draw()
     return encode_all(layout, body.solved())
+
+
+def _gaits_of(span: BorneSpan) -> dict[Gait, str]:
+    """Return the gaits of a part of a motion, each once, and the side that its prompt names."""
+    gaits: dict[Gait, str] = {}
+    for each in span.stated:
+        if (gait := each.bearing.gait) and each.shown_in(span.action) == "body":
+            gaits[gait] = each.side or gaits.get(gait, "")
+    return gaits
 
 
 def _drawn(
@@ -203,8 +221,10 @@ def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: boo
     the end. `goes_on`: it is held in the part before."""
     frames, moment = span.end - span.begin, round(BROUGHT_S * fps)
     begin, end = span.begin, span.end
-    if stated.is_brought and not goes_on:
-        begin += min(round(LATE * frames) if span.action in MOVES_FIRST else moment, frames // 2)
+    if span.action in MOVES_FIRST and (stated.is_brought or stated.bearing.work):
+        begin += round(LATE * frames)
+    elif stated.is_brought and not goes_on:
+        begin += min(moment, frames // 2)
     if stated.ends:
         end -= min(moment + round(PASSES_S * fps), frames // 4)
     return begin, end
@@ -255,7 +275,9 @@ class _Drawing:
         if keys.twist:
             body.lean((-1.0 if self._is_exchanged else 1.0) * self._keyed(keys.twist) * way, "up")
         if bearing.heave:
-            body.lean(bearing.heave * way * self._swung(bearing.heave_hz), "left")
+            heave = self._swung(bearing.heave_hz)
+            body.lean(bearing.heave * way * heave, "left")
+            body.shrug(bearing.sob * way * heave)
         if bearing.aside:
             body.lean((1.0 if LEFT in self._arms else -1.0) * bearing.aside * legs, "forward")
         if bearing.roll:
