@@ -84,7 +84,7 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
         return bare or prompt
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
-    if action in DRAWN_ON and _WITH_LOAD.search(bare):
+    if action in DRAWN_ON and any(each.bearing.load for each in borne.stated):
         action, bare = "walk", _WITH_LOAD.sub("", bare)  # the arms are drawn
     plain = load_vocabulary().need(action).plain_words
     if not bare or action in DRAWN_AS or (surely and action in ALONE):

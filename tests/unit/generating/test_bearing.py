@@ -220,6 +220,15 @@ def test_what_is_worked_at_on_the_knees_begins_on_them() -> None:
     assert lean[80:].min() > 25
 
 
+def test_the_legs_of_who_kneels_stay_as_they_are() -> None:
+    joints = standing()
+    joints[:, 4, 0] += 0.05  # a knee beside the line that a solved one is on
+    made: MotionFeatures = OnceMade(joints)
+    spans = [BorneSpan(0, len(made.features), (named("rifle-aimed"),), action="kneel", seed=3)]
+    after = LAYOUT.decode(borne(made, LAYOUT, spans))
+    np.testing.assert_allclose(after[:, 4], LAYOUT.decode(made.features)[:, 4], atol=1e-3)
+
+
 def test_two_gestures_share_the_time() -> None:
     joints = drawn(standing(6.0), named("salute"), named("shrug"))
     brow = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)

@@ -23,7 +23,7 @@ from marey.generation.port import MotionFeatures, Request
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
+from marey.posing.standing import ARMS, LEFT, LEGS, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import (
     DRAWN_AS,
@@ -41,6 +41,7 @@ Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
 
 _ACTS = {**DRAWN_AS, **DRAWN_ON}
+_LEG_JOINTS = [joint for leg in LEGS.values() for joint in leg]
 BEARING = "bearing"
 """Key of a manifest, and of the record of a row of a timeline."""
 PASSES_S = 0.25
@@ -178,7 +179,10 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
     body = StandingBody(joints)
     for stated, ways, rng in _drawn(spans, len(features), layout.fps):
         _Drawing(body, stated, ways, layout.fps, rng).draw()
-    return encode_all(layout, body.solved())
+    drawn = body.solved()
+    if not any(each.shown_in(span.action) == "body" for span in spans for each in span.stated):
+        drawn[:, _LEG_JOINTS] = joints[:, _LEG_JOINTS]  # solved knees of who kneels go through the floor
+    return encode_all(layout, drawn)
 
 
 def _gaits_of(span: BorneSpan) -> dict[Gait, str]:
