@@ -13,7 +13,7 @@ from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import Bearing
 
 WORK_S = 5.0
-"""Seconds of work at least: two rounds of the longest."""
+"""Seconds of work at least, two rounds of the longest, and of what has an end, such as a phone call."""
 
 
 def resolved_length(generator: Generator[Any], request: Request) -> Request:
