@@ -50,9 +50,9 @@ STOMPS, STOMP_FALLS_S, STAMP_S = 0.05, 0.25, 0.75
 from one stamp of a body that stands to the next."""
 DRAGS, DRAGS_LOW = 0.12, 0.045
 """Share that is left of the height to which a dragged foot rises, and metres by which the hips sink for it."""
-ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.075, 0.035
+ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.085, 0.035
 """Seconds of a hop over a rope, the share of them in the air, and metres by which the body rises, and sinks between."""
-TOES_DOWN = 0.05
+TOES_DOWN = 0.025
 """Metres by which the toes of who hops hang below where they stand."""
 SHANK_BACK = 14.0
 """Degrees by which the shank below it hangs back."""
