@@ -26,7 +26,7 @@ _RETURN = re.compile(
 """A way to where the person was before: "walks back to his car"."""
 _TURNED_BACK = re.compile(
     rf"""(?P<turn>\b(?:turns?|turning|spins?|spinning|whirls?|swings?|wheels?|pivots?|does\ an\ about[ -]face)
-    (?:\ (?:around|round|about|back|180(?:\ degrees)?))?(?:,|,?\ (?:and(?:\ then)?|then|to))\ )
+    (?:\ (?:around|round|about|back))?(?:\ 180(?:\ degrees|°)?)?(?:,|,?\ (?:and(?:\ then)?|then|to))\ )
     (?P<way>(?:{_GAITS}|go)(?:e?s|ing)?)\ back(?!wards?\b|\ (?:and|to|home|into|in|inside)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
@@ -54,7 +54,8 @@ _STRUCK_DOWN = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A blow before a fall, which is part of it."""
-
+_STRIKES_BACK = re.compile(r"\bcounter(?:[ -]?(?:attack|strik)(?:e?s|e|ing)?)\b", re.IGNORECASE)
+_BLADE = re.compile(r"\b(?:sword|blade|katana|sabre|saber|dagger|knife|axe|shield|parr(?:y|ies|ying))\b", re.IGNORECASE)
 _TURNS_IN_AIR = re.compile(
     r"""\b(?P<jump>jumps?|jumping|leaps?|leaping|hops?)(?:\ (?:up|into\ the\ air|straight\ up))?
     (?:\ (?P<degrees>\d{2,3})(?:\ degrees?|°)
@@ -103,13 +104,13 @@ def without_misleading(prompt: str) -> str:
 
     Who "walks up to the door" goes there, and who "walks down the street" goes along it: of "up" and "down" models read
     a climb. Who "walks back to his car" or "turns around and walks back" walks ahead, who "paces back and forth" turns
-    on the way, and who "is kicked" is hit. Where the hands of a driver are is said
-    of the wheel, and read as rising from the seat. The blow of who "is shot and falls" is part of the fall.
+    on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
+    from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     """
     prompt = _AT_WHEEL.sub(r"\g<drives>", prompt)
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
-    text = _TURNS_IN_AIR.sub(_with_turn, text)
+    text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
     return _STRUCK.sub(_hit, _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text)))
 
 
@@ -127,6 +128,15 @@ def _with_turn(found: re.Match[str]) -> str:
     jump = found["jump"]
     turn = "turning" if jump.lower().endswith("ing") else "turns" if jump.lower().endswith("s") else "turn"
     return f"{jump} and {turn} {found['degrees'] or 180} degrees in the air"
+
+
+def _strikes_back(found: re.Match[str]) -> str:
+    """Return a counterattack as a blow of the weapon that its prompt names."""
+    end = next((end for end in ("ing", "s") if found[0].lower().endswith(end)), "")
+    if _BLADE.search(found.string):
+        said = "" if found.string[found.end() :].startswith(" with ") else " with the sword"
+        return f"slash{'es' if end == 's' else end}{said}"
+    return f"throw{end} a punch"
 
 
 def _hit(found: re.Match[str]) -> str:

@@ -11,10 +11,10 @@ from marey.text.encoders import Encoding
 from marey.text.misleading_words import has_other_sense
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_rest
+from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_a_stop, way_to_rest
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.gazes import without_gaze
+from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.scope import STANDING
 
 SURELY, SURELY_AGREED = 0.9, 0.4
@@ -83,6 +83,8 @@ class TrainedReaders:
         self._pooled([clause for text in unsure for clause in sequence_reader().clauses(text, self._encodings[text])])
 
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
+        if only_gaze(bare.prompt):
+            return ReadPrompt.of(bare.prompt, STANDING, surely=True)
         read = self._read_bare(bare)
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
@@ -149,5 +151,7 @@ class TrainedReaders:
         return ReadAction(only, AGREED, AGREED) if only and bare.fits(only) else read
 
     def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
+        if action is None and (way := way_to_a_stop(bare.prompt)) and (ends := self._read_action(way).action) in WAYS:
+            action = ends  # "sprints forward then stops suddenly"
         encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
         return sequence_reader().read(bare, encoding, self._pooled, action)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.hashing import sha256_of
-from marey.text.action_reader import OUTSIDE, named_actions
+from marey.text.action_reader import OUTSIDE, RISING, named_actions
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
@@ -28,6 +28,7 @@ from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.gazes import only_gaze
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
@@ -51,6 +52,10 @@ SURE = 0.4
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
 """Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""
+HELD = {"sit-down": "sit", "lie-down": "lie", "die": "lie"} | {
+    name: name for name in ("sit", "sit-floor", "kneel", "lie", "crouch")
+}
+"""Actions in whose last pose who "waits" behind them stays, by those that show it."""
 TURNS = frozenset({TURNING, "walk", "run"})
 """Actions that a prompt for a turn while walking or running names."""
 PLAIN = 0.5
@@ -77,6 +82,8 @@ _JOINING = re.compile(
 
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
+ON_FEET = WAYS | RISING | {"jump", "jump-forward", "leap", "hop", "climb-stairs", "climb-ladder", "climb-onto", "dance"}
+"""Actions behind which a body is on its feet, though it sat before."""
 DRAWN_S = 1.8
 """Seconds of an action that is drawn as a gesture, beside other actions."""
 REST_S = 2.0
@@ -92,6 +99,7 @@ _STOP = re.compile(
     (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
     re.IGNORECASE | re.VERBOSE,
 )
+_STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
 _STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
 """Beginning of a clause that ends the way before it."""
 
@@ -191,7 +199,7 @@ class SequenceReader(Reader):
             return ()
         if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
             return ()
-        found = list(_risen_from_there(map(_movement, groups)))
+        found = list(_from_there(map(_movement, groups)))
         if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(bare.prompt):
             found[-1] = _rest()
         return tuple(found)
@@ -367,21 +375,30 @@ def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
     return found
 
 
-def _risen_from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
-    """Yield movements; those that stand up do so from where the movement before has ended."""
-    before: str | None = None
+def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
+    """Yield movements that begin where the one before has ended: who sat down and waits sits, and who stands up does so
+    from there."""
+    before = down = None
     for movement in movements:
         action = movement.action
-        if action == "stand-up" and before in FLOOR:
-            action = "get-up"
-        elif action == "get-up" and before in SEAT:
-            action = "stand-up"
+        if action == STANDING and before in HELD and not _STANDS.search(movement.text):
+            action = HELD[before]
+        elif action in RISING and down is not None:
+            action = "get-up" if down in FLOOR else "stand-up"
+        elif action in RISING and before is not None:
+            action = STANDING
         yield replace(movement, action=action)
         before = action
+        if action in FLOOR | SEAT:
+            down = action
+        elif action in ON_FEET:
+            down = None
 
 
 def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     text = without_joints(" ".join(clause.text for clause in group))
+    if only_gaze(text):
+        return ReadMovement(text, STANDING)
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
     action = group[0].name if single else None
     return ReadMovement(text, action, DRAWN_S if action in DRAWN_AS else None)

@@ -11,27 +11,29 @@ Glance = Literal["left", "right", "up", "down", "around", "shake"]
 """`around`: to one side and to the other; `shake`: quickly to and fro."""
 
 _WHERE = {
-    "left": r"left|leftwards?",
-    "right": r"right(?! (?:at|into|in|through|past)\b)|rightwards?",
+    "left": r"left|leftwards?|over (?:his|her|their|the) left shoulder",
+    "right": r"right(?! (?:at|into|in|through|past)\b)|rightwards?|over (?:his|her|their|the) right shoulder",
     "up": r"up(?! (?:the|to) )|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
     "down": r"down(?! the )|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
     "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left"
-    r"|behind (?:him|her|them)|over (?:his|her|their|the|one) (?:left |right )?shoulder",
+    r"|behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
+    r"|over (?:his|her|their|the|one) shoulder",
 }
 _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
 _LOOKS = re.compile(
     r"\b(?:look|glanc|gaz|peer|star|scan)(?:s|e|es|ing|ed)?\b"
-    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:his|her|their|the) head\b"
+    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|the) )?head\b(?: (?:to|and) (?:look|glance|peer)s?\b)?"
 )
 _STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")
-_SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b|\bhead[ -]shak(?:e|ing)\b")
+_SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b(?: no\b)?|\bhead[ -]shak(?:e|ing)\b")
 _JOINT = re.compile(
     r"(?:^|\s*[,;]|\s)\s*(?:(?:and|then|while|as|but|first)\s+)*(?:(?:an?|the)\s+(?:person|man|woman)\s+|(?:he|she|they)\s+)?"
     r"(?:(?:is|are)\s+)?(?:\w+ly\s+)?$",
     re.IGNORECASE,
 )
 """Words that join these to others."""
+_SAYS_HOW = re.compile(r"(?:(?:an?|the) \w+ ?)?(?:\w+ly)?\W*", re.IGNORECASE)
 _DENIED = re.compile(r"\b(?:without|not|never|no|n't|don't|stops?|avoids?)\s+(?:\w+\s+)?$")
 
 
@@ -53,6 +55,11 @@ def without_gaze(prompt: str) -> str:
         kept += prompt[at : begin if joint is None else at + joint.start()]
         at = end
     return (kept + prompt[at:]).strip(" ,;.") if at else prompt
+
+
+def only_gaze(prompt: str) -> bool:
+    """Return True if a prompt asks for nothing but that the head turns."""
+    return bool(stated_gaze(prompt)) and _SAYS_HOW.fullmatch(without_gaze(prompt)) is not None
 
 
 def _spans(prompt: str) -> Iterator[tuple[int, int, list[Glance]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -16,7 +17,9 @@ from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.generation.stepped import frames_of_steps
+from marey.motion.courses import natural_course
 from marey.motion.features import HUMANML3D_263
+from marey.motion.skeleton import HUMANML3D
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
 from tests.support.bodies import Body, lift, raiser, steady, walker, waver
@@ -241,6 +244,18 @@ def test_the_limb_that_acts_is_the_one_that_the_prompt_names() -> None:
 def test_turns_are_as_large_as_asked_for() -> None:
     made = make(walker(6.0, turn=150.0), ask("a man walks ahead and then turns left by 90 degrees"))
     assert made.changes == {"turn": {"made": pytest.approx(150, abs=5), "shown": pytest.approx(90, abs=5)}}
+
+
+def test_frames_that_a_transition_replaces_are_no_part_of_a_turn() -> None:
+    request = ask("a man walks ahead and then turns left by 90 degrees")
+    joints = walker(6.0, turn=150.0)[40:]
+    whole = make(joints, request)
+    joined = make(joints, replace(request, beside=("a man waves", "")))
+    headings = [
+        natural_course(HUMANML3D_263.decode(each.features), HUMANML3D, 20.0).headings for each in (whole, joined)
+    ]
+    assert abs(math.degrees(headings[0][-1] - headings[0][8])) < 80
+    assert abs(math.degrees(headings[1][-1] - headings[1][8])) == pytest.approx(90, abs=7)
 
 
 def test_a_turn_to_the_other_side_is_mirrored_first() -> None:

@@ -102,6 +102,21 @@ def test_a_jump_that_ends_in_another_direction_turns(prompt: str, read: str) -> 
 
 
 @pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("blocks, then counterattacks", "blocks, then throws a punch"),
+        ("parry the sword and counter attack", "parry the sword and slash with the sword"),
+        ("ducks before counter-striking with a knife", "ducks before slashing with a knife"),
+        ("attacks the counter", "attacks the counter"),
+        ("turns around 180 and walks back", "turns around 180 and walks forward"),
+        ("turns 180 degrees and walks back", "turns 180 degrees and walks forward"),
+    ],
+)
+def test_counterattacks_are_blows_and_ways_behind_an_angle_lead_ahead(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
     ("action", "prompt", "other"),
     [
         ("roll", "he rolls up his sleeves", True),

@@ -12,6 +12,7 @@ from safetensors.numpy import save_file
 from marey.bundles import TextSpec
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
+from marey.generation.asked import action_of
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
 from marey.text.keys import feature_key
@@ -193,6 +194,33 @@ def test_a_way_of_a_number_of_steps_comes_to_rest(reading: TextPipeline) -> None
         load_vocabulary().need(STANDING).plain_words,
     ]
     assert walk.movements == stairs.movements == ()
+
+
+def test_a_way_to_a_stop_is_read_though_the_whole_is_in_doubt(reading: TextPipeline) -> None:
+    (read,) = reading.features(["sprints forward then stops suddenly"])
+    assert [load_vocabulary().said_first(each.rewritten) for each in read.movements] == ["sprint", STANDING]
+
+
+@pytest.mark.parametrize(
+    ("prompt", "actions"),
+    [
+        ("sits down on a chair, waits, then stands back up", ["sit-down", "sit", "stand-up"]),
+        ("lies down, rests for a while and gets up", ["lie-down", "lie", "get-up"]),
+        ("sits down, drinks a coffee and then stands up", ["sit-down", "drink", "stand-up"]),
+        ("touches toes then stands up", ["bend-over", STANDING]),
+        ("crouches behind a box, waits, then stands up and runs", ["crouch", "crouch", STANDING, "run"]),
+        ("look over the right shoulder, then continue walking", [STANDING, "walk"]),
+    ],
+)
+def test_a_movement_begins_where_the_one_before_ends(reading: TextPipeline, prompt: str, actions: list[str]) -> None:
+    (read,) = reading.features([prompt])
+    assert [action_of(each) for each in read.movements] == actions
+
+
+def test_who_only_looks_stands(reading: TextPipeline) -> None:
+    (read,) = reading.features(["looks left, then looks right"])
+    assert load_vocabulary().said_first(read.rewritten) == STANDING
+    assert read.movements == ()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from marey.vocabulary.gazes import stated_gaze, without_gaze
+from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 
 
 @pytest.mark.parametrize(
@@ -13,6 +13,9 @@ from marey.vocabulary.gazes import stated_gaze, without_gaze
         ("look left, look right", ("left", "right")),
         ("walk forward, stop, look around", ("around",)),
         ("she glances over her shoulder", ("around",)),
+        ("look over the right shoulder", ("right",)),
+        ("turns head to look behind", ("around",)),
+        ("looks behind the sofa", ()),
         ("looks to the left, then to the right", ("left", "right")),
         ("looks up at the sky and then down", ("up", "down")),
         ("turns her head to the right", ("right",)),
@@ -43,9 +46,24 @@ def test_the_gaze_of_a_prompt(prompt: str, gaze: tuple[str, ...]) -> None:
         ("looks up, waves and sits down", "waves and sits down"),
         ("look left, look right", ""),
         ("A man looks around", ""),
+        ("shakes head no", ""),
+        ("turns head to look behind while walking", "while walking"),
         ("walks without looking back", "walks without looking back"),
         ("He waves.", "He waves."),
     ],
 )
 def test_a_prompt_without_its_gaze(prompt: str, left: str) -> None:
     assert without_gaze(prompt) == left
+
+
+@pytest.mark.parametrize(
+    ("prompt", "only"),
+    [
+        ("looks left, then looks right", True),
+        ("a guard looks around slowly", True),
+        ("looks around and walks on", False),
+        ("waves", False),
+    ],
+)
+def test_a_prompt_of_a_gaze_alone(prompt: str, only: bool) -> None:
+    assert only_gaze(prompt) == only

@@ -25,6 +25,7 @@ from marey.generation.port import GenerationControl, Generator, Limits, MotionFe
 from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
 from marey.generation.stepped import frames_of_steps, stepped
+from marey.generation.timed import cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
 from marey.generation.whole_body import AGAIN
 from marey.items.values import MAX_SECONDS
@@ -92,6 +93,7 @@ class _Wish:
         turn: how far the body turns; None = as it comes.
         pace: at which it is done.
         gaze: where the head turns.
+        joined: a transition replaces the first frames.
     """
 
     steps: tuple[Step, ...] | None = None
@@ -101,6 +103,7 @@ class _Wish:
     turn: Turn | None = None
     pace: AskedPace = field(default_factory=AskedPace)
     gaze: tuple[Glance, ...] = ()
+    joined: bool = False
 
     @classmethod
     def of(cls, request: Request) -> _Wish:
@@ -117,7 +120,7 @@ class _Wish:
         if action == "spin":
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
-        return cls(steps, action, limb_of(prompt, action), count, turn, pace, gaze)
+        return cls(steps, action, limb_of(prompt, action), count, turn, pace, gaze, bool(request.beside[0]))
 
     @property
     def side(self) -> str:
@@ -243,18 +246,19 @@ def _as_often(
 def _turned(
     features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
-    """Return the motion with the turn that is asked for."""
+    """Return the motion with the turn that is asked for, behind what a transition replaces of it."""
     if wish.turn is None:
         return features
+    lost = cut_of(len(features)) if wish.joined else 0
+    replaced, features = features[:lost], features[lost:]
     first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action == ON_THE_SPOT else None
     enough = features if first is None else first
     bent = turned_features(enough, layout, wish.turn, wish.side)
-    if first is None and bent is None:
-        return features
-    made = _turn(features, layout) if first is not None or bent is None else bent[1]
-    enough = enough if bent is None else bent[0]
-    changes["turn"] = {"made": round(made), "shown": round(_turn(enough, layout))}
-    return enough
+    if first is not None or bent is not None:
+        made = _turn(features, layout) if first is not None or bent is None else bent[1]
+        enough = enough if bent is None else bent[0]
+        changes["turn"] = {"made": round(made), "shown": round(_turn(enough, layout))}
+    return np.concatenate([replaced, enough])
 
 
 def _on_floor(

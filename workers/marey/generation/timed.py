@@ -13,6 +13,17 @@ from numpy.typing import NDArray
 from marey.items.values import MAX_SEED
 from marey.text.features import TextFeatures
 
+CUT = 8
+"""Most frames of a row that the transition to it replaces. All are at its beginning: an action shows at its end that it
+was done (a seat is reached, stairs are climbed), and replacing frames there costs adherence."""
+CUT_SHARE = 4
+"""At most one in so many frames of a row is replaced."""
+
+
+def cut_of(frames: int, grid: int = 1) -> int:
+    """Return how many frames at its beginning a row loses to a transition, a multiple of `grid`."""
+    return max(grid, min(CUT, frames // CUT_SHARE // grid * grid))
+
 
 @dataclass(frozen=True)
 class TimedText:

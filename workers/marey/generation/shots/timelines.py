@@ -23,17 +23,12 @@ from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.shots.going_on import is_way, without_halt
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
-from marey.generation.timed import TimedText, part_seed
+from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
 from marey.vocabulary.entries import load_vocabulary
 
-CUT = 8
-"""Most frames of a row that the transition to it replaces. All are at its beginning: an action shows at its end that it
-was done (a seat is reached, stairs are climbed), and replacing frames there costs adherence."""
-CUT_SHARE = 4
-"""At most one in so many frames of a row is replaced."""
 RISE, RISE_SPEED = 0.3, 0.6
 """Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
 stand up or to go down at this speed."""
@@ -111,11 +106,6 @@ def _transition(before: TimelinePart, after: TimelinePart, seed: int, grid: int)
     """Return the frames that are generated without a prompt between two rows: a gap, and the beginning of the row after
     it, if the gap is shorter than that."""
     return TimelinePart(before.end, max(after.start, before.end + cut_of(after.frames, grid)), seed)
-
-
-def cut_of(frames: int, grid: int) -> int:
-    """Return how many frames at its beginning a row loses to a transition."""
-    return max(grid, min(CUT, frames // CUT_SHARE // grid * grid))
 
 
 def generate_timelines(

@@ -1,0 +1,39 @@
+"""Names of takes as words."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.vocabulary.scope import ActionLists, match_scope
+from marey.vocabulary.take_names import as_words
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("idle_injured", "idle injured"),
+        ("DEATH_BACKWARD_01", "death backward"),
+        ("LOCO_walk_limp_L", "walk limp left"),
+        ("ENEMY_MELEE_01 - overhead swing w/ two hands", "melee - overhead swing with two hands"),
+        ("WalkFwd_Loop_v02", "walk forward"),
+        ("Turn180_R", "turn 180 degrees right"),
+        ("Jump_180deg_L", "jump 180 degrees left"),
+        ("take_cover", "take cover"),
+        ("Take_01_walk", "walk"),
+        ("crouch_walk_b", "crouch walk"),
+        ("a_person_waves", "a person waves"),
+        ("sits down w/o looking", "sits down without looking"),
+        ("npc_01", "npc 01"),
+        ("a person walks", "a person walks"),
+        ("waves to user_name@example.com", "waves to user_name@example.com"),
+        ("walks - slowly", "walks - slowly"),
+    ],
+)
+def test_a_name_of_a_take_is_read_as_words(name: str, words: str) -> None:
+    assert as_words(name) == words
+
+
+def test_the_scope_of_a_name_is_that_of_its_words() -> None:
+    lists = ActionLists(("walk", "die"))
+    for name, action in (("LOCO_walk_L", "walk"), ("DEATH_BACKWARD_01", "die")):
+        assert [each.action for each in match_scope(name, lists).actions] == [action]
