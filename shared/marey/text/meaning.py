@@ -18,6 +18,7 @@ from marey.vocabulary.entries import Action, load_vocabulary
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.lexicon import EXACT, WILDCARD
 from marey.vocabulary.scope import ActionLists, Scope, match_as, match_as_thing, match_scope
+from marey.vocabulary.take_names import as_words
 
 if TYPE_CHECKING:
     from marey.text.pipeline import TextPipeline
