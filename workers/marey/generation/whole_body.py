@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.crawls import crawl
+from marey.drawing.crawls import crawl, low_crawl
 from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
 from marey.drawing.gesture import Gesture
@@ -58,6 +58,13 @@ _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|standing|rises?|rising|picks? (?:him|her|them|it)sel\w+) (?:back )?up\b|\brises?\b"
 )
 _CRAWLS = re.compile(r"\bcrawl\w*\b|\bon all fours\b|\bhands and knees\b")
+_LOW = re.compile(
+    r"\b(?:belly|bellies|stomach|tummy|chest|army|armies|military|soldiers?|marines?|troops?|infantry\w*|commandos?|prone"
+    r"|low|flat|barbed|wires?|elbows?|forearms?|leopard|tiger|snakes?|worms?|lizard|slither\w*|face[ -]?down"
+    r"|under (?:enemy |heavy )?(?:fire|bullets))\b"
+)
+"""Words of crawls on the belly."""
+_ON_KNEES = re.compile(r"\b(?:all fours|hands and knees|knees and hands)\b")
 _ON_FOURS = re.compile(r"\b(?:all fours|hands and knees|a crawl|crawling)\b")
 _ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|chest)\b")
 
@@ -107,8 +114,15 @@ def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 
 
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    back = bool(re.search(r"\b(?:backwards?|in reverse)\b", wish.prompt.lower()))
-    return crawl(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+    text = wish.prompt.lower()
+    back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
+    form = low_crawl if _is_low(text) else crawl
+    return form(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+
+
+def _is_low(text: str) -> bool:
+    """Return True if a crawl is one on the belly."""
+    return bool(_LOW.search(text)) and not _ON_KNEES.search(text)
 
 
 def _lie_down(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -123,9 +137,12 @@ def _lie(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     before, text = wish.beside[0].lower(), wish.prompt.lower()
-    if _CRAWLS.search(before) or _ON_FOURS.search(text):
+    crawls = _CRAWLS.search(before) and not _is_low(before)
+    if crawls or _ON_FOURS.search(text):
         return get_up(rng, "fours")
-    return get_up(rng, "lie-front" if _ends_on_front(before) or _ONTO_FRONT.search(text) else "lie-back")
+    return get_up(
+        rng, "lie-front" if _ends_on_front(before) or _CRAWLS.search(before) or _ONTO_FRONT.search(text) else "lie-back"
+    )
 
 
 def _jump_turn(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
