@@ -204,10 +204,24 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
         chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
         times = min(wish.count or 1, MOST) if action in AGAIN else 1
         frames = len(joints) if wish.fixed else None
-        gestures = _fitting(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames)
-        return None if gestures is None else _joined(gestures, frames, chance)
+        return drawn_in_place(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames, chance)
 
     return drawn
+
+
+def drawn_in_place(
+    draw: Callable[[float | None], Gesture], times: int, frames: int | None, rng: random.Random
+) -> Array | None:
+    """Return joints (T, 22, 3) of a body that stands and moves as drawn; None if there is no time for it.
+
+    Args:
+        draw: returns a movement; is given the seconds that it has to fill, or None.
+        times: that it is done, one after the other.
+        frames: of the motion; None = as many as it takes.
+        rng: decides how the body stands.
+    """
+    gestures = _fitting(draw, times, frames)
+    return None if gestures is None else _joined(gestures, frames, rng)
 
 
 def _fitting(draw: Callable[[float | None], Gesture], times: int, frames: int | None) -> list[Gesture] | None:
