@@ -54,6 +54,8 @@ def test_each_shows_its_action_on_the_floor_without_breaks(action: str, seed: in
         ("she trips and falls forward", -1),
         ("dies, falling face down", -1),
         ("drops to his knees and falls dead", -1),
+        ("death from the front", 1),
+        ("shot from behind", -1),
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
@@ -73,7 +75,9 @@ def test_a_fall_over_the_knees_kneels_first() -> None:
         assert kneels.sum() >= 4
 
 
-@pytest.mark.parametrize(("prompt", "way"), [("falls to the left", 1), ("falls over to the right side", -1)])
+@pytest.mark.parametrize(
+    ("prompt", "way"), [("falls to the left", 1), ("falls over to the right side", -1), ("death from the left", -1)]
+)
 def test_a_fall_goes_to_the_side_that_is_named(prompt: str, way: int) -> None:
     for seed in SEEDS:
         joints = drawn("die", prompt, seed=seed)
@@ -92,7 +96,8 @@ def test_the_wounded_are_hit_before_they_fall() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prompt", "forward"), [("a forward roll", 1), ("rolls backwards", -1), ("a combat roll", 1), ("a dive roll", 1)]
+    ("prompt", "forward"),
+    [("a forward roll", 1), ("rolls backwards", -1), ("rolls over his left shoulder", 1), ("a dive roll", 1)],
 )
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_roll_goes_where_its_words_say_and_ends_on_the_feet(prompt: str, forward: int, seed: int) -> None:
@@ -102,7 +107,15 @@ def test_a_roll_goes_where_its_words_say_and_ends_on_the_feet(prompt: str, forwa
     assert joints[:, HEAD, 1].min() < 0.35
 
 
-@pytest.mark.parametrize(("prompt", "way"), [("rolls to the left", 1), ("a sideways roll to the right", -1)])
+@pytest.mark.parametrize(
+    ("prompt", "way"),
+    [
+        ("rolls to the left", 1),
+        ("a sideways roll to the right", -1),
+        ("dodge roll to the left", 1),
+        ("combat roll, right", -1),
+    ],
+)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_roll_goes_to_the_side_that_is_named(prompt: str, way: int, seed: int) -> None:
     joints = drawn("roll", prompt, seed=seed)

@@ -23,7 +23,7 @@ from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody, way_through
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, way_through
 from marey.posing.still import standing_still
 from marey.vocabulary.turns import stated_turn
 
@@ -50,6 +50,11 @@ _HIT = re.compile(
 _SLOWLY = re.compile(r"\b(?:slow\w*|gradual\w*|sinks?|slump\w*|crumples?)\b")
 _LOG = re.compile(r"\b(?:side|sideways|log|barrel|pencil|over onto|lateral\w*)\b")
 _SIDE_NAMED = re.compile(r"\b(left|right)\b")
+_OVER_SHOULDER = re.compile(r"\b(?:left|right) shoulder\b")
+_FROM = re.compile(
+    r"\bfrom (?:the |his |her |its |their )?(?:(front|ahead)|(back|behind|rear)|(left|right))\b(?! foot| leg| hand)"
+)
+"""Words of where a blow comes from that a body falls away of."""
 _CROUCHES = re.compile(r"\b(?:crouch\w*|kneel\w*|knee|squat\w*|stays? low)\b")
 _SHOULDER = re.compile(r"\b(?:shoulder|combat|dodge|tactical|parkour|judo|evad\w*|evasive)\b")
 _IN_BED = re.compile(r"\b(?:bed|sleep\w*|asleep|lying|lies)\b")
@@ -71,7 +76,7 @@ _ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|ch
 
 def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
-    text = wish.prompt.lower()
+    text = _FROM.sub(_away, wish.prompt.lower())
     knees, aside = bool(_KNEES.search(text)), bool(_SIDE.search(text))
     forms = [
         *(["knees-side"] if knees and aside else ["knees"] if knees else []),
@@ -88,11 +93,17 @@ def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     return die(rng, form, side=named[1] if named else "", hit=bool(_HIT.search(text)), slow=bool(_SLOWLY.search(text)))
 
 
+def _away(match: re.Match[str]) -> str:
+    """Return the direction in which a body falls that is hit from another one."""
+    front, _, side = match.groups()
+    return f"to the {OTHER_SIDE[side]}" if side else "backward" if front else "forward"
+
+
 def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = wish.prompt.lower()
     named = _SIDE_NAMED.search(text)
-    if _LOG.search(text) or (named and not _SHOULDER.search(text)):
+    if _LOG.search(text) or (named and not _OVER_SHOULDER.search(text)):
         form = "sideways"
     elif re.search(r"\b(?:back|backwards?)\b", text):
         form = "backward"
