@@ -113,3 +113,54 @@ def test_a_raise_without_height_or_direction_is_left_as_it_is() -> None:
 )
 def test_arms_that_are_stretched_out_are_raised(prompt: str, named: str) -> None:
     assert stated_action(prompt) == named
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_hands_clap_as_often_as_asked_for_and_rest(count: int, seed: int) -> None:
+    joints = drawn("clap", "claps his hands", count=count, seed=seed)
+    assert len(REPETITIONS["clap"](Motion(joints, FPS))) == count
+    assert joints[-1, WRISTS, 1].max() < joints[-1, 0, 1] + 0.1
+    assert stated_features(LAYOUT, "clap", FineWish(prompt="claps"), 60, seed) is None
+
+
+def test_hands_clap_over_the_head_where_that_is_said() -> None:
+    assert hands(drawn("clap", "claps twice above his head", count=2))[..., 1].max() > 0.35
+    assert hands(drawn("clap", "claps twice", count=2))[..., 1].max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("prompt", "steps"),
+    [("sidestep right x3", 3), ("takes 5 steps to the right", 5), ("one quick step to the right", 1)],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steps_aside_are_as_many_as_asked_for(prompt: str, steps: int, seed: int) -> None:
+    joints = drawn("sidestep", prompt, side="right", seed=seed)
+    moved = np.abs(np.diff(joints[:, [7, 8], 0], axis=0)) * FPS > 0.5
+    swings = (np.diff(moved.astype(int), axis=0) == 1).sum(axis=0)
+    assert list(swings) == [steps, steps]
+    assert 0.25 < (joints[0, 0, 0] - joints[-1, 0, 0]) / steps < 0.7
+    assert np.abs(joints[-5:, [7, 8]] - joints[-1, [7, 8]]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("prompt", "least", "most"),
+    [
+        ("strafe left fast", 1.5, 2.3),
+        ("quickly shuffles to the left", 1.5, 2.3),
+        ("steps to the left slowly", 0.2, 0.45),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steps_aside_have_the_pace_that_is_stated(prompt: str, least: float, most: float, seed: int) -> None:
+    joints = drawn("sidestep", prompt, side="left", seed=seed)
+    speeds = np.diff(joints[:, 0, 0]) * FPS
+    assert least < np.median(speeds[speeds > 0.1]) < most
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35, "no foot leaps"
+    assert joints[..., 1].min() > -0.02
+    assert len(drawn("sidestep", prompt, side="left", frames=100, seed=seed)) == 100
+
+
+def test_steps_aside_without_number_or_pace_and_to_both_sides_are_left_as_they_are() -> None:
+    for prompt in ("steps to the left", "quickly shuffles from side to side"):
+        assert stated_features(LAYOUT, "sidestep", FineWish(prompt=prompt), 60, 1) is None

@@ -25,7 +25,7 @@ from marey.generation.port import GenerationControl, Generator, Limits, MotionFe
 from marey.generation.raising import stated_action
 from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
-from marey.generation.stated import stated_features
+from marey.generation.stated import AT_PACE, stated_features
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.turned import NEAR, ended_turn, turned_features
 from marey.generation.whole_body import AGAIN
@@ -208,6 +208,7 @@ def _as_asked(
     if _is_better_mirrored(features, layout, wish) if one_side else wish.action in ALIKE and request.seed % 2:
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
+    stated = None
     if layout.skeleton.name == HUMANML3D.name:
         stated = _stated(features, layout, wish, request) if redraws else None
         drawn = _drawn(features, layout, wish, request, redraws=redraws) if stated is None else stated
@@ -216,13 +217,15 @@ def _as_asked(
         for change in (_as_often, _turned, _on_floor, _ended) if stated is None else ():
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
-    features = _retimed(features, layout, wish, fixed, changes)
+    if stated is None or wish.action not in AT_PACE:
+        features = _retimed(features, layout, wish, fixed, changes)
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
 
 
 def _stated(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
     """Return the movement whose form the prompt states, drawn; None if it states none."""
-    return stated_features(layout, wish.action, wish.fine(request), len(features), request.seed)
+    frames = (request.frames if wish.action in AT_PACE else None) or len(features)
+    return stated_features(layout, wish.action, wish.fine(request), frames, request.seed)
 
 
 def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request, *, redraws: bool) -> Float32 | None:
