@@ -66,7 +66,8 @@ def stated_features(layout: FeatureLayout, action: str, wish: FineWish, frames: 
     if state is None:
         return None
     rng = random.Random(f"{seed} {action}")  # noqa: S311
-    if state(wish, rng, None) is None:
+    first = state(wish, rng, None)
+    if first is None:
         return None
-    joints = drawn_in_place(lambda seconds: state(wish, rng, seconds), 1, frames if wish.fixed else None, rng)
+    joints = drawn_in_place(lambda seconds: state(wish, rng, seconds) or first, 1, frames if wish.fixed else None, rng)
     return None if joints is None else encode_all(layout, joints)
