@@ -63,6 +63,14 @@ _TURNS_IN_AIR = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """Jumps with a turn: "jumps 360 degrees", "jumps and lands facing the other way"."""
+_AT_WHEEL = re.compile(
+    r"""(?P<drives>\b(?:drives?|driving|steers?|steering)\b[^,.;]*?)
+    (?:,|,?\ (?:with|keeping|holding|and\ (?:keeps|holds)))?(?:\ with)?
+    \ (?:his\ |her\ |their\ |both\ |two\ |the\ )*hands?\ (?:firmly\ |tightly\ )?(?:on|at|gripping|holding|upon)
+    \ (?:the|his|her|their)\ (?:steering\ )?wheel""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The hands of who drives, which are where they are anyway."""
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -96,9 +104,10 @@ def without_misleading(prompt: str) -> str:
 
     Who "walks up to the door" goes there, and who "walks down the street" goes along it: of "up" and "down" models read
     a climb. Who "walks back to his car" or "turns around and walks back" walks ahead, who "paces back and forth" turns
-    on the way, and who "is kicked" is hit. The blow of who "is shot and falls" is part of the fall. A
-    counterattack is a blow of the weapon.
+    on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
+    from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     """
+    prompt = _AT_WHEEL.sub(r"\g<drives>", prompt)
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))

@@ -12,14 +12,14 @@ from functools import lru_cache
 
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
-from marey.vocabulary.bearings import DRAWN_AS
+from marey.vocabulary.bearings import DRAWN_AS, DRAWN_ON
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
-VERSION = 7
+VERSION = 8
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""
@@ -32,6 +32,7 @@ ALONE = frozenset({STANDING, NODDING})
 post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
+_WITH_LOAD = re.compile(r" (?:with|carrying) a load\b")
 _NOD = re.compile(r"\bnod", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z]+")
 
@@ -83,6 +84,8 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
         return bare or prompt
     if action == NODDING and bare != said and not _NOD.search(prompt):
         action = STANDING
+    if action in DRAWN_ON and any(each.bearing.load for each in borne.stated):
+        action, bare = "walk", _WITH_LOAD.sub("", bare)  # the arms are drawn
     plain = load_vocabulary().need(action).plain_words
     if not bare or action in DRAWN_AS or (surely and action in ALONE):
         return plain

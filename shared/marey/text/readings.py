@@ -30,7 +30,7 @@ SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
 UNSPLIT = 0.35
 """Probability from which on a prompt that is no sequence asks for one action."""
-STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel"})
+STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel", "laugh"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
 

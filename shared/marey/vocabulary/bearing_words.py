@@ -7,21 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from marey.vocabulary.bearings import Side, StatedBearing, bearing_words, each_once
+from marey.vocabulary.bearings import Side, StatedBearing, bearing_macros, bearing_words, each_once
 from marey.vocabulary.inflection import gerund, third_person, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
 KEPT_READINGS = 1024
 """Prompts whose words are kept as read: reader, scope and manifest ask for the same ones."""
-_WALK = "walk"
+_WALK, _LOAD = "walk", " with a load"
 _PERSON = "person"
 _ALL = r"a|an|the|my|his|her|this|that|one|some"
-_MACROS = {
-    "WITH ": r"(?:with|keeping|keeps|keep|holding|holds|having|has) ",
-    "OPT ": r"(?:(?:with|keeping|keeps|keep|holding|holds|having|has) )?",
-    "HIS ": r"(?:(?:his|her|their|its|the|a|an|both|one|my|your) (?:of (?:his|her|their) )?(?:own )?)?"
-    r"(?:left |right )?",
-}
 _VERY = r"(?:(?:very|really|so|rather|quite|extremely|slightly|somewhat|too|visibly|clearly|obviously) )*"
 _BE = r"(?:(?:who|that|which) )?(?:is|are|was|were|looks?|feels?|seems?|being|looking|feeling) "
 _JOINT = re.compile(
@@ -135,7 +129,18 @@ _BRINGING = frozenset(
 """Verbs by which arms come to where they are held: what is told before and after is done before and after."""
 _GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
 """Nouns of ways before which an adjective is one of the person: "sad walk"."""
-_GAIT = re.compile(r"([\w-]+)(.*)", re.DOTALL)
+_GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
+_POSTURES = re.compile(r"\b(?:kneel\w*|knelt|crouch\w*|squat\w*|sit|sits|sitting|sat|knees?)\b")
+_WAYS = (
+    r"(?:walk(?:s|ing|ed)?|runs?|running|jog(?:s|ging)?|sprint(?:s|ing)?|stroll(?:s|ing)?|march(?:es|ing)?|turns?|turning"
+    r"|(?:side)?steps?|back(?:s|ing)|advanc(?:e|es|ing)|strafe?s?|strafing|creeps?|creeping|paces?|pacing)"
+)
+_WHILE = re.compile(r"\b(?:while|whilst|as)\s+(?:(?:he|she|they)\s+)?(?:(?:is|are)\s+)?$")
+_WAY = re.compile(rf"\b{_WAYS}\b")
+_BORNE = rf"(?:{_WAYS}|stand(?:s|ing)?|kneel(?:s|ing)?|crouch(?:es|ing)?|idles?|climb(?:s|ing)?|limp(?:s|ing)?)"
+_BORNE_BEFORE = re.compile(rf"\b{_BORNE}\b[^.;]*$")
+_BORNE_JUST_BEFORE = re.compile(rf"\b{_BORNE} (?:cycle )?$")
+_BORNE_AFTER = re.compile(rf"^\W*(?:\w+ly )?(?!\w+ing\b){_BORNE}\b")
 
 
 @dataclass(frozen=True)
@@ -150,12 +155,12 @@ class _Words:
     @property
     def is_gerund(self) -> bool:
         """True if they begin with a verb in -ing."""
-        return self.stated.words.partition(" ")[0].endswith("ing")
+        return self.stated.first.endswith("ing")
 
     @property
     def is_event(self) -> bool:
         """True if something is done in them: "salutes", "crosses his arms"; not "with his arms crossed"."""
-        bearing, first = self.stated.bearing, self.stated.words.partition(" ")[0]
+        bearing, first = self.stated.bearing, self.stated.first
         arms = bool(bearing.arms) and not (bearing.pace or bearing.gait or bearing.roll)
         return (
             not self.instead
@@ -312,12 +317,22 @@ def _matches(text: str) -> Iterator[_Words]:
         for match in pattern.finditer(text):
             whole = kind in ("adjectives", "beings", "people")
             stated = StatedBearing(name, _side(match[0]), whole, match[0])
-            if kind == "gaits":
-                yield from _gait(text, match, stated)
+            if kind in ("gaits", "loads"):
+                yield from _gait(text, match, stated, _LOAD if kind == "loads" else "")
             elif kind in ("beings", "people"):
                 yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
+            elif kind == "beside":
+                if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
+                    yield _Words(*match.span(), stated)
             elif kind == "how" or _is_subject(text[: match.start()]):
                 yield _Words(*match.span(), stated)
+
+
+def _is_beside(text: str, words: str) -> bool:
+    """Return True if a body does what these words say in a posture that the rest of its prompt names, or on its way:
+    "kneels and aims a rifle", "walks aiming a rifle", but not "walks in and aims a rifle"."""
+    first = words.split()[0]
+    return bool(_POSTURES.search(text) or ((first.endswith("ing") or first == "with") and _WAY.search(text)))
 
 
 def _is_subject(before: str) -> bool:
@@ -325,12 +340,29 @@ def _is_subject(before: str) -> bool:
     return not _says_more(_SUBJECT.sub("", before))
 
 
-def _gait(text: str, match: re.Match[str], stated: StatedBearing) -> Iterator[_Words]:
-    """Yield the words of a verb that is read as walking; "a swaggering cowboy" is said of the person."""
-    if match["verb"].endswith("ing") and _person_ahead().match(text, match.end()):
+def _gait(text: str, match: re.Match[str], stated: StatedBearing, load: str) -> Iterator[_Words]:
+    """Yield the words of a verb that is read as walking; "a swaggering cowboy" is said of the person.
+
+    Only the load, if any, stands in their place where the prompt names a way beside, and nothing beside a posture:
+    "walks carrying a box", "stands carrying a box".
+    """
+    before, verb = text[: match.start()], match["verb"]
+    if verb.endswith("ing") and not load and _person_ahead().match(text, match.end()):
         yield _Words(*match.span(), replace(stated, whole=True))
-    elif not _is_noun(text[: match.start()], match["verb"]):
-        yield _Words(*match.span(), stated, _walking()[match["verb"]])
+    elif _is_borne_otherwise(before, verb, text[match.end() :]):
+        goes = load if _WAY.search(text) else ""
+        joint = _WHILE.search(before) if goes else None
+        yield _Words(match.start() if joint is None else joint.start(), match.end(), stated, goes.strip())
+    elif not _is_noun(before, verb):
+        yield _Words(*match.span(), stated, _walking()[verb] + load)
+
+
+def _is_borne_otherwise(before: str, verb: str, after: str) -> bool:
+    """Return True if the words around a verb say how the body goes or stands: "stands carrying", "a walk limp"."""
+    if verb.endswith("ing"):
+        goes = _BORNE_BEFORE.search(before) and not _AND.search(before)
+        return bool(goes or _BORNE_AFTER.match(after))
+    return not verb.endswith("s") and bool(_BORNE_JUST_BEFORE.search(before))
 
 
 def _is_noun(before: str, verb: str) -> bool:
@@ -375,11 +407,12 @@ def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
 def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield kind and pattern; adjectives of a movement are of the kind `how`: "sad walk", "walks home tired"."""
     either = "|".join(entries)
-    if kind == "how":
+    if kind in ("how", "beside"):
         yield kind, "|".join(map(_expanded, entries))
-    elif kind == "gaits":
-        for verb, tail in map(_verb_and_tail, entries):
-            yield kind, rf"(?P<verb>{_longest_first(verb_forms(verb))}){tail}"
+    elif kind in ("gaits", "loads"):
+        for verbs, tail in map(_verbs_and_tail, entries):
+            forms = frozenset(form for verb in verbs for form in verb_forms(verb))
+            yield kind, rf"(?P<verb>{_longest_first(forms)}){_expanded(tail)}"
     elif kind == "adjectives":
         yield kind, rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
         yield kind, rf"{_BE}{_VERY}(?:{either})(?: and)?"
@@ -389,18 +422,17 @@ def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]
         yield kind, rf"(?:{either})s?"
 
 
-def _verb_and_tail(entry: str) -> tuple[str, str]:
+def _verbs_and_tail(entry: str) -> tuple[Sequence[str], str]:
     found = _GAIT.match(entry)
     assert found is not None, entry
-    return found[1], found[2]
+    return found[1].split("|"), found[2]
 
 
 def _expanded(pattern: str) -> str:
     """Return a pattern with the forms of its verbs and its macros."""
-    pattern = re.sub(r"<(\w+)>", lambda verb: f"(?:{_longest_first(verb_forms(verb[1]))})", pattern)
-    for name, words in _MACROS.items():
+    for name, words in bearing_macros().items():
         pattern = pattern.replace(name, words)
-    return pattern
+    return re.sub(r"<(\w+)>", lambda verb: f"(?:{_longest_first(verb_forms(verb[1]))})", pattern)
 
 
 def _longest_first(words: frozenset[str]) -> str:
@@ -423,7 +455,11 @@ def _walking() -> Mapping[str, str]:
     """Return the form of "walk" for each form of a verb that is read so."""
     found: dict[str, str] = {}
     for _, words in bearing_words():
-        for verb, _ in map(_verb_and_tail, words.get("gaits", ())):
+        for verb in (
+            verb
+            for verbs, _ in map(_verbs_and_tail, [*words.get("gaits", ()), *words.get("loads", ())])
+            for verb in verbs
+        ):
             forms = {third_person(verb): third_person(_WALK), verb: _WALK}
             for form in verb_forms(verb):
                 found[form] = forms.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")

@@ -5,35 +5,47 @@ The words and poses are in `bearings.toml`; `marey.vocabulary.bearing_words` fin
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal, cast
 
 from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
-Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", ""]
+Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", "stomp", "shuffle", "rope", ""]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 
-_FILE = Path(__file__).with_name("bearings.toml")
+_FILE, _MACROS = (Path(__file__).with_name(f"{name}.toml") for name in ("bearings", "bearing_macros"))
 
 DRAWN_AS: Mapping[str, str] = {"flinch": "flinch"}
 """Actions that are drawn as a gesture on a body that stands, since no network shows them, and that gesture."""
-UPRIGHT = frozenset({"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep", *DRAWN_AS})
+DRAWN_ON: Mapping[str, str] = {"carry": "load"}
+"""Actions that are drawn on a walk, and the bearing of which the prompt names none of that kind."""
+UPRIGHT = frozenset(
+    {"idle", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "sidestep", *DRAWN_AS, *DRAWN_ON}
+)
 """Actions in which the body is upright on its feet, and its arms swing or hang."""
-ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel"})
+ARMS_FREE = frozenset({"sit", "sit-down", "stand-up", "sit-floor", "kneel", "laugh"})
 """Other actions in which the arms do nothing."""
 ARMS_HELD = frozenset({"jump", "jump-forward", "hop", "squat", "crouch", "balance"})
 """Actions beside which arms can be held, and nothing else of a bearing be drawn."""
-ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "carry", "sneak"})
+ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "sneak"})
 """Actions in which trunk and head are free."""
 Shown = Literal["body", "upper", "trunk", ""]
 """Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
-WORDS = ("how", "gaits", "adjectives", "beings", "people")
+_BRINGS = re.compile(
+    r"\b(?:answers?|(?:aim|point|level|raise|shoulder|cross|fold|put|place|clasp|cover|clutch|grab|press|pick|pull|take)s?"
+    r"|crosses|clasps|clutches|presses|places)\b"
+)
+"""Verbs, not in -ing, by which arms come to where they are held."""
+_ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
+WORDS = ("how", "beside", "gaits", "loads", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
 
@@ -89,6 +101,7 @@ class Bearing:
         gesture: done once, by itself or beside another action.
         fall_s: seconds in which a gesture ends; 0 = a little longer than it takes to begin.
         keys: what the body goes through; None = it stays as it is.
+        load: something is carried in it.
         work: something that is done ("saws a plank"), not a way to do something else.
         arms: by `left` and `right`, those that it moves.
     """
@@ -96,6 +109,7 @@ class Bearing:
     id: str
     gesture: bool = False
     trunk: float = 0.0
+    aside: float = 0.0
     head: float = 0.0
     tilt: float = 0.0
     shrug: float = 0.0
@@ -105,11 +119,13 @@ class Bearing:
     roll_hz: float = 0.0
     heave: float = 0.0
     heave_hz: float = 0.0
+    sob: float = 0.0
     gait: Gait = ""
     pace: Pace = ""
     raise_s: float = 0.5
     fall_s: float = 0.0
     hold_s: tuple[float, float] = (1.0, 2.0)
+    load: bool = False
     work: bool = False
     keys: Keys | None = None
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
@@ -140,6 +156,21 @@ class StatedBearing:
     side: Side = ""
     whole: bool = False
     words: str = field(default="", compare=False)
+
+    @property
+    def first(self) -> str:
+        """The first of its words."""
+        return self.words.partition(" ")[0]
+
+    @property
+    def is_brought(self) -> bool:
+        """True if its words say that the arms come to their place, not that they are there: "answers the phone"."""
+        return bool(self.bearing.arms and _BRINGS.search(self.words))
+
+    @property
+    def ends(self) -> bool:
+        """True if its words say that the arms come down again: "answers the phone and hangs up"."""
+        return bool(_ENDS.search(self.words))
 
     @property
     def bearing(self) -> Bearing:
@@ -186,6 +217,12 @@ def bearing_words() -> Sequence[tuple[str, Mapping[str, Sequence[str]]]]:
 
 
 @lru_cache(maxsize=1)
+def bearing_macros() -> Mapping[str, str]:
+    """Return the words that stand for others in the patterns of `bearings.toml`, in the order to replace them in."""
+    return tomllib.loads(_MACROS.read_text("utf-8"))
+
+
+@lru_cache(maxsize=1)
 def bearing_table() -> Mapping[str, Any]:
     """Return `bearings.toml`."""
     return tomllib.loads(_FILE.read_text("utf-8"))
@@ -193,8 +230,8 @@ def bearing_table() -> Mapping[str, Any]:
 
 @lru_cache(maxsize=1)
 def bearings_sha256() -> str:
-    """Return the hash of `bearings.toml`."""
-    return sha256_of(_FILE)
+    """Return a hash of `bearings.toml` and of the words that stand for others in it."""
+    return sha256(f"{sha256_of(_FILE)}{sha256_of(_MACROS)}".encode()).hexdigest()
 
 
 def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
@@ -203,7 +240,7 @@ def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
     poses = {side: ArmPose(**_tuples(pose)) for side, pose in sides.items() if pose is not None}
     keys = Keys(**_tuples(values["keys"])) if "keys" in values else None
     own = {key: value for key, value in values.items() if key not in ("arms", "keys", *WORDS)}
-    return Bearing(name, arms=poses, keys=keys, **_tuples(own))
+    return Bearing(name, arms=poses, keys=keys, load="loads" in values, **_tuples(own))
 
 
 def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:

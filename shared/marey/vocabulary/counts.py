@@ -7,6 +7,7 @@ from collections.abc import Iterator, Set
 from functools import lru_cache
 from itertools import pairwise
 
+from marey.vocabulary.blows import stated_blows
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import noun_forms
 from marey.vocabulary.lengths import TO_TWENTY
@@ -60,6 +61,8 @@ def stated_count(prompt: str, action: str) -> int | None:
         found = set(_of_things(text, _STEPS))
     else:
         found = {*_of_times(text), *_of_things(text, _nouns(action)), *_of_words_again(text, action)}
+    if action == "punch" and found and len(blows := stated_blows(text)) > 1:
+        found = {len(blows)}  # "jab, jab, cross": neither twice nor once
     return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
 
 

@@ -294,3 +294,23 @@ def test_a_motion_that_does_not_show_its_action_is_drawn_by_bundles_that_draw() 
     assert isinstance(made, AskedMotion)
     assert made.changes == {"drawn": "kneel"}
     assert isinstance(make(Body(4.0).joints(), ask("a man kneels")), RawMotion)
+
+
+def test_a_movement_whose_form_is_stated_is_drawn_by_models_that_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    prompt = "a man raises his right arm to shoulder height"
+    assert isinstance(make(raiser("right"), ask(prompt)), RawMotion)
+    monkeypatch.setattr(OneMotion, "bundle", SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True)))
+    made = make(raiser("right"), ask(prompt))
+    assert made.changes == {"drawn": "raise-arm"}
+    joints = HUMANML3D_263.decode(made.features)
+    assert abs((joints[:, 21, 1] - joints[:, 17, 1]).max()) < 0.14
+    assert make(raiser("right"), ask("her right arm stretched out to the side")).changes == {"drawn": "raise-arm"}
+
+
+def test_steps_aside_are_drawn_at_the_pace_that_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(OneMotion, "bundle", SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True)))
+    request = ask("a man steps to the left fast")
+    assert make(walker(), replace(request, open=True)).changes == {"drawn": "sidestep"}
+    fixed = make(walker(), replace(request, frames=80))
+    assert len(fixed.features) == 80
+    assert "speed" not in fixed.changes

@@ -66,6 +66,19 @@ def test_an_arm_throws_from_behind_the_shoulder_and_the_feet_stay(side: str) -> 
     assert RULES["throw"](Motion(joints, FPS), "left" if side == "right" else "right") < 0.6
 
 
+@pytest.mark.parametrize("lifted", [slice(0, 70), slice(0, 100)], ids=["at first", "all the time"])
+@pytest.mark.parametrize("action", ["kick-ball", "throw", "dodge"])
+def test_a_body_on_one_leg_is_not_what_a_movement_is_drawn_on(action: str, lifted: slice) -> None:
+    joints = STANDS.copy()
+    joints[lifted, 4, 2] += 0.3
+    joints[lifted, 7:11:3, 1] += 0.35
+    joints[70:, [20, 21], 2] += 0.2 * np.sin(np.arange(len(joints) - 70))[:, None]  # less calm on both feet
+    made = drawn_on(joints, action, side="right")
+    assert made[0, FEET[2:], 1].max() < 0.05
+    assert made[-1, FEET[2:], 1].max() < 0.05
+    assert np.abs(made[:, [7, 10]] - made[0, [7, 10]]).max() < 0.05, "the left foot stands"
+
+
 @pytest.mark.parametrize("action", ["kick-ball", "throw"])
 def test_nothing_is_drawn_without_time_for_it(action: str) -> None:
     short = LAYOUT.encode(Body(1.3).joints())

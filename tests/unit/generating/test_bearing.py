@@ -12,7 +12,16 @@ import pytest
 from marey.bundles import Bundle
 from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, with_bearing
 from marey.generation.export import finish
-from marey.generation.gaits import limping, skipping, staggering, tapping, with_high_knees
+from marey.generation.gaits import (
+    limping,
+    over_rope,
+    shuffling,
+    skipping,
+    staggering,
+    stomping,
+    tapping,
+    with_high_knees,
+)
 from marey.generation.port import MotionFeatures, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.motion.capsules import depth
@@ -102,6 +111,122 @@ def test_crossed_arms_are_held_all_along_in_front_of_the_chest() -> None:
     left, right = hands[:, 0, 0], hands[:, 1, 0]
     assert left.max() < 0.03  # over the middle, to the other side
     assert right.min() > -0.03
+
+
+def test_a_phone_comes_to_the_ear_and_goes_down_when_the_call_ends() -> None:
+    words = "answers a phone call, talks, and hangs up"
+    joints = drawn(standing(6.0), StatedBearing("phone-call", words=words))
+    away = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)
+    assert away.min() < 0.22
+    assert min(away[0], away[-1]) > 0.45
+    held = drawn(standing(6.0), StatedBearing("phone-call", words="talking on the phone"))
+    assert np.linalg.norm(held[:, 21] - held[:, HEAD], axis=1).max() < 0.25
+
+
+def test_a_suitcase_hangs_from_a_straight_arm_and_the_trunk_leans_away() -> None:
+    for side, wrist, elbow, shoulder in (("right", 21, 19, 17), ("left", 20, 18, 16)):
+        before, after = drawn(standing()), drawn(standing(), named("bag-carried", side))
+        bones = np.linalg.norm(after[:, [elbow, wrist]] - after[:, [shoulder, elbow]], axis=-1).sum(1)
+        assert (np.linalg.norm(after[:, wrist] - after[:, shoulder], axis=1) / bones).min() > 0.97
+        aside = (after[:, NECK, 0] - before[:, NECK, 0]).mean()
+        assert (aside > 0.02) if side == "right" else (aside < -0.02)  # +X is the left
+
+
+def test_a_box_is_held_before_the_belly_by_both_hands() -> None:
+    joints = drawn(walker(), named("box-carried"))
+    hands = joints[:, WRISTS] - joints[:, [PELVIS]]
+    assert hands[..., 1].min() > 0.1
+    assert hands[..., 1].max() < 0.32
+    assert hands[..., 2].min() > 0.15
+
+
+def test_who_carries_has_the_load_that_is_named_or_one_before_the_belly() -> None:
+    for prompt, name in (
+        ("a person walks with a load", "load"),
+        ("he carries a sack over his shoulder", "sack-carried"),
+    ):
+        request = Request(text=text_of(prompt, 8), seed=3)
+        (span,) = borne_spans(request, FPS, 80)
+        assert [each.name for each in span.stated] == [name]
+
+
+def gait(joints: np.ndarray, draws: Any, side: str = "") -> np.ndarray:
+    return draws(joints, LAYOUT, 0, len(joints), side, np.random.default_rng(1))
+
+
+def test_dragged_feet_stay_near_the_floor() -> None:
+    before = walker()
+    after = gait(before, shuffling)
+    assert np.ptp(after[10:-10, TOES, 1], axis=0).max() < 0.4 * np.ptp(before[10:-10, TOES, 1], axis=0).max()
+    np.testing.assert_allclose(after[:, PELVIS, [0, 2]], before[:, PELVIS, [0, 2]], atol=1e-6)
+
+
+def test_who_stomps_lifts_the_knees_and_drops_on_the_feet() -> None:
+    before = walker()
+    after = gait(before, stomping)
+    lifted = [each[:, [4, 5], 1].max(0) for each in (before, after)]
+    assert (lifted[1] - lifted[0]).min() > 0.08
+    assert (before[:, PELVIS, 1] - after[:, PELVIS, 1]).max() > 0.02
+
+
+def test_who_stands_stamps_with_the_foot_that_is_named_or_both() -> None:
+    before = standing()
+    one, both = gait(before, stomping, "left"), gait(before, stomping)
+    assert np.ptp(one[:, 7, 1]) > 0.1
+    assert np.ptp(one[:, 8, 1]) < 0.02
+    assert np.ptp(both[:, [7, 8], 1], axis=0).min() > 0.1
+    assert not ((both[:, 7, 1] > 0.25) & (both[:, 8, 1] > 0.25)).any()
+
+
+def test_who_skips_rope_leaves_the_floor_with_both_feet_over_and_over() -> None:
+    before = standing(5.0)
+    after = gait(before, over_rope)
+    up = (after[:, [7, 8], 1] - before[:, [7, 8], 1]).min(1)
+    assert 0.05 < up.max() < 0.15
+    leaves = np.flatnonzero((up[:-1] < 0.02) & (up[1:] >= 0.02))
+    assert 9 <= len(leaves) <= 13
+    np.testing.assert_allclose(after[:, TOES][..., [0, 2]], before[:, TOES][..., [0, 2]], atol=0.01)
+
+
+def test_who_stands_drunk_sways_on_feet_that_stay() -> None:
+    before = standing(6.0)
+    after = drawn(before, named("drunk"))
+    assert np.ptp(after[:, HEAD, 0]) > 0.15
+    assert np.ptp(after[20:-20, TOES][..., [0, 2]], axis=0).max() < 0.05
+
+
+def test_a_gait_is_drawn_once_on_the_side_that_is_named() -> None:
+    once, twice = drawn(walker(), named("limp", "left")), drawn(walker(), named("limp", "left"), named("injured"))
+    assert abs(once[:, PELVIS, 1].min() - twice[:, PELVIS, 1].min()) < 0.03
+
+
+def test_fingers_type_and_do_not_sweep() -> None:
+    joints = drawn(standing(), named("typing"))
+    hands = joints[:, WRISTS] - joints[:, [PELVIS]]
+    assert 0.01 < np.ptp(hands[20:], axis=0).max() < 0.06
+
+
+def test_sobs_heave_the_shoulders() -> None:
+    joints = drawn(standing(), named("face-covered"))
+    lifted = joints[:, SHOULDERS, 1].mean(1) - joints[:, NECK, 1]
+    assert np.ptp(lifted) > 0.02
+
+
+def test_what_is_worked_at_on_the_knees_begins_on_them() -> None:
+    made: MotionFeatures = OnceMade(standing(6.0))
+    spans = [BorneSpan(0, len(made.features), (named("lace-tying"),), action="kneel", seed=3)]
+    lean = pitch(LAYOUT.decode(borne(made, LAYOUT, spans)))
+    assert lean[:40].max() < 10
+    assert lean[80:].min() > 25
+
+
+def test_the_legs_of_who_kneels_stay_as_they_are() -> None:
+    joints = standing()
+    joints[:, 4, 0] += 0.05  # a knee beside the line that a solved one is on
+    made: MotionFeatures = OnceMade(joints)
+    spans = [BorneSpan(0, len(made.features), (named("rifle-aimed"),), action="kneel", seed=3)]
+    after = LAYOUT.decode(borne(made, LAYOUT, spans))
+    np.testing.assert_allclose(after[:, 4], LAYOUT.decode(made.features)[:, 4], atol=1e-3)
 
 
 def test_two_gestures_share_the_time() -> None:

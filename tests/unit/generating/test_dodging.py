@@ -61,7 +61,7 @@ def test_a_dodge_of_the_network_is_kept_where_the_feet_leave_their_place() -> No
 
 
 def test_a_body_that_walked_stands_in_place() -> None:
-    joints = calm(walker(5.0).astype(np.float64), FPS)
+    joints = calm(walker(5.0).astype(np.float64), FPS, np.random.default_rng(0))
     assert len(joints) == len(walker(5.0))
-    assert np.abs(joints[:, FEET] - joints[0, FEET]).max() == 0
+    assert np.abs(joints[:, FEET] - joints[0, FEET]).max() < 1e-9
     assert np.abs(joints - joints.mean(0)).max() <= 0.03 + 1e-9

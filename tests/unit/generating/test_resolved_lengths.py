@@ -44,6 +44,7 @@ def test_work_and_gestures_have_the_time_that_they_take(generator: Any) -> None:
 
     assert seconds("a man stands") == 2
     assert seconds("a man sweeps the floor") == WORK_S
+    assert seconds("a man answers the phone, talks and hangs up") == WORK_S
     assert seconds("a man swings a golf club") > 5
     assert seconds("a man shrugs") + 2 < seconds("a man shrugs and salutes") < 8
     assert resolve_request(generator, asked(generator, "a man sweeps the floor")).frames >= WORK_S * fps

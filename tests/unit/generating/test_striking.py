@@ -34,7 +34,7 @@ def hands(joints: np.ndarray) -> np.ndarray:
 
 def struck(joints: np.ndarray) -> list[int]:
     """The hand (0 = left) of each blow in its order: one that is far out ahead."""
-    out = hands(joints)[..., 2] > 0.38
+    out = hands(joints)[..., 2] > 0.34
     begun = [(frame, k) for k in (0, 1) for frame in np.flatnonzero(out[1:, k] & ~out[:-1, k])]
     return [k for _, k in sorted(begun)]
 
@@ -62,12 +62,19 @@ def test_a_row_is_in_the_order_of_the_prompt() -> None:
     assert struck(drawn("punch", "throws a jab, a cross and a left hook")) == [0, 1, 0]
     assert struck(drawn("punch", "a right hook, then a hook")) == [1, 0]
     assert struck(drawn("punch", "throws a single punch")) == [0]
+    assert struck(drawn("punch", "boxing: jab, jab, cross", count=2)) == [0, 0, 1]
+    assert struck(drawn("punch", "left, right, left")) == [0, 1, 0]
+    assert struck(drawn("punch", "right hook")) == [1]
     assert len(struck(drawn("punch", "punches the bag"))) >= 4
 
 
 def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     hook = hands(drawn("punch", "a right hook", side="right"))[:, 1]
-    assert np.ptp(hook[:, 0]) > 0.35
+    assert np.ptp(hook[:, 0]) > 0.6
+    assert hook[:, 1].max() > 0.12, "at the height of the head"
+    elbow = drawn("punch", "a right hook", side="right")[:, [17, 19, 21]]
+    bent = np.linalg.norm(elbow[:, 2] - elbow[:, 0], axis=-1)
+    assert bent[hook[:, 1] > 0.12].max() < 0.47, "the arm stays bent"
     uppercut = hands(drawn("punch", "a right uppercut", side="right"))[:, 1]
     assert uppercut[:, 1].min() < -0.2
     assert uppercut[:, 1].max() > 0.05
@@ -78,6 +85,23 @@ def test_the_feet_stay() -> None:
     assert np.abs(made - BEFORE[: len(made)])[:, LEGS].max() < 0.03
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_stated_row_is_punched_from_a_stance_and_ends_soon(seed: int) -> None:
+    turning = drawn_on(BEFORE, "punch", "boxing combo: left jab, right cross, left hook", seed=seed)
+    assert np.abs(turning - turning[0])[:, LEGS].max() < 0.01
+    assert turning[0, LEGS[0], 2] - turning[0, LEGS[2], 2] > 0.12, "the left foot is ahead"
+    last = np.flatnonzero(hands(turning)[..., 2].max(axis=1) > 0.34)[-1]
+    assert 0.5 < (len(turning) - last) / FPS < 1.6
+    fixed = drawn_features(LAYOUT.encode(BEFORE), LAYOUT, "punch", FineWish(None, "", "a jab and a cross", True), seed)
+    assert fixed is not None
+    assert len(fixed) == len(LAYOUT.encode(BEFORE))
+
+
+def test_feet_that_are_to_move_are_those_of_the_network() -> None:
+    made = drawn("punch", "steps forward with a jab and a cross")
+    assert np.abs(made - BEFORE[: len(made)])[:, LEGS].max() < 0.03
+
+
 def test_there_is_no_punch_without_time_for_it() -> None:
     short = LAYOUT.encode(Body(1.3).joints())
-    assert drawn_features(short, LAYOUT, "punch", FineWish(None, "", "an uppercut"), 1) is None
+    assert drawn_features(short, LAYOUT, "punch", FineWish(None, "", "an uppercut", fixed=True), 1) is None

@@ -21,6 +21,7 @@ from tests.support.drawn_motions import drawn_on
 FPS = HUMANML3D_263.fps
 STANDS = Body(5.0).joints()
 PELVIS, HEAD, CHEST, HIPS, NECK = 0, 15, 9, [1, 2], 12
+FEET = [7, 8, 10, 11]
 SEEDS = range(6)
 
 drawn = partial(drawn_on, STANDS)
@@ -53,6 +54,8 @@ def test_each_shows_its_action_on_the_floor_without_breaks(action: str, seed: in
         ("she trips and falls forward", -1),
         ("dies, falling face down", -1),
         ("drops to his knees and falls dead", -1),
+        ("death from the front", 1),
+        ("shot from behind", -1),
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
@@ -72,7 +75,9 @@ def test_a_fall_over_the_knees_kneels_first() -> None:
         assert kneels.sum() >= 4
 
 
-@pytest.mark.parametrize(("prompt", "way"), [("falls to the left", 1), ("falls over to the right side", -1)])
+@pytest.mark.parametrize(
+    ("prompt", "way"), [("falls to the left", 1), ("falls over to the right side", -1), ("death from the left", -1)]
+)
 def test_a_fall_goes_to_the_side_that_is_named(prompt: str, way: int) -> None:
     for seed in SEEDS:
         joints = drawn("die", prompt, seed=seed)
@@ -91,7 +96,8 @@ def test_the_wounded_are_hit_before_they_fall() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prompt", "forward"), [("a forward roll", 1), ("rolls backwards", -1), ("a combat roll", 1), ("a dive roll", 1)]
+    ("prompt", "forward"),
+    [("a forward roll", 1), ("rolls backwards", -1), ("rolls over his left shoulder", 1), ("a dive roll", 1)],
 )
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_roll_goes_where_its_words_say_and_ends_on_the_feet(prompt: str, forward: int, seed: int) -> None:
@@ -101,7 +107,15 @@ def test_a_roll_goes_where_its_words_say_and_ends_on_the_feet(prompt: str, forwa
     assert joints[:, HEAD, 1].min() < 0.35
 
 
-@pytest.mark.parametrize(("prompt", "way"), [("rolls to the left", 1), ("a sideways roll to the right", -1)])
+@pytest.mark.parametrize(
+    ("prompt", "way"),
+    [
+        ("rolls to the left", 1),
+        ("a sideways roll to the right", -1),
+        ("dodge roll to the left", 1),
+        ("combat roll, right", -1),
+    ],
+)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_roll_goes_to_the_side_that_is_named(prompt: str, way: int, seed: int) -> None:
     joints = drawn("roll", prompt, seed=seed)
@@ -138,6 +152,34 @@ def test_a_crawl_travels(prompt: str, forward: int) -> None:
         assert joints[:, HEAD, 1].max() < 0.8
 
 
+@pytest.mark.parametrize(
+    ("prompt", "forward"),
+    [
+        ("prone crawl under barbed wire", 1),
+        ("army crawl forward", 1),
+        ("commando crawl", 1),
+        ("a soldier crawls along on his elbows", 1),
+        ("belly crawl backwards", -1),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS[:3])
+def test_a_crawl_on_the_belly_stays_on_the_floor_and_travels(prompt: str, forward: int, seed: int) -> None:
+    joints = drawn("crawl", prompt, seed=seed)
+    assert forward * (joints[-1, PELVIS, 2] - joints[0, PELVIS, 2]) > 0.5
+    assert joints[:, PELVIS, 1].max() < 0.2
+    assert joints[:, CHEST, 1].max() < 0.3
+    assert joints[:, FEET, 1].max() < 0.12, "feet drag"
+    for limbs in ([4, 5], [20, 21]):
+        ahead = joints[:, limbs, 2] - joints[:, [PELVIS], 2]
+        assert np.ptp(ahead, axis=0).min() > 0.12
+        assert np.corrcoef(ahead.T)[0, 1] < -0.5, "left and right by turns"
+
+
+def test_a_crawl_on_hands_and_knees_stays_one() -> None:
+    for prompt in ("crawls forward", "a soldier crawls on his hands and knees"):
+        assert np.median(drawn("crawl", prompt)[:, PELVIS, 1]) > 0.4
+
+
 @pytest.mark.parametrize(("prompt", "faces"), [("lies down", 1), ("lies down on his stomach", -1)])
 def test_who_lies_down_lies_as_the_words_say(prompt: str, faces: int) -> None:
     for action in ("lie-down", "lie"):
@@ -153,6 +195,7 @@ def test_who_lies_down_lies_as_the_words_say(prompt: str, faces: int) -> None:
         ("lies face down", "stands up", -1),
         ("", "gets up from his stomach", -1),
         ("crawls forward", "stands up", -1),
+        ("army crawl", "stands up", -1),
     ],
 )
 def test_who_gets_up_begins_as_the_movement_before_ends(before: str, prompt: str, faces: int) -> None:
@@ -162,7 +205,7 @@ def test_who_gets_up_begins_as_the_movement_before_ends(before: str, prompt: str
     joints = HUMANML3D_263.decode(features).astype(np.float64)
     assert faces * front_of(joints)[0, 1] > 0.6
     assert joints[-1, HEAD, 1] > 1.4
-    assert (joints[0, PELVIS, 1] > 0.35) == ("crawl" in before)
+    assert (joints[0, PELVIS, 1] > 0.35) == (before == "crawls forward")
 
 
 def test_who_falls_and_then_rises_falls_so_that_it_can_be_gone_on_from() -> None:

@@ -27,6 +27,9 @@ def reading() -> TextPipeline:
         ("a person sits and thinks with his hand on his chin", "a person sits on a chair, a person sits"),
         ("a tired boxer throws a punch", "a person strikes with the fist, a tired boxer throws a punch"),  # not drawn
         ("an old chair falls over", "an old chair falls over"),
+        ("a man carries a heavy box to the door", "a person walks forward, a man walks to the door"),
+        ("a person walks with a load", "a person walks with a load"),
+        ("kneels on one knee and aims rifle", "a person kneels down, a person kneels on one knee"),
     ],
 )
 def test_the_model_reads_what_is_not_drawn(reading: TextPipeline, prompt: str, read: str) -> None:

@@ -139,3 +139,16 @@ def test_counterattacks_are_blows_and_ways_behind_an_angle_lead_ahead(prompt: st
 )
 def test_words_in_another_sense_are_known(action: str | None, prompt: str, other: bool) -> None:
     assert has_other_sense(action, prompt) == other
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("driving a car, both hands on the wheel", "driving a car"),
+        ("a man drives a truck with his hands on the steering wheel", "a man drives a truck"),
+        ("drives with both hands firmly on the wheel", "drives"),
+        ("puts his hands on the wheel", "puts his hands on the wheel"),
+    ],
+)
+def test_the_hands_of_a_driver_are_not_said(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read

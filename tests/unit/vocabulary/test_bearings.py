@@ -14,6 +14,7 @@ from marey.vocabulary.bearings import (
     ARMS_FREE,
     ARMS_HELD,
     DRAWN_AS,
+    DRAWN_ON,
     UPRIGHT,
     StatedBearing,
     bearing_words,
@@ -22,6 +23,8 @@ from marey.vocabulary.bearings import (
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import ActionLists, every_action, match_scope
 from tests.support.marey import REPOSITORY
+
+DRAWN = {**DRAWN_AS, **DRAWN_ON}
 
 
 @pytest.mark.parametrize(
@@ -53,6 +56,52 @@ from tests.support.marey import REPOSITORY
         ("a person walks while talking on the phone", "a person walks", ["phone-call"]),
         ("a drunk staggers home", "a person walks home", ["drunk"]),
         ("he is drunk and walks home", "walks home", ["drunk"]),
+        ("walks with rifle at ready", "walks", ["rifle-ready"]),
+        ("a guard stands with a rifle in his hands", "a guard stands", ["rifle-ready"]),
+        ("kneels on one knee and aims rifle", "kneels on one knee", ["rifle-aimed"]),
+        ("walks forward aiming a rifle", "walks forward", ["rifle-aimed"]),
+        ("crouches and points her pistol at the door", "crouches", ["pistol-aimed"]),
+        ("holds a pistol with both hands, low ready", "", ["pistol-low"]),
+        ("walks carrying a suitcase in right hand", "walks with a load", ["bag-carried"]),
+        ("a man carrying a suitcase", "a man walking with a load", ["bag-carried"]),
+        ("a man carrying a suitcase walks away", "a man with a load walks away", ["bag-carried"]),
+        ("carries two buckets of water", "walks with a load", ["bags-carried"]),
+        ("carries a heavy crate in front of him while walking", "walks with a load", ["box-carried"]),
+        ("stands holding a box", "stands", ["box-carried"]),
+        ("picks up a box and carries it away", "picks up a box and walks with a load", ["box-carried"]),
+        ("carries a sack of rice over his shoulder", "walks with a load", ["sack-carried"]),
+        ("a waiter carries a tray of drinks to the table", "a waiter walks with a load to the table", ["tray-carried"]),
+        ("she holds a baby in her arms", "", ["baby-held"]),
+        ("answers a phone call, talks, and hangs up", "", ["phone-call"]),
+        ("his phone rings, he answers, talks for a while and puts it away", "", ["phone-call"]),
+        ("limping, right leg is hurt", "walking", ["limp"]),
+        ("walks as if his left ankle is sprained", "walks", ["limp"]),
+        ("walks, dragging his left leg behind him", "walks", ["limp"]),
+        ("a man who broke his leg walks home", "a man walks home", ["limp"]),
+        ("walk limp left", "walk", ["limp"]),
+        ("he is limping because of a wounded right thigh", "he is walking", ["limp"]),
+        ("walk injured leg left", "walk", ["limp"]),
+        ("hobbles on crutches", "walks", ["limp", "cane"]),
+        ("a girl carries a bucket of water with both hands", "a girl walks with a load", ["box-carried"]),
+        ("walks holding a tray with both hands", "walks", ["box-carried"]),
+        ("a mother carries her child on her hip", "a mother walks with a load", ["baby-held"]),
+        ("idle injured", "idle", ["injured"]),
+        ("an angry person stomps forward", "a person walks forward", ["angry", "stomping"]),
+        ("dragging his feet", "walking", ["foot-dragging"]),
+        ("walks dragging her feet", "walks", ["foot-dragging"]),
+        ("old woman walks with a cane", "woman walks", ["old", "cane"]),
+        ("reload pistol", "", ["reloading"]),
+        ("a soldier changes magazines", "", ["reloading"]),
+        ("tennis serve", "", ["tennis-serve"]),
+        ("she serves a tennis ball", "", ["tennis-serve"]),
+        ("skipping rope", "", ["rope-skipping"]),
+        ("a girl jumps rope", "", ["rope-skipping"]),
+        ("a boxer skips with a rope", "", ["rope-skipping"]),
+        ("opens a jar, struggling with the lid", "", ["jar-opened"]),
+        ("kneels down and ties his shoe", "kneels down", ["lace-tying"]),
+        ("sitting at a desk typing on a keyboard", "sitting at a desk", ["typing"]),
+        ("laughing hard, slapping the knee", "laughing hard", ["knee-slapped"]),
+        ("sits at a table and plays cards", "sits at a table", ["card-playing"]),
     ],
 )
 def test_what_a_prompt_says_beside_its_bearing(prompt: str, left: str, names: list[str]) -> None:
@@ -95,6 +144,15 @@ def test_what_a_prompt_says_beside_its_bearing(prompt: str, left: str, names: li
         "holds a golf club",
         "listens to the music",
         "a cook walks in",
+        "aims a gun",
+        "walks in and aims a gun",
+        "holds a rifle",
+        "a man stands with a hand on his shoulder",
+        "picks up the phone",
+        "holds the box above his head",
+        "carries a basket on her head",
+        "holds a dog on a leash",
+        "walks with his arm hurt",
         "does a sweeping kick",
         "a karate chop",
         "looks at a photograph",
@@ -114,12 +172,24 @@ def test_other_words_are_left_alone(prompt: str) -> None:
         ("walks favoring his left leg", "right"),
         ("salutes with his left hand", "left"),
         ("a soldier salutes", ""),
+        ("limping, right leg is hurt", "right"),
+        ("walk limp left", "left"),
+        ("carries a bucket in her left hand", "left"),
     ],
 )
 def test_the_side_of_a_bearing(prompt: str, side: str) -> None:
     found = stated_bearings(prompt)
     assert len(found) == 1
     assert found[0].side in (side, "right" if "favoring" in prompt else side)
+
+
+def test_arms_are_brought_where_a_verb_says_so_and_come_down_where_another_does() -> None:
+    (answers,) = stated_bearings("answers a phone call, talks, and hangs up")
+    assert answers.is_brought
+    assert answers.ends
+    (talks,) = stated_bearings("walks while talking on the phone")
+    assert not talks.is_brought
+    assert not talks.ends
 
 
 def test_what_is_said_of_the_person_holds_for_all_movements() -> None:
@@ -158,7 +228,7 @@ def test_characters_that_are_left_know_their_place(words: list[str]) -> None:
 
 def test_every_bearing_has_words_and_a_pose_within_what_a_body_can() -> None:
     for name, words in bearing_words():
-        assert bool(words) != (name in DRAWN_AS.values()), name
+        assert bool(words) != (name in DRAWN.values()), name
         assert re.fullmatch(r"[a-z-]+", name)
     for bearing in load_bearings().values():
         assert bearing.arms or bearing.trunk or bearing.gait or bearing.shrug, bearing.id
@@ -218,7 +288,7 @@ def test_the_documentation_lists_every_bearing() -> None:
     table = page.partition("| bearing |")[2].partition("\n\n")[0]
     rows = [row for row in table.splitlines() if row.startswith("| `")]
     assert sorted(name for row in rows for name in re.findall(r"`([a-z-]+)`", row)) == sorted(
-        set(load_bearings()) - set(DRAWN_AS.values())
+        set(load_bearings()) - set(DRAWN.values())
     )
     for row in rows:
         names = set(re.findall(r"`([a-z-]+)`", row))

@@ -8,7 +8,8 @@ import numpy as np
 
 from marey.drawing.gesture import BOTH, SIDES, Gesture
 from marey.drawing.parts import GesturePace, arms_of, drawn_arm, respond
-from marey.posing.standing import ARMS, StandingBody, swings, swung
+from marey.posing.limbs import FPS
+from marey.posing.standing import ARMS, StandingBody, envelope, swings, swung
 
 _WAVES = {
     "wave-high": {"upper": ((20, 100), (5, 60)), "fore": ((30, 90), (72, 88)), "swing": (14, 34)},
@@ -122,3 +123,33 @@ def clap(rng: random.Random) -> Gesture:
 
     kinds = ("clap-high" if high else "clap", *([f"clap-{tempo}"] if tempo else []))
     return Gesture(pace.total(rng), kinds, change, BOTH)
+
+
+_APART, _TOGETHER = (0.2, 0.28), 0.05
+"""Metres of each hand from the middle of the body between claps, and when they meet."""
+_CLAPS_HZ = (1.8, 2.3)
+
+
+def clap_times(rng: random.Random, count: int, *, high: bool = False) -> Gesture:
+    """Hands that go up before the chest or over the head, meet so many times, and come down.
+
+    Args:
+        rng: decides the rest.
+        count: of the claps.
+        high: over the head.
+    """
+    rate = rng.uniform(*_CLAPS_HZ)
+    start, rise, fall = rng.uniform(0.2, 0.5), rng.uniform(0.45, 0.6), rng.uniform(0.5, 0.7)
+    above = rng.uniform(0.42, 0.48) if high else rng.uniform(-0.2, -0.08)
+    ahead, apart = rng.uniform(0.1, 0.16) if high else rng.uniform(0.28, 0.34), rng.uniform(*_APART)
+    seconds = start + rise + count / rate + fall + rng.uniform(0.4, 0.7)
+
+    def change(body: StandingBody) -> None:
+        way = envelope(len(body.joints), start, rise, count / rate, fall)
+        phase = np.clip((np.arange(len(way)) / FPS - start - rise) * rate, 0.0, count)
+        gap = _TOGETHER + (apart - _TOGETHER) * (0.5 + 0.5 * np.cos(2 * np.pi * phase))
+        for side in SIDES:
+            point = np.stack([gap, np.full(len(gap), above), np.full(len(gap), ahead)], axis=-1)
+            body.hold(side, way, point, lag=0.0)
+
+    return Gesture(seconds, ("clap-times",), change, BOTH, count)

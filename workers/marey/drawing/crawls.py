@@ -1,9 +1,9 @@
-"""Bodies that crawl on hands and knees."""
+"""Bodies that crawl on hands and knees, or on the belly."""
 
 from __future__ import annotations
 
 import random
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
@@ -90,3 +90,79 @@ def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None
     untrue = "belly|army|low crawl|forward|along" if back else "belly|army|low crawl"
     gesture = done.gesture(rng, kinds)
     return replace(gesture, seconds=done.times[-1], untrue=untrue)
+
+
+_LOW_PELVIS = 0.14
+"""Metres of the hips over the floor in a crawl on the belly."""
+_LOW_SHOULDERS = 0.44
+"""Metres of the shoulders ahead of the hips."""
+_LOW_PACES = {"slow": (1.9, 2.4), "": (1.35, 1.75), "quick": (1.0, 1.2)}
+"""Seconds in which each limb moves once."""
+_BELOW: Point = (0.9, -0.5, -0.5)
+"""Where the elbow of an arm on the floor points: outward, up and forward."""
+
+
+@dataclass(frozen=True)
+class _LowForm:
+    """The part of a crawl on the belly that stays: how wide hands and feet are put, metres, and the angles of the trunk
+    and the neck, degrees."""
+
+    hands: float
+    feet: float
+    raised: float
+    look: float
+    sway: float
+
+
+def low_crawl(rng: random.Random, *, back: bool = False, seconds: float | None = None) -> Gesture:
+    """Flat on the floor: the forearm of one side and the knee of the other move ahead, then the body is drawn after.
+
+    Args:
+        rng: decides everything that is not given.
+        back: backward.
+        seconds: for about how long.
+    """
+    tempo = rng.choice(["slow", "", "", "quick"])
+    period = rng.uniform(*_LOW_PACES[tempo])
+    stride = rng.uniform(0.5, 0.62) * (-0.6 if back else 1.0)
+    form = _LowForm(
+        rng.uniform(0.16, 0.22), rng.uniform(0.1, 0.15), rng.uniform(14, 20), rng.uniform(-44, -34), rng.uniform(7, 12)
+    )
+    cycles = max(2, round((seconds or rng.uniform(4.0, 7.0)) / period))
+    side = rng.choice(SIDES)
+    other = {LEFT: RIGHT, RIGHT: LEFT}[side]
+    quarter = 0.25 * stride
+    hands, feet = {side: -quarter, other: quarter}, {side: quarter, other: -quarter}
+    where = 0.0
+    done = Sequel([0.0], [_flat(form, where, hands, feet, "")])
+    for k in range(2 * cycles):
+        moves, stays = (side, other) if k % 2 == 0 else (other, side)
+        halfway = {moves: hands[moves] + 0.5 * stride, stays: hands[stays]}
+        drawn_up = {stays: feet[stays] + 0.5 * stride, moves: feet[moves]}
+        done.then(0.25 * period, _flat(form, where + quarter, halfway, drawn_up, moves))
+        hands, feet = {**hands, moves: hands[moves] + stride}, {**feet, stays: feet[stays] + stride}
+        where += 0.5 * stride
+        done.then(0.25 * period, _flat(form, where, hands, feet, ""))
+    gesture = done.gesture(rng, ["crawl-low"])
+    return replace(gesture, seconds=done.times[-1])
+
+
+def _flat(form: _LowForm, where: float, hands: dict[str, float], feet: dict[str, float], lifted: str) -> Posture:
+    """A body on its belly with its hips at a place along the way, and each limb at its own; `lifted`: the side of the
+    hand that moves, if any."""
+    lean = {LEFT: 1.0, RIGHT: -1.0}.get(lifted, 0.0) * form.sway
+    places, shanks, knees = {}, {}, dict[str, Point]()
+    for side in SIDES:
+        ahead = hands[side] + _LOW_SHOULDERS + 0.25
+        places[side] = HandPlace((form.hands, 0.04 + 0.04 * (side == lifted), ahead), "floor", _BELOW)
+        drawn_up = min(max((feet[side] - where + 0.16) / 0.32, 0.0), 1.0)
+        wide = form.feet + 0.16 * drawn_up
+        shanks[side] = FootPlace((wide, 0.05, feet[side] - 0.64), (0.45 + 0.4 * drawn_up, -0.12, -0.8), drags=True)
+        knees[side] = (1.0, -0.12, 0.3)
+    posture = Posture(
+        (0.012 * lean / form.sway, _LOW_PELVIS, where),
+        (86, 0.5 * lean, 0.5 * lean),
+        (-form.raised, -0.6 * lean, 0.7 * lean),
+        (form.look, 0, -0.8 * lean),
+    )
+    return replace(posture, hands=places, feet=shanks, knees=knees)

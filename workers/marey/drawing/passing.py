@@ -141,7 +141,7 @@ class _Posing:
             places = np.array([foot.at + (raised if foot.toes else flat) if foot else rest for foot in feet])
             free = self._track([[0.0 if foot else 1.0] for foot in feet])
             put = self._track(places, _SMOOTH_FEET) + free * (own - rest)
-            put[:, 1] += self._steps(places)
+            put[:, 1] += self._steps(places, [foot is not None and foot.drags for foot in feet])
             toes = self._track([normalize(np.array(foot.toes if foot and foot.toes else towards)) for foot in feet])
             toes = normalize(toes + free * (normalize(pointed) - normalize(towards)))
             joints[:, ankle] = self.origin + self._world(put, side)
@@ -161,11 +161,11 @@ class _Posing:
         pointed = (toe - ankle) * np.array([1.0, 0.0, 1.0])
         return self._floor(self.origin + (aside + _STRAIGHT * normalize(pointed)).mean(0)) * self._outward(side)
 
-    def _steps(self, places: Array) -> Array:
-        """Extra height (T,) of a foot that is put elsewhere on the floor."""
+    def _steps(self, places: Array, drags: Sequence[bool]) -> Array:
+        """Extra height (T,) of a foot that is put elsewhere on the floor, if it does not drag there."""
         lift = np.zeros(len(self.t))
         for k, far in enumerate(np.linalg.norm(np.diff(places, axis=0)[:, [0, 2]], axis=-1)):
-            if far > _STEP and max(places[k, 1], places[k + 1, 1]) < _FLOOR:
+            if far > _STEP and not drags[k + 1] and max(places[k, 1], places[k + 1, 1]) < _FLOOR:
                 within = np.clip((self.t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0)
                 lift += min(0.12, 0.05 + 0.2 * far) * np.sin(np.pi * within)
         return blurred(lift, _SMOOTH_FEET)

@@ -34,10 +34,12 @@ class HandPlace:
 @dataclass(frozen=True)
 class FootPlace:
     """Where an ankle is put and where its toes point: outward, up and forward, over the floor. Without a direction the
-    foot is flat, as that of the idle, and at 0.07 m it stands."""
+    foot is flat, as that of the idle, and at 0.07 m it stands. One that drags slides over the floor instead of making
+    a step there."""
 
     at: Point
     toes: Point | None = None
+    drags: bool = False
 
 
 @dataclass(frozen=True)

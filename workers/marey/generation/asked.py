@@ -22,8 +22,10 @@ from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
+from marey.generation.raising import stated_action
 from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
+from marey.generation.stated import AT_PACE, stated_features
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.timed import cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -113,6 +115,8 @@ class _Wish:
         text = request.text
         steps = wanted_of(text.actions or (text.rewritten,))
         action = _action_of(text, steps) or _row_of_blows(steps or ())
+        if action in ("", "idle") and (steps is None or action):
+            action = stated_action(text.said) or action
         prompt, gaze = text.said, stated_gaze(text.said)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
@@ -207,15 +211,24 @@ def _as_asked(
     if _is_better_mirrored(features, layout, wish) if one_side else wish.action in ALIKE and request.seed % 2:
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
+    stated = None
     if layout.skeleton.name == HUMANML3D.name:
-        drawn = _drawn(features, layout, wish, request, redraws=redraws)
+        stated = _stated(features, layout, wish, request) if redraws else None
+        drawn = _drawn(features, layout, wish, request, redraws=redraws) if stated is None else stated
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
-        for change in (_as_often, _turned, _on_floor, _ended):
+        for change in (_as_often, _turned, _on_floor, _ended) if stated is None else ():
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
-    features = _retimed(features, layout, wish, fixed, changes)
+    if stated is None or wish.action not in AT_PACE:
+        features = _retimed(features, layout, wish, fixed, changes)
     return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+
+
+def _stated(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
+    """Return the movement whose form the prompt states, drawn; None if it states none."""
+    frames = (request.frames if wish.action in AT_PACE else None) or len(features)
+    return stated_features(layout, wish.action, wish.fine(request), frames, request.seed)
 
 
 def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request, *, redraws: bool) -> Float32 | None:

@@ -81,7 +81,7 @@ def _begun(
     side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT, RIGHT]))
     start = float(rng.uniform(*early)) * left
     times = start + np.concatenate([[0.0], np.cumsum(parts)])
-    return side, StandingBody(calm(joints, fps)), np.arange(len(joints)) / fps, times
+    return side, StandingBody(calm(joints, fps, rng)), np.arange(len(joints)) / fps, times
 
 
 def kicks_well(joints: Array, fps: float, wish: FineWish) -> bool:

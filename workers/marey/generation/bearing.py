@@ -23,17 +23,31 @@ from marey.generation.port import MotionFeatures, Request
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.standing import ARMS, LEFT, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
+from marey.posing.standing import ARMS, LEFT, LEGS, NECK, OTHER_SIDE, RIGHT, StandingBody, envelope, way_through
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.bearings import DRAWN_AS, ArmPose, Bearing, Keys, StatedBearing, Vector, load_bearings
+from marey.vocabulary.bearings import (
+    DRAWN_AS,
+    DRAWN_ON,
+    ArmPose,
+    Bearing,
+    Gait,
+    Keys,
+    StatedBearing,
+    Vector,
+    load_bearings,
+)
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
 
+_ACTS = {**DRAWN_AS, **DRAWN_ON}
+_LEG_JOINTS = [joint for leg in LEGS.values() for joint in leg]
 BEARING = "bearing"
 """Key of a manifest, and of the record of a row of a timeline."""
 PASSES_S = 0.25
 """Standard deviation of the filter by which a body passes into a bearing in the middle of a motion, seconds."""
+BROUGHT_S = 0.8
+"""Seconds before arms are brought to their place, and after they have left it."""
 SWING_S = 0.5
 """The same of the filter that leaves an arm's way and takes out its swing."""
 BEGINS_S, LATEST_S, FALL = 0.4, 1.1, 1.15
@@ -101,14 +115,14 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         return []
     if request.timeline is None:
         action = action_of(request.text)
-        stated = fitting([*stated_bearings(request.text.said), *_drawn_as(action)], action)
+        stated = fitting(_with_drawn(stated_bearings(request.text.said), action), action)
         return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
     whole = [each for each in stated_bearings(request.text.said) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
         action, own = action_of(row.text), stated_bearings(row.text.said)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
-        stated = fitting([*whole, *kept, *own, *_drawn_as(action)], action)
+        stated = fitting(_with_drawn([*whole, *kept, *own], action), action)
         if request.is_sequence:
             carried = [each for each in (*kept, *own) if each in stated and each.bearing.lasts]
         if stated:
@@ -117,14 +131,20 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
     return found
 
 
+def _with_drawn(stated: Sequence[StatedBearing], action: str) -> list[StatedBearing]:
+    """Return bearings with the one that an action is drawn as; a load that the prompt names takes its place."""
+    names_load = action in DRAWN_ON and any(each.bearing.load for each in stated)
+    return [*stated, *([] if names_load else _drawn_as(action))]
+
+
 def _drawn_as(action: str) -> list[StatedBearing]:
-    """Return the gesture that an action is drawn as, in a list; an empty one if a network shows it."""
-    return [StatedBearing(DRAWN_AS[action])] if action in DRAWN_AS else []
+    """Return the bearing that an action is drawn as, in a list; an empty one if a network shows it."""
+    return [StatedBearing(_ACTS[action])] if action in _ACTS else []
 
 
 def actions_alone(spans: Sequence[BorneSpan]) -> list[BorneSpan]:
     """Return the parts of a motion whose action itself is drawn, with nothing but that."""
-    return [replace(span, stated=tuple(_drawn_as(span.action))) for span in spans if span.action in DRAWN_AS]
+    return [replace(span, stated=tuple(_drawn_as(span.action))) for span in spans if span.action in _ACTS]
 
 
 def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
@@ -154,13 +174,24 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
     joints = layout.decode(features).astype(np.float64)
     for span in spans:
         rng = np.random.default_rng([span.seed, span.begin])
-        for each in span.stated:
-            if each.bearing.gait and each.shown_in(span.action) == "body":
-                joints = GAITS[each.bearing.gait](joints, layout, span.begin, span.end, each.side, rng)
+        for gait, side in _gaits_of(span).items():
+            joints = GAITS[gait](joints, layout, span.begin, span.end, side, rng)
     body = StandingBody(joints)
     for stated, ways, rng in _drawn(spans, len(features), layout.fps):
         _Drawing(body, stated, ways, layout.fps, rng).draw()
-    return encode_all(layout, body.solved())
+    drawn = body.solved()
+    if not any(each.shown_in(span.action) == "body" for span in spans for each in span.stated):
+        drawn[:, _LEG_JOINTS] = joints[:, _LEG_JOINTS]  # solved knees of who kneels go through the floor
+    return encode_all(layout, drawn)
+
+
+def _gaits_of(span: BorneSpan) -> dict[Gait, str]:
+    """Return the gaits of a part of a motion, each once, and the side that its prompt names."""
+    gaits: dict[Gait, str] = {}
+    for each in span.stated:
+        if (gait := each.bearing.gait) and each.shown_in(span.action) == "body":
+            gaits[gait] = each.side or gaits.get(gait, "")
+    return gaits
 
 
 def _drawn(
@@ -179,12 +210,28 @@ def _drawn(
             continue
         held = {"body": np.zeros(frames), "upper": np.zeros(frames), "trunk": np.zeros(frames)}
         for span, each in having:
-            held[each.shown_in(span.action) or "trunk"][span.begin : span.end] = 1.0
+            begin, end = _held_in(span, each, fps, goes_on=any(other.end == span.begin for other, _ in having))
+            held[each.shown_in(span.action) or "trunk"][begin:end] = 1.0
         legs, arms, trunk = (
             np.clip(smooth(mask, PASSES_S, fps), 0.0, 1.0)
             for mask in (held["body"], held["body"] + held["upper"], held["body"] + held["upper"] + held["trunk"])
         )
         yield names[name], _Ways(trunk, arms, legs), rng
+
+
+def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: bool) -> tuple[int, int]:
+    """Return the first frame in which a bearing is held in a part of a motion, and the one after the last: arms that
+    are brought to their place come there after a moment, or what is done first, and those that come down do so before
+    the end. `goes_on`: it is held in the part before."""
+    frames, moment = span.end - span.begin, round(BROUGHT_S * fps)
+    begin, end = span.begin, span.end
+    if span.action in MOVES_FIRST and (stated.is_brought or stated.bearing.work):
+        begin += round(LATE * frames)
+    elif stated.is_brought and not goes_on:
+        begin += min(moment, frames // 2)
+    if stated.ends:
+        end -= min(moment + round(PASSES_S * fps), frames // 4)
+    return begin, end
 
 
 def _once(span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: np.random.Generator) -> Array:
@@ -232,7 +279,11 @@ class _Drawing:
         if keys.twist:
             body.lean((-1.0 if self._is_exchanged else 1.0) * self._keyed(keys.twist) * way, "up")
         if bearing.heave:
-            body.lean(bearing.heave * way * self._swung(bearing.heave_hz), "left")
+            heave = self._swung(bearing.heave_hz)
+            body.lean(bearing.heave * way * heave, "left")
+            body.shrug(bearing.sob * way * heave)
+        if bearing.aside:
+            body.lean((1.0 if LEFT in self._arms else -1.0) * bearing.aside * legs, "forward")
         if bearing.roll:
             aside = self._swung(bearing.roll_hz) if bearing.roll_hz else self._steps()
             body.lean(bearing.roll * legs * aside, "forward")

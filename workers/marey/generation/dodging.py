@@ -42,7 +42,7 @@ def dodges_well(joints: Array, fps: float, wish: FineWish) -> bool:
 
 def dodged(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
     """Return joints (T, 22, 3) of a body that stands and dodges; None if there is no time for it."""
-    body = StandingBody(calm(joints, fps))
+    body = StandingBody(calm(joints, fps, rng))
     text = wish.prompt.lower()
     side = wish.side or str(rng.choice([LEFT, RIGHT]))
     ways = list(_ways(len(joints) / fps, wish.count, rng))

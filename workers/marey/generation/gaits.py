@@ -1,4 +1,5 @@
-"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees and skips; and a foot that taps.
+"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps and feet that are
+dragged; and, drawn on a body that stands, a foot that taps and hops over a rope.
 
 A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
 slower. Frames are played at other times, so standing feet stay. Knees are lifted while their feet pass the other ones;
@@ -29,14 +30,30 @@ HURRIES, LINGERS = 0.55, 0.22
 """By how much the time of a limp runs faster over the leg that hurts, and slower over the other."""
 DIP, ASIDE, AHEAD = 0.045, 9.0, 7.0
 """Metres by which the hips sink over the leg that hurts, and degrees by which the trunk leans to it, and forward."""
-WEAVES, WEAVES_HZ = 30.0, (0.2, 0.28)
+WEAVES, WEAVES_HZ = 46.0, (0.2, 0.28)
 """Degrees by which a staggering body leaves its way to each side, and how often a second."""
-UNEVEN, UNEVEN_HZ = 0.28, 0.55
+WEAVES_AT = 0.4
+"""Metres a second from which on it does so in full: who stands would slide on the feet."""
+UNEVEN, UNEVEN_HZ = 0.5, 0.5
 """By how much its time runs faster and slower, and how often a second."""
-WANDERS = 0.05
-"""Metres by which its hips go to the sides of its feet."""
-KNEE_UP, KNEE_SKIPS = 78.0, 58.0
-"""Degrees of a lifted thigh from the vertical: in a march with high knees, and in a skip."""
+WANDERS, ROCKS = 0.09, 0.05
+"""Metres by which its hips go to the sides of its feet, and to and fro."""
+LURCHES, LURCH_S, LURCH_EVERY = (11.0, 0.05), 0.22, (1.6, 2.6)
+"""Degrees by which its trunk falls forward as it loses its balance, and metres by which it sinks; how long that takes
+(standard deviation), and seconds from one to the next."""
+WIDE = 0.045
+"""Metres by which each of its feet is set further out."""
+KNEE_UP, KNEE_SKIPS, KNEE_STOMPS = 78.0, 58.0, 64.0
+"""Degrees of a lifted thigh from the vertical: in a march with high knees, a skip, and a stomp."""
+STOMPS, STOMP_FALLS_S, STAMP_S = 0.05, 0.25, 0.75
+"""Metres by which the hips of a stomping body drop where a foot comes down, seconds in which it does so, and seconds
+from one stamp of a body that stands to the next."""
+DRAGS, DRAGS_LOW = 0.12, 0.045
+"""Share that is left of the height to which a dragged foot rises, and metres by which the hips sink for it."""
+ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.085, 0.035
+"""Seconds of a hop over a rope, the share of them in the air, and metres by which the body rises, and sinks between."""
+TOES_DOWN = 0.025
+"""Metres by which the toes of who hops hang below where they stand."""
 SHANK_BACK = 14.0
 """Degrees by which the shank below it hangs back."""
 APART = 0.03
@@ -83,12 +100,35 @@ def staggering(
     inside, time = _inside(len(joints), begin, end, layout.fps), np.arange(len(joints)) / layout.fps
     hz, phase = rng.uniform(*WEAVES_HZ), rng.uniform(0, 2 * np.pi)
     natural = natural_course(joints, layout.skeleton, layout.fps)
-    weaves = np.radians(WEAVES) * inside * np.sin(2 * np.pi * hz * time + phase)
+    weaves = (
+        np.radians(WEAVES)
+        * inside
+        * np.clip(_speed(joints, layout.fps) / WEAVES_AT, 0.0, 1.0)
+        * np.sin(2 * np.pi * hz * time + phase)
+    )
     woven = bent_along(joints, layout, natural, natural.facing(natural.headings + weaves))
     body = StandingBody(woven)
-    body.shift(np.zeros(len(time)), left=WANDERS * inside * np.sin(2 * np.pi * 1.3 * hz * time + phase))
+    lurch = inside * _lurches(time, rng)
+    for leg, (_, _, ankle, toe) in LEGS.items():
+        out = np.stack([WIDE * inside, np.zeros_like(time), np.zeros_like(time)], axis=-1)
+        body.joints[:, [ankle, toe]] += body.world(out, leg)[:, None]
+    body.shift(
+        -LURCHES[1] * lurch,
+        ROCKS * inside * np.sin(2 * np.pi * 1.7 * hz * time + 2 * phase),
+        WANDERS * inside * np.sin(2 * np.pi * 1.3 * hz * time + phase),
+    )
+    body.lean(LURCHES[0] * lurch, "left")
     rate = 1.0 + UNEVEN * inside * np.sin(2 * np.pi * UNEVEN_HZ * time + rng.uniform(0, 2 * np.pi))
     return _retimed(body.solved(), rate, begin, end)
+
+
+def _lurches(time: Array, rng: np.random.Generator) -> Array:
+    """Return 0 to 1 (T,): how much a body has lost its balance."""
+    found, at = np.zeros_like(time), float(rng.uniform(0.9, 1.8))
+    while at < time[-1]:
+        found += np.exp(-0.5 * ((time - at) / LURCH_S) ** 2)
+        at += float(rng.uniform(*LURCH_EVERY))
+    return np.minimum(found, 1.0)
 
 
 def with_high_knees(
@@ -96,22 +136,76 @@ def with_high_knees(
 ) -> Array:
     """Return joints (T, 22, 3) of a walk that lifts its knees high in the frames `begin` to `end`; see `limping`."""
     del side, rng  # both knees, all the same
-    return _knees_lifted(joints, layout, begin, end, KNEE_UP, 0.0)
+    lifts = _lifts(joints, layout.fps, _inside(len(joints), begin, end, layout.fps))
+    return _knees_lifted(joints, lifts, KNEE_UP, 0.0)
 
 
 def skipping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
     """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` skip; see `limping`."""
     del side, rng
-    return _knees_lifted(joints, layout, begin, end, KNEE_SKIPS, HOPS)
+    lifts = _lifts(joints, layout.fps, _inside(len(joints), begin, end, layout.fps))
+    return _knees_lifted(joints, lifts, KNEE_SKIPS, HOPS)
 
 
-def _knees_lifted(joints: Array, layout: FeatureLayout, begin: int, end: int, degrees: float, hops: float) -> Array:
+def stomping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk that stomps in the frames `begin` to `end`, or of a body that stands and
+    stamps with its feet in turn, or that of the `side`; see `limping`."""
+    fps, inside = layout.fps, _inside(len(joints), begin, end, layout.fps)
+    goes = np.clip(smooth((_speed(joints, fps) > STILL).astype(float), 0.15, fps), 0.0, 1.0)
+    lifts = {each: goes * lift for each, lift in _lifts(joints, fps, inside).items()}
+    rounds = np.arange(len(joints)) / fps / STAMP_S + rng.uniform()
+    for each in [side] if side in LEGS else LEGS:
+        its = (rounds.astype(int) % 2 == list(LEGS).index(each)) | (side in LEGS)
+        lifts[each] = lifts[each] + (1.0 - goes) * inside * its * np.sin(np.pi * np.minimum(rounds % 1.0 / 0.6, 1.0))
+    body = StandingBody(_knees_lifted(joints, lifts, KNEE_STOMPS, 0.0))
+    falls = np.maximum(*(-np.gradient(lift) * fps * STOMP_FALLS_S for lift in lifts.values()))
+    body.shift(-STOMPS * inside * np.clip(smooth(falls, 0.05, fps), 0.0, 1.0))
+    return body.solved()
+
+
+def shuffling(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk whose feet stay near the floor in the frames `begin` to `end`; see
+    `limping`."""
+    del side, rng
+    moved, inside = joints.copy(), _inside(len(joints), begin, end, layout.fps)[:, None]
+    for _, _, ankle, toe in LEGS.values():
+        heights = moved[:, [ankle, toe], 1]
+        stands = np.percentile(heights, 10, axis=0)
+        moved[:, [ankle, toe], 1] -= (1.0 - DRAGS) * inside * np.maximum(heights - stands, 0.0)
+    body = StandingBody(moved)
+    body.shift(-DRAGS_LOW * inside[:, 0])
+    return body.solved()
+
+
+def over_rope(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a body that stands, and hops on both feet in the frames `begin` to `end`; see
+    `limping`."""
+    del side
+    inside = _inside(len(joints), begin, end, layout.fps)
+    phase = (np.arange(len(joints)) / layout.fps / ROPE_S + rng.uniform()) % 1.0
+    air = np.clip(phase / ROPE_AIR, 0.0, 1.0)
+    up = inside * 4 * air * (1.0 - air)
+    floor = np.clip((phase - ROPE_AIR) / (1.0 - ROPE_AIR), 0.0, 1.0)
+    body = StandingBody(joints)
+    body.shift(-ROPE_DIP * inside * np.sin(np.pi * floor))
+    body.joints[:, :, 1] += ROPE_UP * up[:, None]
+    body.joints[:, [leg[-1] for leg in LEGS.values()], 1] -= TOES_DOWN * up[:, None]
+    return body.solved()
+
+
+def _lifts(joints: Array, fps: float, inside: Array) -> dict[str, Array]:
+    """Return 0 to 1 (T,) for each side: how much its knee is lifted, while its foot passes the other one."""
+    body = StandingBody(joints)
+    return {side: inside * smooth(_stands(body, OTHER_SIDE[side], fps), LIFTS_S, fps) for side in LEGS}
+
+
+def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float, hops: float) -> Array:
     """Return joints (T, 22, 3) with thighs that are lifted by `degrees` in each step, and hops of so many metres."""
-    body, inside = StandingBody(joints), _inside(len(joints), begin, end, layout.fps)
+    body = StandingBody(joints)
     thigh, shank = np.radians(degrees), np.radians(SHANK_BACK)
     up = np.zeros(len(joints))
     for side, (hip, knee, ankle, toe) in LEGS.items():
-        lifted = inside * smooth(_stands(body, OTHER_SIDE[side], layout.fps), LIFTS_S, layout.fps)
+        lifted = lifts[side]
         share = np.stack([lifted**2, eased(UP_FIRST * lifted), lifted**2], axis=-1)
         bent = BONE_LENGTHS[knee] * np.array([0.0, -np.cos(thigh), np.sin(thigh)])
         below = BONE_LENGTHS[ankle] * np.array([0.0, -np.cos(shank), -np.sin(shank)])
@@ -129,7 +223,7 @@ def tapping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
     taps = side if side in LEGS else str(rng.choice(list(LEGS)))
     time = np.arange(len(joints)) / layout.fps
     busy = (time + rng.uniform(0, TAPS_S[0])) % sum(TAPS_S) < TAPS_S[0]
-    speed = np.linalg.norm(np.gradient(smooth(joints[:, 0], 0.2, layout.fps), axis=0), axis=-1) * layout.fps
+    speed = _speed(joints, layout.fps)
     way = _inside(len(joints), begin, end, layout.fps) * smooth(
         (busy & (speed < STILL)).astype(float), 0.08, layout.fps
     )
@@ -144,8 +238,16 @@ GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Ge
     "high-knees": with_high_knees,
     "skip": skipping,
     "foot-tap": tapping,
+    "stomp": stomping,
+    "shuffle": shuffling,
+    "rope": over_rope,
 }
 """Gaits of bearings, by their name in `bearings.toml`."""
+
+
+def _speed(joints: Array, fps: float) -> Array:
+    """Return the metres a second (T,) of the hips."""
+    return np.linalg.norm(np.gradient(smooth(joints[:, 0], 0.2, fps), axis=0), axis=-1) * fps
 
 
 def _inside(frames: int, begin: int, end: int, fps: float) -> Array:

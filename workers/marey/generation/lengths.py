@@ -13,7 +13,7 @@ from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import Bearing
 
 WORK_S = 5.0
-"""Seconds of work at least: two rounds of the longest."""
+"""Seconds of work at least, two rounds of the longest, and of what has an end, such as a phone call."""
 
 
 def resolved_length(generator: Generator[Any], request: Request) -> Request:
@@ -33,9 +33,9 @@ def _least(text: TextFeatures) -> float:
     """Return the seconds that the bearings of a text take that are done, one gesture after the other."""
     if not (stated := stated_bearings(text.said)):
         return 0.0  # most prompts: their action need not be read
-    done = [each.bearing for each in fitting(stated, action_of(text))]
-    gestures = [_seconds(bearing) for bearing in done if bearing.gesture]
-    return max([sum(gestures), *(WORK_S for bearing in done if bearing.work)])
+    done = fitting(stated, action_of(text))
+    gestures = [_seconds(each.bearing) for each in done if each.bearing.gesture]
+    return max([sum(gestures), *(WORK_S for each in done if each.bearing.work or each.ends)])
 
 
 def _seconds(gesture: Bearing) -> float:

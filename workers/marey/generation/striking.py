@@ -1,11 +1,14 @@
 """Punches, drawn on the body that a network made.
 
 The network gives the footwork, the stance and the turns of a fight, but its fists seldom go out: a punch lasts three of
-its tokens. The guard and the ways of the fists are drawn with a turn of the trunk; the legs stay.
+its tokens. The guard and the ways of the fists are drawn with a turn of the trunk; the legs stay. Punches of which the
+number or the order is stated are drawn on a body that stands in guard, whose feet stay where they are, unless the
+prompt has them move; it ends soon after the last one.
 """
 
 from __future__ import annotations
 
+import random
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,8 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
+from marey.drawing.guards import drawn_stance
+from marey.drawing.stances import settle
 from marey.generation.fine_wish import FineWish
 from marey.posing.standing import ARMS, LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
+from marey.posing.still import standing_still
+from marey.vocabulary.blows import stated_blows
 
 Array = NDArray[np.floating]
 Point = tuple[float, float, float]
@@ -55,12 +62,12 @@ class _Strike:
         return self.times[-1]
 
 
-_STRAIGHT = _Strike((0.0, 0.12, 0.19, 0.44), ((-0.02, 0.0, 0.56), (-0.02, 0.0, 0.56)), (0.0, 24.0, 24.0, 0.0))
+_STRAIGHT = _Strike((0.0, 0.12, 0.19, 0.44), ((-0.02, 0.0, 0.66), (-0.02, 0.0, 0.66)), (0.0, 24.0, 24.0, 0.0))
 _HOOK = _Strike(
-    (0.0, 0.2, 0.36, 0.44, 0.72),
-    ((0.32, -0.04, 0.18), (-0.06, 0.05, 0.47), (-0.18, 0.04, 0.36)),
-    (0.0, -14.0, 30.0, 36.0, 0.0),
-    (1.0, 0.1, 0.0),
+    (0.0, 0.22, 0.32, 0.4, 0.48, 0.8),
+    ((0.46, 0.02, 0.06), (0.44, 0.16, 0.30), (0.06, 0.19, 0.43), (-0.14, 0.14, 0.32)),
+    (0.0, -22.0, 10.0, 42.0, 48.0, 0.0),
+    (1.0, 0.35, -0.2),
 )
 _UPPERCUT = _Strike(
     (0.0, 0.24, 0.4, 0.5, 0.8),
@@ -74,11 +81,20 @@ _KINDS: Mapping[str, tuple[_Strike, str]] = {
     "uppercut": (_UPPERCUT, RIGHT),
     "jab": (_STRAIGHT, LEFT),
     "cross": (_STRAIGHT, RIGHT),
+    "": (_STRAIGHT, ""),
 }
 """Way of each kind of punch, and the hand that does it if none is named; empty = the one that did not strike last."""
-_KIND = re.compile(rf"\b(?:(left|right)(?:[ -]hand(?:ed)?)? )?({'|'.join(_KINDS)})(?!-)")
+_FOOTWORK = re.compile(
+    r"\b(?:step|walk|advanc|retreat|circl|footwork|bounc|hop|jump|lung|run|dash|mov|charg|danc|spin|turn|shuffl|kick)"
+)
+"""Words of feet that move."""
+STRIDE_M = 0.04
+"""Metres by which the hips go ahead in a blow."""
+AFTER_S = (0.6, 0.9)
+"""Seconds in guard after the last one of a stated number."""
 _ONE = re.compile(
     r"\b(?:a|an|one|single)\b(?: [\w-]+){0,3} (?:punch|jab|hook|uppercut|cross|blow)\b(?! (?:combo|combination))"
+    r"|^(?:(?:left|right|lead|rear)[ -](?:hand )?)?(?:jab|hook|uppercut|cross|haymaker|punch)\b"
 )
 """Words of a single punch."""
 
@@ -86,14 +102,27 @@ _ONE = re.compile(
 def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
     """Return joints (T, 22, 3) of a body in guard that punches, `count` times or in rows of a few; None if there is no
     time for a punch."""
-    seconds = len(joints) / fps
-    strikes = list(_timed(seconds, wish, rng))
+    kinds, count = _row(wish, rng)
+    stands = count is not None and not _FOOTWORK.search(wish.prompt.lower())
+    seconds = len(joints) / fps if wish.fixed or not stands else None
+    strikes = list(_timed(seconds, kinds, count, rng))
     if not strikes:
         return None
-    body, time = StandingBody(joints), np.arange(len(joints)) / fps
-    twist = np.zeros(len(joints))
-    ways = {side: np.tile(GUARD[side], (len(joints), 1)) for side in ARMS}
-    elbows = {side: np.tile(ELBOW, (len(joints), 1)) for side in ARMS}
+    if stands:
+        ends = strikes[-1][0] + strikes[-1][1].seconds + float(rng.uniform(*AFTER_S))
+        frames = len(joints) if wish.fixed else round(ends * fps)
+        body = _in_stance(frames, random.Random(int(rng.integers(2**62))))  # noqa: S311
+    else:
+        body = StandingBody(joints)
+    return _struck(body, fps, strikes, drives=stands)
+
+
+def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, str]], *, drives: bool) -> Array:
+    """Draw the guard and the strikes; the hips go ahead with these if it `drives` them."""
+    frames = len(body.joints)
+    time, twist = np.arange(frames) / fps, np.zeros(frames)
+    ways = {side: np.tile(GUARD[side], (frames, 1)) for side in ARMS}
+    elbows = {side: np.tile(ELBOW, (frames, 1)) for side in ARMS}
     for start, strike, side in strikes:
         inside = (time >= start) & (time < start + strike.seconds)
         points = [GUARD[side], *strike.way, GUARD[side]]
@@ -102,39 +131,52 @@ def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator)
         twist[inside] -= SIGN[side] * way_through(since, strike.times, strike.twist)
         lifted = eased(np.minimum(since, strike.seconds - since) / 0.12)[:, None]
         elbows[side][inside] = (1 - lifted) * np.array(ELBOW) + lifted * np.array(strike.elbow)
-    body.lean(smooth(twist, SMOOTH_S, fps), "up")
+    twist = smooth(twist, SMOOTH_S, fps)
+    if drives:
+        ahead = smooth(np.abs(twist) / 36.0, 0.05, fps)
+        body.shift(-0.3 * STRIDE_M * ahead, STRIDE_M * ahead)
+        settle(body)
+    body.lean(twist, "up")
     for side in ARMS:
-        body.hold(side, np.ones(len(joints)), smooth(ways[side], SMOOTH_S, fps), pole=smooth(elbows[side], 0.05, fps))
+        body.hold(side, np.ones(frames), smooth(ways[side], SMOOTH_S, fps), pole=smooth(elbows[side], 0.05, fps))
     return body.solved()
 
 
-def _timed(seconds: float, wish: FineWish, rng: np.random.Generator) -> Iterator[tuple[float, _Strike, str]]:
-    """Yield start, way and hand of each strike, as many as there is time for."""
-    kinds, left = _kinds(wish, rng), wish.count
-    if left is None and (named := len(_KIND.findall(wish.prompt.lower()))) > 1:
-        left = named
-    elif left is None and _ONE.search(wish.prompt.lower()):
-        left = 1
+def _in_stance(frames: int, rng: random.Random) -> StandingBody:
+    """Return a body that stands with its left foot ahead and bent knees."""
+    body = StandingBody(standing_still(frames, rng))
+    drawn_stance(rng, LEFT, -2.0, None)(body, np.ones(frames))
+    return body
+
+
+def _timed(
+    seconds: float | None, kinds: list[tuple[_Strike, str]], count: int | None, rng: np.random.Generator
+) -> Iterator[tuple[float, _Strike, str]]:
+    """Yield start, way and hand of each strike, as many as there is time for; without `seconds`, for all of `count`."""
     at, number, row = FIRST_S + float(rng.uniform(0.0, 0.4)), 0, int(rng.integers(*ROW, endpoint=True))
-    if left is not None:
-        taken = sum(kinds[k % len(kinds)][0].seconds + BETWEEN_S[1] for k in range(left))
+    if count is not None and seconds is not None:
+        taken = sum(kinds[k % len(kinds)][0].seconds + BETWEEN_S[1] for k in range(count))
         at = max(0.15, min(at, (seconds - taken) / 2))
-    while (left is None or number < left) and at + kinds[number % len(kinds)][0].seconds + LAST_S <= seconds:
+    ends = np.inf if seconds is None else seconds - LAST_S
+    while (count is None or number < count) and at + kinds[number % len(kinds)][0].seconds <= ends:
         strike, side = kinds[number % len(kinds)]
         yield at, strike, side
         number, row, at = number + 1, row - 1, at + strike.seconds + float(rng.uniform(*BETWEEN_S))
-        if not row and left is None:
+        if not row and count is None:
             at, row = at + float(rng.uniform(*PAUSE_S)), int(rng.integers(*ROW, endpoint=True))
 
 
-def _kinds(wish: FineWish, rng: np.random.Generator) -> list[tuple[_Strike, str]]:
-    """Return ways and hands in the order of the prompt; a jab and a cross where it names no kind."""
-    found: list[tuple[_Strike, str]] = []
-    last = str(rng.choice([LEFT, RIGHT]))
-    named = _KIND.findall(wish.prompt.lower())
-    side = "" if any(own for own, _ in named) else wish.side  # of "jab, cross, left hook" only the hook is left
-    for own, kind in named:
-        strike, usual = _KINDS[kind]
-        last = own or side or usual or OTHER_SIDE[last]
+def _row(wish: FineWish, rng: np.random.Generator) -> tuple[list[tuple[_Strike, str]], int | None]:
+    """Return ways and hands in the order of the prompt, a jab and a cross where it names no kind, and the number of
+    strikes; None = any number."""
+    last, found = str(rng.choice([LEFT, RIGHT])), list[tuple[_Strike, str]]()
+    blows = stated_blows(wish.prompt)
+    side = "" if any(each.side for each in blows) else wish.side  # of "jab, cross, left hook" only the hook is left
+    for each in blows:
+        strike, usual = _KINDS[each.kind]
+        last = each.side or side or usual or OTHER_SIDE[last]
         found.append((strike, last))
-    return found or [(_STRAIGHT, side) for side in ([wish.side] if wish.side else [LEFT, RIGHT])]
+    if len(found) > 1:
+        return found, len(found)
+    count = wish.count or (1 if _ONE.search(wish.prompt.lower()) else None)
+    return found or [(_STRAIGHT, each) for each in ([wish.side] if wish.side else [LEFT, RIGHT])], count

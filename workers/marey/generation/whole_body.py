@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.crawls import crawl
+from marey.drawing.crawls import crawl, low_crawl
 from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
 from marey.drawing.gesture import Gesture
@@ -23,7 +23,7 @@ from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody, way_through
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, way_through
 from marey.posing.still import standing_still
 from marey.vocabulary.turns import stated_turn
 
@@ -50,6 +50,11 @@ _HIT = re.compile(
 _SLOWLY = re.compile(r"\b(?:slow\w*|gradual\w*|sinks?|slump\w*|crumples?)\b")
 _LOG = re.compile(r"\b(?:side|sideways|log|barrel|pencil|over onto|lateral\w*)\b")
 _SIDE_NAMED = re.compile(r"\b(left|right)\b")
+_OVER_SHOULDER = re.compile(r"\b(?:left|right) shoulder\b")
+_FROM = re.compile(
+    r"\bfrom (?:the |his |her |its |their )?(?:(front|ahead)|(back|behind|rear)|(left|right))\b(?! foot| leg| hand)"
+)
+"""Words of where a blow comes from that a body falls away of."""
 _CROUCHES = re.compile(r"\b(?:crouch\w*|kneel\w*|knee|squat\w*|stays? low)\b")
 _SHOULDER = re.compile(r"\b(?:shoulder|combat|dodge|tactical|parkour|judo|evad\w*|evasive)\b")
 _IN_BED = re.compile(r"\b(?:bed|sleep\w*|asleep|lying|lies)\b")
@@ -58,13 +63,20 @@ _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|standing|rises?|rising|picks? (?:him|her|them|it)sel\w+) (?:back )?up\b|\brises?\b"
 )
 _CRAWLS = re.compile(r"\bcrawl\w*\b|\bon all fours\b|\bhands and knees\b")
+_LOW = re.compile(
+    r"\b(?:belly|bellies|stomach|tummy|chest|army|armies|military|soldiers?|marines?|troops?|infantry\w*|commandos?|prone"
+    r"|low|flat|barbed|wires?|elbows?|forearms?|leopard|tiger|snakes?|worms?|lizard|slither\w*|face[ -]?down"
+    r"|under (?:enemy |heavy )?(?:fire|bullets))\b"
+)
+"""Words of crawls on the belly."""
+_ON_KNEES = re.compile(r"\b(?:all fours|hands and knees|knees and hands)\b")
 _ON_FOURS = re.compile(r"\b(?:all fours|hands and knees|a crawl|crawling)\b")
 _ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|chest)\b")
 
 
 def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
-    text = wish.prompt.lower()
+    text = _FROM.sub(_away, wish.prompt.lower())
     knees, aside = bool(_KNEES.search(text)), bool(_SIDE.search(text))
     forms = [
         *(["knees-side"] if knees and aside else ["knees"] if knees else []),
@@ -81,11 +93,17 @@ def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     return die(rng, form, side=named[1] if named else "", hit=bool(_HIT.search(text)), slow=bool(_SLOWLY.search(text)))
 
 
+def _away(match: re.Match[str]) -> str:
+    """Return the direction in which a body falls that is hit from another one."""
+    front, _, side = match.groups()
+    return f"to the {OTHER_SIDE[side]}" if side else "backward" if front else "forward"
+
+
 def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = wish.prompt.lower()
     named = _SIDE_NAMED.search(text)
-    if _LOG.search(text) or (named and not _SHOULDER.search(text)):
+    if _LOG.search(text) or (named and not _OVER_SHOULDER.search(text)):
         form = "sideways"
     elif re.search(r"\b(?:back|backwards?)\b", text):
         form = "backward"
@@ -107,8 +125,15 @@ def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 
 
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    back = bool(re.search(r"\b(?:backwards?|in reverse)\b", wish.prompt.lower()))
-    return crawl(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+    text = wish.prompt.lower()
+    back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
+    form = low_crawl if _is_low(text) else crawl
+    return form(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+
+
+def _is_low(text: str) -> bool:
+    """Return True if a crawl is one on the belly."""
+    return bool(_LOW.search(text)) and not _ON_KNEES.search(text)
 
 
 def _lie_down(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -123,9 +148,12 @@ def _lie(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     before, text = wish.beside[0].lower(), wish.prompt.lower()
-    if _CRAWLS.search(before) or _ON_FOURS.search(text):
+    crawls = _CRAWLS.search(before) and not _is_low(before)
+    if crawls or _ON_FOURS.search(text):
         return get_up(rng, "fours")
-    return get_up(rng, "lie-front" if _ends_on_front(before) or _ONTO_FRONT.search(text) else "lie-back")
+    return get_up(
+        rng, "lie-front" if _ends_on_front(before) or _CRAWLS.search(before) or _ONTO_FRONT.search(text) else "lie-back"
+    )
 
 
 def _jump_turn(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -187,10 +215,24 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
         chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
         times = min(wish.count or 1, MOST) if action in AGAIN else 1
         frames = len(joints) if wish.fixed else None
-        gestures = _fitting(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames)
-        return None if gestures is None else _joined(gestures, frames, chance)
+        return drawn_in_place(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames, chance)
 
     return drawn
+
+
+def drawn_in_place(
+    draw: Callable[[float | None], Gesture], times: int, frames: int | None, rng: random.Random
+) -> Array | None:
+    """Return joints (T, 22, 3) of a body that stands and moves as drawn; None if there is no time for it.
+
+    Args:
+        draw: returns a movement; is given the seconds that it has to fill, or None.
+        times: that it is done, one after the other.
+        frames: of the motion; None = as many as it takes.
+        rng: decides how the body stands.
+    """
+    gestures = _fitting(draw, times, frames)
+    return None if gestures is None else _joined(gestures, frames, rng)
 
 
 def _fitting(draw: Callable[[float | None], Gesture], times: int, frames: int | None) -> list[Gesture] | None:

@@ -1,0 +1,166 @@
+"""Movements whose prompt states their form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.generation.fine_wish import FineWish
+from marey.generation.raising import stated_action
+from marey.generation.stated import stated_features
+from marey.motion.features import HUMANML3D_263
+from marey.selector.motion import Motion
+from marey.selector.repetitions import REPETITIONS
+
+LAYOUT = HUMANML3D_263
+FPS = LAYOUT.fps
+WRISTS, SHOULDERS = [20, 21], [16, 17]
+SEEDS = range(3)
+
+
+def drawn(
+    action: str, prompt: str, *, side: str = "", count: int | None = None, frames: int | None = None, seed: int = 1
+) -> np.ndarray:
+    wish = FineWish(count, side, prompt, frames is not None)
+    features = stated_features(LAYOUT, action, wish, frames or 60, seed)
+    assert features is not None
+    return LAYOUT.decode(features).astype(np.float64)
+
+
+def hands(joints: np.ndarray) -> np.ndarray:
+    """Places (T, 2, 3) of the left and the right wrist from their shoulders: outward, up, forward."""
+    return (joints[:, WRISTS] - joints[:, SHOULDERS]) * np.array([[1, 1, 1], [-1, 1, 1]])
+
+
+@pytest.mark.parametrize(
+    ("prompt", "low", "high"),
+    [
+        ("raises his right hand to waist height", -0.45, -0.2),
+        ("lifts her right arm to chest level", -0.22, -0.06),
+        ("raises the right arm to shoulder height", -0.03, 0.14),
+        ("holds the right arm level with his shoulder, then lowers it", -0.03, 0.14),
+        ("puts the right hand up to head height", 0.1, 0.4),
+        ("raise your right hand above your head", 0.42, 0.6),
+        ("the right arm goes straight up and is lowered again", 0.42, 0.6),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_hand_goes_to_the_height_that_is_stated_once_and_comes_down(
+    prompt: str, low: float, high: float, seed: int
+) -> None:
+    own, other = np.moveaxis(hands(drawn("raise-arm", prompt, side="right", seed=seed)), 1, 0)[::-1]
+    assert low < own[:, 1].max() < high
+    assert other[:, 1].max() < -0.4
+    assert own[-1, 1] < -0.4
+    up = own[:, 1] > 0.5 * (own[:, 1].max() + own[0, 1])
+    assert (np.diff(up.astype(int)) == 1).sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("prompt", "axis"),
+    [
+        ("extends her left arm out to the side", 0),
+        ("raises the left arm sideways to shoulder height", 0),
+        ("raises the left arm forward", 2),
+        ("lifts the left arm in front of him at shoulder level and lowers it to his side", 2),
+    ],
+)
+def test_an_arm_goes_in_the_direction_that_is_stated(prompt: str, axis: int) -> None:
+    for seed in SEEDS:
+        left = hands(drawn("raise-arm", prompt, side="left", seed=seed))[:, 0]
+        top = left[left[:, 1].argmax()]
+        assert top[axis] > 0.4
+        assert abs(top[2 - axis]) < 0.2
+
+
+def test_both_arms_go_up_where_both_are_named() -> None:
+    both = hands(drawn("raise-arm", "lifts both arms to the sides at shoulder height"))
+    assert both[..., 1].max(axis=0).min() > -0.03
+    assert both[..., 1].max() < 0.14
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_arms_go_up_as_often_as_asked_for(count: int) -> None:
+    joints = drawn("raise-arm", "raises the left arm to the side", side="left", count=count)
+    assert len(REPETITIONS["raise-arm"](Motion(joints, FPS))) == count
+
+
+def test_an_arm_that_is_kept_up_stays_up() -> None:
+    prompt = "raises the right arm to shoulder height and keeps it there"
+    for frames in (None, 120):
+        assert hands(drawn("raise-arm", prompt, side="right", frames=frames))[-1, 1, 1] > -0.03
+    held = hands(drawn("raise-arm", "raises the right arm overhead, holds it for three seconds, then lowers it"))[:, 1]
+    assert 2.8 * FPS < (held[:, 1] > 0.3).sum() < 4.5 * FPS
+    assert held[-1, 1] < -0.4
+
+
+def test_a_raise_without_height_or_direction_is_left_as_it_is() -> None:
+    for prompt in ("raises the right arm", "a man raises his hand to the side of his head"):
+        assert stated_features(LAYOUT, "raise-arm", FineWish(prompt=prompt), 60, 1) is None
+    assert stated_features(LAYOUT, "walk", FineWish(prompt="walks forward"), 60, 1) is None
+
+
+@pytest.mark.parametrize(
+    ("prompt", "named"),
+    [
+        ("extends her left arm out to the side", "raise-arm"),
+        ("right arm stretched forward", "raise-arm"),
+        ("stretches out his arm", ""),
+        ("walks with one arm stretched forward", ""),
+        ("stretches both arms out to the sides", ""),
+    ],
+    ids=["side", "forward", "no direction", "walk", "bearing"],
+)
+def test_arms_that_are_stretched_out_are_raised(prompt: str, named: str) -> None:
+    assert stated_action(prompt) == named
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_hands_clap_as_often_as_asked_for_and_rest(count: int, seed: int) -> None:
+    joints = drawn("clap", "claps his hands", count=count, seed=seed)
+    assert len(REPETITIONS["clap"](Motion(joints, FPS))) == count
+    assert joints[-1, WRISTS, 1].max() < joints[-1, 0, 1] + 0.1
+    assert stated_features(LAYOUT, "clap", FineWish(prompt="claps"), 60, seed) is None
+
+
+def test_hands_clap_over_the_head_where_that_is_said() -> None:
+    assert hands(drawn("clap", "claps twice above his head", count=2))[..., 1].max() > 0.35
+    assert hands(drawn("clap", "claps twice", count=2))[..., 1].max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("prompt", "steps"),
+    [("sidestep right x3", 3), ("takes 5 steps to the right", 5), ("one quick step to the right", 1)],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steps_aside_are_as_many_as_asked_for(prompt: str, steps: int, seed: int) -> None:
+    joints = drawn("sidestep", prompt, side="right", seed=seed)
+    moved = np.abs(np.diff(joints[:, [7, 8], 0], axis=0)) * FPS > 0.5
+    swings = (np.diff(moved.astype(int), axis=0) == 1).sum(axis=0)
+    assert list(swings) == [steps, steps]
+    assert 0.25 < (joints[0, 0, 0] - joints[-1, 0, 0]) / steps < 0.7
+    assert np.abs(joints[-5:, [7, 8]] - joints[-1, [7, 8]]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("prompt", "least", "most"),
+    [
+        ("strafe left fast", 1.5, 2.3),
+        ("quickly shuffles to the left", 1.5, 2.3),
+        ("steps to the left slowly", 0.2, 0.45),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steps_aside_have_the_pace_that_is_stated(prompt: str, least: float, most: float, seed: int) -> None:
+    joints = drawn("sidestep", prompt, side="left", seed=seed)
+    speeds = np.diff(joints[:, 0, 0]) * FPS
+    assert least < np.median(speeds[speeds > 0.1]) < most
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35, "no foot leaps"
+    assert joints[..., 1].min() > -0.02
+    assert len(drawn("sidestep", prompt, side="left", frames=100, seed=seed)) == 100
+
+
+def test_steps_aside_without_number_or_pace_and_to_both_sides_are_left_as_they_are() -> None:
+    for prompt in ("steps to the left", "quickly shuffles from side to side"):
+        assert stated_features(LAYOUT, "sidestep", FineWish(prompt=prompt), 60, 1) is None

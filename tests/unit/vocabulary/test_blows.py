@@ -1,0 +1,38 @@
+"""Punches that a prompt lists."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.vocabulary.blows import stated_blows
+from marey.vocabulary.counts import stated_count
+
+
+@pytest.mark.parametrize(
+    ("prompt", "blows"),
+    [
+        ("boxing: jab, jab, cross", "jab jab cross"),
+        ("boxing combo: left jab, right cross, left hook", "left-jab right-cross left-hook"),
+        ("one-two combo", "jab cross"),
+        ("throws two jabs and a cross", "jab jab cross"),
+        ("double jab, then a quick right hand cross", "jab jab right-cross"),
+        ("jab twice then a hook", "jab jab hook"),
+        ("jab, cross, three times", "jab cross jab cross jab cross"),
+        ("jab-cross-hook x2", "jab cross hook jab cross hook"),
+        ("left, right, left hook", "left right left-hook"),
+        ("punches left, right, left", "left right left"),
+        ("throws three jabs", "jab jab jab"),
+        ("hooks", "hook"),
+        ("throws a punch to the left", ""),
+        ("sits cross-legged", ""),
+    ],
+)
+def test_punches_are_read_in_their_order(prompt: str, blows: str) -> None:
+    assert " ".join(f"{each.side}-{each.kind}".strip("-") for each in stated_blows(prompt)) == blows
+
+
+def test_a_list_of_punches_is_their_number() -> None:
+    assert stated_count("boxing: jab, jab, cross", "punch") == 3
+    assert stated_count("one-two combo", "punch") == 2
+    assert stated_count("throws a jab three times", "punch") == 3
+    assert stated_count("throws a hook", "punch") is None

@@ -1,0 +1,100 @@
+"""Steps aside: one foot goes out, the other one follows."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.drawing.gesture import Gesture
+from marey.drawing.stances import settle
+from marey.posing.curves import blurred
+from marey.posing.limbs import FPS
+from marey.posing.standing import ARMS, LEGS, OTHER_SIDE, SIGN, StandingBody, eased, envelope
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """How steps aside are made at a pace.
+
+    Attributes:
+        seconds, metres: limits of those of a step.
+        leads, follows: shares of a step in which the one foot and the other are in the air.
+        sinks: metres by which the body sinks.
+        arms: degrees by which the arms are lifted.
+    """
+
+    seconds: tuple[float, float]
+    metres: tuple[float, float]
+    leads: tuple[float, float]
+    follows: tuple[float, float]
+    sinks: float
+    arms: float
+
+
+PACES = {
+    "slow": _Pace((1.0, 1.25), (0.3, 0.38), (0.0, 0.45), (0.5, 0.95), 0.01, 6.0),
+    "": _Pace((0.62, 0.74), (0.44, 0.52), (0.0, 0.52), (0.46, 0.98), 0.02, 8.0),
+    "fast": _Pace((0.3, 0.33), (0.6, 0.66), (0.0, 0.6), (0.4, 1.0), 0.06, 20.0),
+}
+_LIFT = 0.07
+_HIPS_S = 0.13
+"""Standard deviation of the filter of the ways of the feet whose middle the hips follow, seconds."""
+
+
+def sidestep(
+    rng: random.Random, side: str, *, count: int | None = None, pace: str = "", seconds: float = 3.0
+) -> Gesture:
+    """Steps to a side, one after the other; the body faces ahead.
+
+    Args:
+        rng: decides lengths and times.
+        side: left or right.
+        count: of the steps; None = as many as there is time for.
+        pace: slow, fast, or empty: as one walks.
+        seconds: that it has to fill, without a `count`.
+    """
+    form = PACES[pace]
+    period, far, lift = rng.uniform(*form.seconds), rng.uniform(*form.metres), _LIFT * rng.uniform(0.8, 1.1)
+    start, rests = rng.uniform(0.25, 0.45), rng.uniform(0.5, 0.8)
+    steps = count or max(2, round((seconds - start - rests) / period))
+
+    def change(body: StandingBody) -> None:
+        time = np.arange(len(body.joints)) / FPS - start
+        way = envelope(len(time), start - 0.2, 0.3, steps * period, 0.5)
+        body.lean(6.0 * way, "left")
+        for arm in ARMS:
+            body.lift_arm(arm, form.arms * way)
+        feet = {
+            side: _foot(time / period, steps, form.leads, far, lift),
+            OTHER_SIDE[side]: _foot(time / period, steps, form.follows, far, lift),
+        }
+        hips = blurred(np.mean([foot[:, 0] for foot in feet.values()], axis=0), _HIPS_S * FPS)
+        body.shift(-form.sinks * way, left=SIGN[side] * hips)
+        for one, foot in feet.items():
+            moved = body.world(np.stack([SIGN[one] * SIGN[side] * foot[:, 0], foot[:, 1], 0 * time], axis=1), one)
+            body.joints[:, LEGS[one][2:]] += moved[:, None]
+        settle(body)
+
+    return Gesture(start + steps * period + rests, ("sidestep",), change, side, steps)
+
+
+def _foot(steps: Array, count: int, swings: tuple[float, float], far: float, lift: float) -> Array:
+    """Return how far a foot is aside and over the floor (T, 2), metres.
+
+    Args:
+        steps: (T,) time, in steps.
+        count: of the steps.
+        swings: shares of a step in which the foot is in the air.
+        far: metres of a step.
+        lift: metres over the floor.
+    """
+    place = np.zeros((len(steps), 2))
+    for number in range(count):
+        share = eased((steps - number - swings[0]) / (swings[1] - swings[0]))
+        place += np.stack([far * share, 4 * lift * share * (1 - share)], axis=1)
+    return place

@@ -1,0 +1,73 @@
+"""Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
+or in a direction, a number of claps, and steps aside by number or at a pace.
+
+A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
+nothing stays as the network makes it.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.drawing.arms import clap_times
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.sidesteps import sidestep
+from marey.generation.fine_wish import FineWish
+from marey.generation.raising import stated_raise
+from marey.generation.whole_body import drawn_in_place
+from marey.motion.features import FeatureLayout, encode_all
+from marey.vocabulary.counts import stated_count
+from marey.vocabulary.paces import stated_pace
+
+Float32 = NDArray[np.float32]
+Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
+"""`(wish, rng, seconds)`: the movement that the prompt states, None if it states none; seconds that it has to fill, or
+None."""
+
+AT_PACE = frozenset({"sidestep"})
+"""Actions that are drawn at the pace that is asked for."""
+_HIGH = re.compile(r"\boverhead\b|\b(?:above|over) (?:(?:his|her|their|the|your) )?heads?\b")
+_TO_AND_FRO = re.compile(r"\b(?:side to side|back and forth|to and fro|left and right|right and left|both)\b")
+
+
+def _claps(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    del seconds  # the hands rest at the end
+    return clap_times(rng, wish.count, high=bool(_HIGH.search(wish.prompt.lower()))) if wish.count else None
+
+
+def _steps_aside(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    count, pace = stated_count(wish.prompt, "sidestep"), stated_pace(wish.prompt)
+    if not (count or pace) or _TO_AND_FRO.search(wish.prompt.lower()):
+        return None
+    side = wish.side or rng.choice(SIDES)
+    return sidestep(rng, side, count=count, pace=pace, seconds=seconds or rng.uniform(2.6, 3.6))
+
+
+STATED: Mapping[str, Statement] = {"raise-arm": stated_raise, "clap": _claps, "sidestep": _steps_aside}
+"""Movements by action."""
+
+
+def stated_features(layout: FeatureLayout, action: str, wish: FineWish, frames: int, seed: int) -> Float32 | None:
+    """Return features (T, D) of the movement that a prompt states; None if it states no form.
+
+    Args:
+        layout: of the features, on the skeleton of HumanML3D.
+        action: id in the vocabulary.
+        wish: what the prompt asks for.
+        frames: of the motion that the network made, kept if the wish is for a fixed length.
+        seed: of the motion.
+    """
+    state = STATED.get(action)
+    if state is None:
+        return None
+    rng = random.Random(f"{seed} {action}")  # noqa: S311
+    first = state(wish, rng, None)
+    if first is None:
+        return None
+    joints = drawn_in_place(lambda seconds: state(wish, rng, seconds) or first, 1, frames if wish.fixed else None, rng)
+    return None if joints is None else encode_all(layout, joints)
