@@ -82,11 +82,11 @@ def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
 
 
 def test_an_action_that_the_words_are_only_close_to_is_not_believed_sooner() -> None:
-    (scampers,) = read(["a boy scampers off"])
-    assert named_actions("a boy scampers off") == {"run"}
-    assert named_actions("a boy scampers off", surely=True) == set()
-    assert (scampers.name, scampers.action) == ("run", None)
-    assert AGREED < scampers.probability < SURE
+    (waddles,) = read(["a man waddles"])
+    assert named_actions("a man waddles") == {"walk"}
+    assert named_actions("a man waddles", surely=True) == set()
+    assert (waddles.name, waddles.action) == ("walk", None)
+    assert AGREED < waddles.probability < SURE
 
 
 def test_who_stands_by_the_words_does_where_the_network_knows_nothing() -> None:

@@ -245,11 +245,11 @@ def test_movements_around_a_stop_a_place_and_an_origin(
 
 
 def test_a_prompt_that_is_no_sequence_is_read_as_the_likeliest_action(reading: TextPipeline) -> None:
-    prompt = "hop your legs apart and swing your arms up"
+    prompt = "arabesque, ballet, hold"
     read = action_reader().read(prompt, shared_reading_encoder().pooled([prompt])[0])
-    assert (read.name, read.action) == ("jumping-jacks", None)
+    assert (read.name, read.action) == ("arabesque", None)
     (features,) = reading.features([prompt])
-    assert action_of(features) == "jumping-jacks"
+    assert action_of(features) == "arabesque"
 
 
 def test_one_action_is_one_text(reading: TextPipeline) -> None:
