@@ -48,7 +48,7 @@ LEAST_CUT = 0.03
 ACTION_WEIGHT = 4.0
 """Weight of the actions of clauses beside that of the cuts."""
 SURE = 0.15
-"""Probability that each movement of a sequence has at least; what is read less surely than `PLAIN` keeps its own words."""
+"""Probability that each movement of a sequence has at least; one under `PLAIN` keeps its own words alone."""
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
 """Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""

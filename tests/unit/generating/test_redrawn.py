@@ -87,3 +87,19 @@ def test_motions_differ_by_seed_and_are_the_same_for_one() -> None:
     first, again, other = (joints_of(redrawn(IDLE, LAYOUT, "kneel", FineWish(), seed)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert first.shape != other.shape or np.abs(first - other).max() > 0.05
+
+
+def test_laughs_and_shots_are_drawn_though_the_motion_shows_them() -> None:
+    shown = redrawn(IDLE, LAYOUT, "laugh", FineWish(), 1)
+    assert shown is not None
+    again = redrawn(shown, LAYOUT, "laugh", FineWish(), 2)
+    assert again is not None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_kick_in_a_form_that_is_stated_is_drawn(seed: int) -> None:
+    kicks = redrawn(IDLE, LAYOUT, "kick", FineWish(), seed)
+    assert kicks is not None
+    assert redrawn(kicks, LAYOUT, "kick", FineWish(), seed) is None
+    low = joints_of(redrawn(kicks, LAYOUT, "kick", FineWish(prompt="a low kick to the shin"), seed))
+    assert low[:, [10, 11], 1].max() < 0.75

@@ -89,6 +89,8 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
         ("an angry person stomps forward", "a person walks forward", ["angry", "stomping"]),
         ("dragging his feet", "walking", ["foot-dragging"]),
         ("walks dragging her feet", "walks", ["foot-dragging"]),
+        ("a goalkeeper shuffles sideways along the line", "a goalkeeper shuffles sideways along the line", []),
+        ("she shuffles quickly to the left", "she shuffles quickly to the left", []),
         ("old woman walks with a cane", "woman walks", ["old", "cane"]),
         ("reload pistol", "", ["reloading"]),
         ("a soldier changes magazines", "", ["reloading"]),

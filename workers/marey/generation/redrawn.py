@@ -29,6 +29,10 @@ Array = NDArray[np.floating]
 
 FAILS = SHOWN
 """Grade of the selector below which a motion does not show its action, and has the flag `off-prompt`."""
+ALWAYS = frozenset({"aim", "laugh", "shoot"})
+"""Actions that networks make after a long lead, or walking about, though their rule finds them."""
+FORMS = {"kick": re.compile(r"\b(?:round(?:house)?|side|low)[ -]?kick|\bkick\w* (?:sideways|low\b|to the side)")}
+"""Words of forms of an action that networks do not tell apart."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
 DRAWN = 6
@@ -38,8 +42,8 @@ SHORTER = 0.85
 
 
 def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWish, seed: int) -> Float32 | None:
-    """Return features (T', D) of a drawn movement in place of a motion that does not show its action; None if it does,
-    or nothing better can be drawn.
+    """Return features (T', D) of a drawn movement in place of a motion that does not show its action, or not in the form
+    that its prompt states; None if it does, or nothing better can be drawn.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
@@ -50,7 +54,9 @@ def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWis
     """
     if action not in DRAWINGS or action not in RULES or len(features) < SHORTEST:
         return None
-    if _grade(layout.decode(features), action, "") >= FAILS:
+    form = FORMS.get(action)
+    stated = action in ALWAYS or (form is not None and form.search(wish.prompt.lower()))
+    if not stated and _grade(layout.decode(features), action, "") >= FAILS:
         return None
     rng = random.Random(f"{seed} {action}")  # noqa: S311
     frames = len(features) if wish.fixed else None
