@@ -42,8 +42,8 @@ SHORTER = 0.85
 
 
 def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWish, seed: int) -> Float32 | None:
-    """Return features (T', D) of a drawn movement in place of a motion that does not show its action, or not in the form
-    that its prompt states; None if it does, or nothing better can be drawn.
+    """Return features (T', D) of a drawn movement in place of a motion that does not show its action, or not in the
+    form that its prompt states; None if it does, or nothing better can be drawn.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
