@@ -59,7 +59,7 @@ class PackedLinear(nn.Module):
 
     def _product(self, x: Tensor) -> Tensor:
         if self.rows is not None and len(x) > self.rows:
-            return torch.cat([self._product(part) for part in x.split(self.rows)])
+            return torch.cat([self._product(part) for part in torch.split(x, self.rows)])
         return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, self.activation, [], "none")
 
 

@@ -74,7 +74,8 @@ class MiniLM:
         """
         other = copy.copy(self)
         other._often = None
-        other._layers = _Layers([layer.tuned(updates, f"{i}.") for i, layer in enumerate(self._layers.layers)])
+        layers = [layer for layer in self._layers.layers if isinstance(layer, _Layer)]
+        other._layers = _Layers([layer.tuned(updates, f"{number}.") for number, layer in enumerate(layers)])
         return other
 
     @torch.inference_mode()

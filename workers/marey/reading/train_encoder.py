@@ -102,7 +102,7 @@ class _Layer(nn.Module):
         self.parts = nn.ModuleDict(parts)
         self.drop = nn.Dropout(DROPOUT)
         self._norms = [
-            tuple(weights[f"{prefix}{name}.LayerNorm.{part}"] for part in ("weight", "bias"))
+            (weights[f"{prefix}{name}.LayerNorm.weight"], weights[f"{prefix}{name}.LayerNorm.bias"])
             for name in ("attention.output", "output")
         ]
 
@@ -172,7 +172,7 @@ def train(texts: Sequence[PartedText], encoder: MiniLM, weights: Mapping[str, Te
 def _text(text: PartedText, encoder: MiniLM, classes: Sequence[str]) -> _Text:
     encoded = encoder.tokenizer.encode(text.text)
     below = encoder.states(encoded.ids)[LAYERS - UPDATED].numpy()
-    encoding = Encoding(below[0], below.astype(np.float16), tuple(encoded.offsets))
+    encoding = Encoding(below[0], below, tuple(encoded.offsets))
     return _Text(labelled(text, encoding, classes), _spans(text, encoding.offsets, classes))
 
 

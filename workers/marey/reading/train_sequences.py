@@ -122,7 +122,8 @@ def fit_cuts(texts: Sequence[LabelledTokens], classes: int, seed: int) -> _Cuts:
         for batch in batches(texts, rng, CUT_BATCH, lambda each: len(each.states)):
             for group in optimizer.param_groups:
                 group["lr"] = RATE * min(1, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
-            loss = cut_loss(*network(*shown(batch)), batch)
+            begins, named = network(*shown(batch))
+            loss = cut_loss(begins, named, batch)
             optimizer.zero_grad()
             loss.backward()  # pyright: ignore[reportUnknownMemberType]
             nn.utils.clip_grad_norm_(network.parameters(), 1.0)
