@@ -29,19 +29,15 @@ class PackedLinear(nn.Module):
     In float32 a row's bits do not depend on the others; in bfloat16 they do while rows are few.
     """
 
-    def __init__(
-        self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, gelu: bool = False, rows: int | None = None
-    ) -> None:
+    def __init__(self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, gelu: bool = False) -> None:
         """Pack a layer.
 
         Args:
             linear: the layer.
             dtype: of the weights, float32 or bfloat16; input and output have one type, float32 or this.
             gelu: GELU follows, in the same pass.
-            rows: of one product at most; None = any number.
         """
         super().__init__()
-        self.rows = rows
         self.dtype = dtype
         self.activation = "gelu" if gelu else "none"
         self.packed: Tensor = torch.ops.mkldnn._reorder_linear_weight(linear.weight.detach().to(dtype), None)
@@ -58,8 +54,6 @@ class PackedLinear(nn.Module):
         return self._product(x.to(self.dtype)).to(x.dtype)
 
     def _product(self, x: Tensor) -> Tensor:
-        if self.rows is not None and len(x) > self.rows:
-            return torch.cat([self._product(part) for part in torch.split(x, self.rows)])
         return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, self.activation, [], "none")
 
 

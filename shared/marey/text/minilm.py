@@ -213,12 +213,24 @@ def _linear(weight: Tensor, bias: Tensor) -> nn.Module:
     # with AMX, products in bfloat16 of 33 to 383 rows with 1,536 inputs have other bits than those of fewer or more
     dtype = _dtype(weight.device)
     wide = dtype == torch.bfloat16 and weight.shape[1] > WIDTH
-    return PackedLinear(linear, dtype, rows=ROWS if wide else None)
+    return _InRows(PackedLinear(linear, dtype)) if wide else PackedLinear(linear, dtype)
 
 
 def _dtype(device: torch.device) -> torch.dtype:
     """Return the type of the matrices of node features."""
     return torch.bfloat16 if fast_bf16(device) else torch.float32
+
+
+class _InRows(nn.Module):
+    """A linear layer in products of `ROWS` rows at most."""
+
+    def __init__(self, linear: PackedLinear) -> None:
+        super().__init__()
+        self.linear = linear
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, in) to (N, out)."""
+        return torch.cat([self.linear(part) for part in torch.split(x, ROWS)])
 
 
 class _Int8Linear(nn.Module):

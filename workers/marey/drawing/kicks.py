@@ -35,15 +35,6 @@ def _swinging(rng: random.Random, share: float) -> dict[str, HandPlace]:
     return {side: HandPlace(at, "shoulder", (0.5, -0.6, -0.8)) for side, at in low.items()}
 
 
-_FORMS = {
-    "kick-front": r"front[ -]?kick|kick\w* (?:straight )?(?:ahead|forward)",
-    "kick-side": r"side[ -]?kick|sideways|to the side",
-    "kick-round": "round",
-    "kick-low": r"low[ -]?kick|kick\w* low|shin|ankle",
-}
-"""Words that are true of one form alone."""
-
-
 def kick(rng: random.Random) -> Gesture:
     form = rng.choices(["kick-front", "kick-side", "kick-round", "kick-low"], (5, 2, 2, 2))[0]
     guard = rng.random() < 0.5
@@ -76,8 +67,7 @@ def kick(rng: random.Random) -> Gesture:
     done.then(rng.uniform(0.35, 0.55), Posture(hands=arms) if guard else STAND, 0.1)
     if guard:
         done.then(rng.uniform(0.5, 0.8), STAND)
-    gesture = _side(rng, done, ["kick", form, "kick-guard" if guard else ""])
-    return replace(gesture, untrue="|".join(words for name, words in _FORMS.items() if name != form))
+    return _side(rng, done, ["kick", form, "kick-guard" if guard else ""])
 
 
 def _ahead(up: float) -> tuple[FootPlace, FootPlace, Point]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,14 @@ FAILS = SHOWN
 """Grade of the selector below which a motion does not show its action, and has the flag `off-prompt`."""
 ALWAYS = frozenset({"aim", "laugh", "shoot"})
 """Actions that networks make after a long lead, or walking about, though their rule finds them."""
-FORMS = {"kick": re.compile(r"\b(?:round(?:house)?|side|low)[ -]?kick|\bkick\w* (?:sideways|low\b|to the side)")}
-"""Words of forms of an action that networks do not tell apart."""
+FORMS: Mapping[str, Mapping[str, re.Pattern[str]]] = {
+    "kick": {
+        "kick-round": re.compile(r"\bround(?:house)?[ -]?kick|\broundhouse"),
+        "kick-side": re.compile(r"\bside[ -]?kick|\bkick\w* (?:sideways|to the side)"),
+        "kick-low": re.compile(r"\blow[ -]?kick|\bkick\w* low\b|\bkick\w* .*\b(?:shins?|ankles?)\b"),
+    }
+}
+"""Forms of an action that networks do not tell apart, by their kind, and their words."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
 DRAWN = 6
@@ -54,9 +60,8 @@ def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWis
     """
     if action not in DRAWINGS or action not in RULES or len(features) < SHORTEST:
         return None
-    form = FORMS.get(action)
-    stated = action in ALWAYS or (form is not None and form.search(wish.prompt.lower()))
-    if not stated and _grade(layout.decode(features), action, "") >= FAILS:
+    form = _stated_form(action, wish.prompt.lower())
+    if not form and action not in ALWAYS and _grade(layout.decode(features), action, "") >= FAILS:
         return None
     rng = random.Random(f"{seed} {action}")  # noqa: S311
     frames = len(features) if wish.fixed else None
@@ -74,15 +79,22 @@ def _grade(joints: Array, action: str, side: str) -> float:
     return RULES[action](Motion(joints, FPS), side)
 
 
+def _stated_form(action: str, text: str) -> str:
+    """Return the form of an action that a text names, in lower case; empty if it names none."""
+    return next((kind for kind, words in FORMS.get(action, {}).items() if words.search(text)), "")
+
+
 def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> Iterator[Gesture]:
     """Yield movements of which the prompt says nothing that is not true, and that have room."""
     text = wish.prompt.lower()
+    form = _stated_form(action, text)
     for _ in range(TRIES):
         gesture = DRAWINGS[action](rng)
         other_side = wish.side and gesture.side in (LEFT, RIGHT) and gesture.side != wish.side
         too_long = frames is not None and SHORTER * gesture.seconds * FPS > frames
         untrue = gesture.untrue and re.search(gesture.untrue, text)
-        if not (gesture.base or other_side or too_long or untrue):
+        other_form = form and form not in gesture.kinds
+        if not (gesture.base or other_side or too_long or untrue or other_form):
             yield gesture
 
 
