@@ -41,10 +41,20 @@ _TO_AND_FRO = re.compile(
 _STRUCK = re.compile(
     r"""\b(?P<is>is|are|gets?|got|getting|being)[ ](?P<how>\w+ly\ )?
     (?:stabbed|kicked|slashed|slapped|pushed|shoved|bitten|tackled|clubbed|headbutted|elbowed|kneed|whipped|smacked
-    |speared|rammed)\b(?!\ (?:away|off|around|along|through|to|by\ (?:a|the)\ (?:man|woman|person|worker))\b)""",
+    |speared|rammed|shot(?!\ (?:at|down|dead|to|out)\b))\b
+    (?!\ (?:away|off|around|along|through|to|by\ (?:a|the)\ (?:man|woman|person|worker))\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
 """A blow that the person takes: "is pushed from behind"."""
+_SHOT = re.compile(r"(?:^|(?<=[,;:-] ))shot(?= (?:in|from|through) (?:behind|the|his|her|its|their)\b)", re.IGNORECASE)
+"""The same without a verb: "shot in the chest, staggers back"."""
+_HIT_LEG = re.compile(
+    r"\b(?P<hit>gets?|getting)(?P<how> (?:\w+ly )?hit) in (?:the|his|her|their|its) (?:left |right )?"
+    r"(?:leg|thigh|knee|shin|foot|ankle|calf)\b",
+    re.IGNORECASE,
+)
+"""A blow to a leg, of which models read a kick."""
+_SHOT_DEAD = re.compile(r"\b(?P<is>is|are|gets?|got|being) shot (?:dead|down)\b", re.IGNORECASE)
 _STRUCK_DOWN = re.compile(
     r"""\b(?:is|are|gets?|got)[ ](?:\w+ly[ ])?
     (?:shot|hit|struck|stabbed|punched|kicked|slashed|pushed|shoved|tackled|clubbed|wounded|headbutted)\b
@@ -111,7 +121,9 @@ def without_misleading(prompt: str) -> str:
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
-    return _STRUCK.sub(_hit, _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text)))
+    text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
+    text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
+    return _HIT_LEG.sub(r"\g<hit>\g<how>", _SHOT.sub("gets hit", text))
 
 
 def _with_turns(found: re.Match[str]) -> str:
