@@ -55,6 +55,7 @@ _HIT_LEG = re.compile(
 )
 """A blow to a leg, of which models read a kick."""
 _SHOT_DEAD = re.compile(r"\b(?P<is>is|are|gets?|got|being) shot (?:dead|down)\b", re.IGNORECASE)
+"""A blow that kills."""
 _STRUCK_DOWN = re.compile(
     r"""\b(?:is|are|gets?|got)[ ](?:\w+ly[ ])?
     (?:shot|hit|struck|stabbed|punched|kicked|slashed|pushed|shoved|tackled|clubbed|wounded|headbutted)\b

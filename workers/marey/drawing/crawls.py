@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
-from marey.posing.standing import LEFT, RIGHT
+from marey.posing.standing import OTHER_SIDE, SIGN
 
 _PELVIS = 0.47
 """Metres of the hips over the floor: a thigh over a knee that lies on it."""
@@ -19,6 +21,7 @@ _SHOULDERS = 0.47
 """Metres of the shoulders ahead of the hips."""
 _PACES = {"slow": (1.5, 2.1), "": (1.0, 1.4), "quick": (0.72, 0.92)}
 """Seconds in which each limb moves once."""
+_PostureAt = Callable[[float, dict[str, float], dict[str, float], str], Posture]
 _LIFT = 0.07
 """Metres by which a hand is lifted on its way."""
 
@@ -54,10 +57,11 @@ def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None
     elbow: Point = (rng.uniform(0.4, 0.9), 0.2, -0.8)
     pelvis = _PELVIS - rng.uniform(0.0, 0.03)
 
-    def at(body: float, hands: dict[str, float], feet: dict[str, float], lifted: str, lean: float) -> Posture:
+    def at(body: float, hands: dict[str, float], feet: dict[str, float], lifted: str) -> Posture:
         """A body with its hips at a place along the way, and each limb at its own; `lifted`: the side of the hand in
         the air, if any; the knee of the other side slides over the floor."""
-        other = {LEFT: RIGHT, RIGHT: LEFT}.get(lifted, "")
+        lean = SIGN.get(lifted, 0.0) * sway
+        other = OTHER_SIDE.get(lifted, "")
         places = {
             side: HandPlace((wide, 0.05 + _LIFT * (side == lifted), hands[side] + _SHOULDERS + 0.04), "floor", elbow)
             for side in SIDES
@@ -71,25 +75,36 @@ def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None
         )
         return replace(posture, hands=places, feet=shanks, knees=dict.fromkeys(SIDES, (0.1, -0.8, 0.6)))
 
-    side = rng.choice(SIDES)
-    other = {LEFT: RIGHT, RIGHT: LEFT}[side]
-    quarter = 0.25 * stride
-    hands, feet = {side: -quarter, other: quarter}, {side: quarter, other: -quarter}
-    where = 0.0
-    done = Sequel([0.0], [at(where, hands, feet, "", 0.0)])
-    for k in range(2 * cycles):
-        moves, stays = (side, other) if k % 2 == 0 else (other, side)
-        lean = sway * (1.0 if moves == LEFT else -1.0)
-        middle = {moves: hands[moves] + 0.5 * stride, stays: hands[stays]}
-        sliding = {stays: feet[stays] + 0.5 * stride, moves: feet[moves]}
-        done.then(0.25 * period, at(where + quarter, middle, sliding, moves, lean))
-        hands, feet = {**hands, moves: hands[moves] + stride}, {**feet, stays: feet[stays] + stride}
-        where += 0.5 * stride
-        done.then(0.25 * period, at(where, hands, feet, "", 0.0))
+    done = _moved(at, rng.choice(SIDES), stride, period, cycles)
     kinds = ["crawl-back" if back else "crawl", f"crawl-{tempo}" if tempo and not back else ""]
     untrue = "belly|army|low crawl|forward|along" if back else "belly|army|low crawl"
     gesture = done.gesture(rng, kinds)
     return replace(gesture, seconds=done.times[-1], untrue=untrue)
+
+
+def _moved(at: _PostureAt, side: str, stride: float, period: float, cycles: int) -> Sequel:
+    """Return a crawl: the hand of one side, `side` at first, and the leg of the other move, then the other two.
+
+    Args:
+        at: draws a body from the place of its hips along the way, those of its hands and of its legs, metres, and the
+            side of the hand that moves, empty if none does.
+        side: of the hand that moves first.
+        stride: metres that each limb moves at once; less than 0 = backward.
+        period: seconds in which each limb moves once.
+        cycles: how often each moves.
+    """
+    other, quarter, where = OTHER_SIDE[side], 0.25 * stride, 0.0
+    hands, feet = {side: -quarter, other: quarter}, {side: quarter, other: -quarter}
+    done = Sequel([0.0], [at(where, hands, feet, "")])
+    for k in range(2 * cycles):
+        moves, stays = (side, other) if k % 2 == 0 else (other, side)
+        halfway = {moves: hands[moves] + 0.5 * stride, stays: hands[stays]}
+        drawn_up = {stays: feet[stays] + 0.5 * stride, moves: feet[moves]}
+        done.then(0.25 * period, at(where + quarter, halfway, drawn_up, moves))
+        hands, feet = {**hands, moves: hands[moves] + stride}, {**feet, stays: feet[stays] + stride}
+        where += 0.5 * stride
+        done.then(0.25 * period, at(where, hands, feet, ""))
+    return done
 
 
 _LOW_PELVIS = 0.14
@@ -129,20 +144,7 @@ def low_crawl(rng: random.Random, *, back: bool = False, seconds: float | None =
         rng.uniform(0.16, 0.22), rng.uniform(0.1, 0.15), rng.uniform(14, 20), rng.uniform(-44, -34), rng.uniform(7, 12)
     )
     cycles = max(2, round((seconds or rng.uniform(4.0, 7.0)) / period))
-    side = rng.choice(SIDES)
-    other = {LEFT: RIGHT, RIGHT: LEFT}[side]
-    quarter = 0.25 * stride
-    hands, feet = {side: -quarter, other: quarter}, {side: quarter, other: -quarter}
-    where = 0.0
-    done = Sequel([0.0], [_flat(form, where, hands, feet, "")])
-    for k in range(2 * cycles):
-        moves, stays = (side, other) if k % 2 == 0 else (other, side)
-        halfway = {moves: hands[moves] + 0.5 * stride, stays: hands[stays]}
-        drawn_up = {stays: feet[stays] + 0.5 * stride, moves: feet[moves]}
-        done.then(0.25 * period, _flat(form, where + quarter, halfway, drawn_up, moves))
-        hands, feet = {**hands, moves: hands[moves] + stride}, {**feet, stays: feet[stays] + stride}
-        where += 0.5 * stride
-        done.then(0.25 * period, _flat(form, where, hands, feet, ""))
+    done = _moved(partial(_flat, form), rng.choice(SIDES), stride, period, cycles)
     gesture = done.gesture(rng, ["crawl-low"])
     return replace(gesture, seconds=done.times[-1])
 
@@ -150,7 +152,7 @@ def low_crawl(rng: random.Random, *, back: bool = False, seconds: float | None =
 def _flat(form: _LowForm, where: float, hands: dict[str, float], feet: dict[str, float], lifted: str) -> Posture:
     """A body on its belly with its hips at a place along the way, and each limb at its own; `lifted`: the side of the
     hand that moves, if any."""
-    lean = {LEFT: 1.0, RIGHT: -1.0}.get(lifted, 0.0) * form.sway
+    lean = SIGN.get(lifted, 0.0) * form.sway
     places, shanks, knees = {}, {}, dict[str, Point]()
     for side in SIDES:
         ahead = hands[side] + _LOW_SHOULDERS + 0.25

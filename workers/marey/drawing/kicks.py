@@ -10,7 +10,7 @@ from dataclasses import replace
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.posing.standing import LEFT, RIGHT
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT
 
 _LEG = 0.785
 """Metres from hip to ankle of a leg that is almost straight."""
@@ -20,7 +20,7 @@ _HIP = 0.83
 def _side(rng: random.Random, done: Sequel, kinds: list[str], *, stands: bool = False) -> Gesture:
     """The gesture of a leg that is drawn; the side that is told is that of the leg, or of the one that stands."""
     leg = rng.choice(SIDES)
-    told = {LEFT: RIGHT, RIGHT: LEFT}[leg] if stands else leg
+    told = OTHER_SIDE[leg] if stands else leg
     return (done if leg == LEFT else done.mirrored()).gesture(rng, kinds, told)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from marey.posing.standing import LEFT, RIGHT
+from marey.posing.standing import OTHER_SIDE
 
 Point = tuple[float, float, float]
 
@@ -73,14 +73,14 @@ STAND = Posture()
 
 def mirrored(posture: Posture) -> Posture:
     """Exchange left and right."""
-    other = {LEFT: RIGHT, RIGHT: LEFT}
     turned = {
         name: (angles[0], -angles[1], -angles[2])
         for name, angles in (("tilt", posture.tilt), ("spine", posture.spine), ("neck", posture.neck))
     }
     pelvis = posture.pelvis and (-posture.pelvis[0], *posture.pelvis[1:])
-    other_foot = other.get(posture.over, "")
+    other_foot = OTHER_SIDE.get(posture.over, "")
     sided = {
-        name: {other[side]: put for side, put in getattr(posture, name).items()} for name in ("hands", "feet", "knees")
+        name: {OTHER_SIDE[side]: put for side, put in getattr(posture, name).items()}
+        for name in ("hands", "feet", "knees")
     }
     return replace(posture, pelvis=pelvis, over=other_foot, **turned, **sided)

@@ -20,7 +20,7 @@ from marey.motion.rotations import cross, from_rotvec, normalize, rotate
 from marey.posing.bones import two_bones
 from marey.posing.curves import blurred, monotone
 from marey.posing.limbs import BONE_LENGTHS, CARRIED, FPS, GRAVITY, LEVEL
-from marey.posing.standing import ARMS, LEFT, LEGS, RIGHT, SIGN, StandingBody
+from marey.posing.standing import ARMS, LEGS, OTHER_SIDE, SIGN, StandingBody
 
 Array = NDArray[np.floating]
 
@@ -81,9 +81,8 @@ class Whole:
 
 def flipped(whole: Whole) -> Whole:
     """Exchange left and right."""
-    other = {LEFT: RIGHT, RIGHT: LEFT}
     turned = {name: _mirrored(getattr(whole, name)) for name in ("tilt", "spine", "neck")}
-    sided = {name: {other[side]: put for side, put in getattr(whole, name).items()} for name in ("hands", "feet")}
+    sided = {name: {OTHER_SIDE[side]: put for side, put in getattr(whole, name).items()} for name in ("hands", "feet")}
     return replace(whole, at=(-whole.at[0], whole.at[1]), **turned, **sided)
 
 
