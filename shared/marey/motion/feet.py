@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.motion.legs import follow_feet, foot_chain
 from marey.motion.rotations import Array, normalize
-from marey.motion.skeleton import OTHER_FOOT, Skeleton
+from marey.motion.skeleton import HUMANML3D, OTHER_FOOT, Skeleton
+from marey.motion.support import clearance
 
 Bool = NDArray[np.bool_]
 
@@ -72,7 +73,7 @@ def clean_feet(
     joints = np.array(joints, np.float64)
     need_feet(skeleton)
     joints[..., 1] -= floor_height(joints, skeleton)
-    stands = find_contacts(joints, skeleton, fps, rule=rule) if contacts is None else np.array(contacts, bool)
+    stands = _on_floor(joints, skeleton, fps, rule) if contacts is None else np.array(contacts, bool)
     before = joints.copy()
     for side in range(2):
         ankle, toe = skeleton.feet[2 * side : 2 * side + 2]
@@ -101,10 +102,16 @@ def floor_height(joints: Array, skeleton: Skeleton) -> float:
     """Return the height of the floor over y = 0 in metres; zero while toes stand within `FLOOR_BAND`, and for a body in
     the air.
 
-    The height at which toes stand is the tenth percentile of the lowest toe's: bouncing and tiptoe do not lift it.
+    The height at which toes stand is the tenth percentile of the lowest toe's: bouncing and tiptoe do not lift it. A
+    body that lies or kneels on other parts, its feet raised, is let down no further than these.
     """
     height = float(np.quantile(joints[:, list(skeleton.feet[1::2]), 1].min(axis=1), 0.1))
-    return 0.0 if height > 0.5 else height - float(np.clip(height, *FLOOR_BAND))
+    if height > 0.5:
+        return 0.0
+    floor = height - float(np.clip(height, *FLOOR_BAND))
+    if floor > 0 and skeleton.joint_names == HUMANML3D.joint_names:
+        return min(floor, max(float(np.quantile(clearance(joints), 0.1)), 0.0))
+    return floor
 
 
 def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: ContactRule = RULE) -> Bool:
@@ -135,6 +142,13 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
             if (end - begin) / fps < rule.shortest:
                 stands[begin:end, foot] = False
     return stands
+
+
+def _on_floor(joints: Array, skeleton: Skeleton, fps: float, rule: ContactRule) -> Bool:
+    """Detect foot contacts (T, 4) of a body over a floor at y = 0; feet that are held still above it have none."""
+    stands = find_contacts(joints, skeleton, fps, rule=rule)
+    low = joints[:, list(skeleton.feet[1::2]), 1] < FLOOR_BAND[1] + rule.toe_height
+    return stands & np.repeat(low, 2, axis=1)
 
 
 def runs(mask: Bool) -> list[tuple[int, int]]:

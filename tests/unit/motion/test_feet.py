@@ -237,3 +237,12 @@ def test_a_running_body_stands_in_wider_bounds() -> None:
     assert skate(clean, contacts, HUMANML3D, 20.0) < 1e-6
     assert rule_for(np.asarray(walker(seconds=3).joints, np.float64), 20.0) is RULE
     assert rule_for(joints[:1], 20.0) is RULE
+
+
+def test_a_body_on_knees_and_hands_is_not_let_down_by_its_raised_feet():
+    joints = np.repeat(walker().joints[:1].astype(np.float64), 40, axis=0)
+    joints[:, KNEES, 1] = 0.05
+    joints[:, [*ANKLES, L_TOE, R_TOE], 1] = 0.2
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert not contacts.any()
+    np.testing.assert_allclose(clean[:, KNEES, 1], 0.05, atol=0.01)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.fine_wish import FineWish
@@ -21,11 +22,12 @@ from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
 from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
-from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, Request, S
+from marey.generation.passes import PassControl
+from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
 from marey.generation.raising import stated_action
 from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
-from marey.generation.stated import AT_PACE, stated_features
+from marey.generation.stated import AT_PACE
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.timed import cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -43,6 +45,7 @@ from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
 from marey.text.features import TextFeatures
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
@@ -184,55 +187,83 @@ def generate_as_asked(
         InvalidInput: as `Limits.check`.
     """
     wishes = [_Wish.of(request) for request in requests]
-    redraws = generator.bundle.manifest.draws_bearings
-    drawn = [wish.drawn(request, generator.limits) for wish, request in zip(wishes, requests, strict=True)]
-    made = generator.generate(drawn, settings, control=control)
+    whole = [_whole(generator, request, wish) for request, wish in zip(requests, wishes, strict=True)]
+    left = [row for row, drawn in enumerate(whole) if drawn is None]
+    asked = [wishes[row].drawn(requests[row], generator.limits) for row in left]
+    watched = PassControl(control or NoControl(), left, len(requests) - len(left), len(requests))
+    made = dict(zip(left, generator.generate(asked, settings, control=watched) if left else (), strict=True))
     return [
-        None if motion is None else _as_asked(generator.layout, request, wish, motion, redraws=redraws)
-        for request, wish, motion in zip(requests, wishes, made, strict=True)
+        _as_asked(generator, request, wish, drawn, made.get(row))
+        for row, (request, wish, drawn) in enumerate(zip(requests, wishes, whole, strict=True))
     ]
 
 
+def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole | None:
+    """Return the motion that is drawn for a request before a network is asked; None if none is.
+
+    Raises:
+        InvalidInput: as `Limits.check`.
+    """
+    if not _draws(generator) or not wish.action:
+        return None
+    generator.limits.check(request)
+    frames = (request if wish.action in AT_PACE else wish.drawn(request, generator.limits)).frames
+    fine = wish.fine(request)
+    held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
+    return drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
+
+
+def _draws(generator: Generator[S]) -> bool:
+    return generator.bundle.manifest.draws_bearings and generator.layout.skeleton.name == HUMANML3D.name
+
+
 def _as_asked(
-    layout: FeatureLayout, request: Request, wish: _Wish, motion: MotionFeatures, *, redraws: bool
-) -> MotionFeatures:
-    """Return the motion, changed where the wish is not fulfilled and can be.
+    generator: Generator[S], request: Request, wish: _Wish, whole: DrawnWhole | None, made: MotionFeatures | None
+) -> MotionFeatures | None:
+    """Return a motion that was drawn, or the one that the network made, changed where the wish is not fulfilled and can
+    be; None if there is neither.
 
     Args:
-        layout: of the features.
+        generator: that made it.
         request: for the motion.
         wish: what its prompt asks for.
-        motion: as the network made it.
-        redraws: one that does not show its action is drawn instead.
+        whole: drawn.
+        made: by the network.
     """
-    features: Float32 = motion.features
+    if whole is None and made is None:
+        return None
+    layout, features = generator.layout, whole.features if made is None else made.features
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
-    one_side = bool(wish.limb or wish.side)
-    if _is_better_mirrored(features, layout, wish) if one_side else wish.action in ALIKE and request.seed % 2:
+    if _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
-    stated = None
-    if layout.skeleton.name == HUMANML3D.name:
-        stated = _stated(features, layout, wish, request) if redraws else None
-        drawn = _drawn(features, layout, wish, request, redraws=redraws) if stated is None else stated
+    if whole is not None:
+        changes["drawn"] = wish.action
+    elif layout.skeleton.name == HUMANML3D.name:
+        drawn = _drawn(features, layout, wish, request, redraws=_draws(generator))
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
-        for change in (_as_often, _turned, _on_floor, _ended) if stated is None else ():
+    if layout.skeleton.name == HUMANML3D.name:
+        for change in (_as_often, _turned, _on_floor, _ended) if whole is None or not whole.exact else ():
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
-    if stated is None or wish.action not in AT_PACE:
+    if whole is None or not whole.exact or wish.action not in AT_PACE:
         features = _retimed(features, layout, wish, fixed, changes)
-    return AskedMotion(features, changes) if changes or len(features) != len(motion.features) else motion
+    changed = changes or made is None or len(features) != len(made.features)
+    return AskedMotion(features, changes) if changed else made
 
 
-def _stated(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
-    """Return the movement whose form the prompt states, drawn; None if it states none."""
-    frames = (request.frames if wish.action in AT_PACE else None) or len(features)
-    return stated_features(layout, wish.action, wish.fine(request), frames, request.seed)
+def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: int, *, drawn: bool) -> bool:
+    """Return True if the mirror image of a motion is what the prompt asks for, or does as well and differs from that of
+    the seed before."""
+    if wish.limb or wish.side:
+        return _is_better_mirrored(features, layout, wish)
+    return not drawn and wish.action in ALIKE and seed % 2 == 1
 
 
 def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request, *, redraws: bool) -> Float32 | None:
-    """Return the motion with what is drawn of its action, or one that is drawn as a whole; None if it stays."""
+    """Return the motion of a network with what is drawn of its action, or one that is drawn in its place; None if it
+    stays."""
     if wish.action not in FINE:
         return redrawn(features, layout, wish.action, wish.fine(request), request.seed) if redraws else None
     if _shows(features, layout, wish, request):

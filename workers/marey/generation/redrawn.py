@@ -48,8 +48,8 @@ SHORTER = 0.85
 
 
 def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWish, seed: int) -> Float32 | None:
-    """Return features (T', D) of a drawn movement in place of a motion that does not show its action, or not in the
-    form that its prompt states; None if it does, or nothing better can be drawn.
+    """Return features (T', D) of a drawn movement in place of a motion that does not show its action; None if it does,
+    or nothing better can be drawn.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
@@ -60,11 +60,25 @@ def redrawn(features: Float32, layout: FeatureLayout, action: str, wish: FineWis
     """
     if action not in DRAWINGS or action not in RULES or len(features) < SHORTEST:
         return None
-    form = _stated_form(action, wish.prompt.lower())
-    if not form and action not in ALWAYS and _grade(layout.decode(features), action, "") >= FAILS:
+    if _grade(layout.decode(features), action, "") >= FAILS:
+        return None
+    return drawn_alone(layout, action, wish, seed, len(features) if wish.fixed else None)
+
+
+def drawn_alone(layout: FeatureLayout, action: str, wish: FineWish, seed: int, frames: int | None) -> Float32 | None:
+    """Return features (T, D) of a movement that is drawn on a body that stands; None if none of those that the prompt
+    asks for shows the action.
+
+    Args:
+        layout: of the features, on the skeleton of HumanML3D.
+        action: id in the vocabulary.
+        wish: what the prompt asks for.
+        seed: of the motion.
+        frames: of the motion; None = as many as it takes.
+    """
+    if action not in DRAWINGS or action not in RULES or (frames is not None and frames < SHORTEST):
         return None
     rng = random.Random(f"{seed} {action}")  # noqa: S311
-    frames = len(features) if wish.fixed else None
     for number, gesture in enumerate(_asked_for(action, wish, rng, frames)):
         if number == DRAWN:
             break

@@ -52,14 +52,16 @@ STATED: Mapping[str, Statement] = {"raise-arm": stated_raise, "clap": _claps, "s
 """Movements by action."""
 
 
-def stated_features(layout: FeatureLayout, action: str, wish: FineWish, frames: int, seed: int) -> Float32 | None:
+def stated_features(
+    layout: FeatureLayout, action: str, wish: FineWish, frames: int | None, seed: int
+) -> Float32 | None:
     """Return features (T, D) of the movement that a prompt states; None if it states no form.
 
     Args:
         layout: of the features, on the skeleton of HumanML3D.
         action: id in the vocabulary.
         wish: what the prompt asks for.
-        frames: of the motion that the network made, kept if the wish is for a fixed length.
+        frames: that it keeps, if the wish is for a fixed length.
         seed: of the motion.
     """
     state = STATED.get(action)

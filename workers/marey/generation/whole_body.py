@@ -206,11 +206,11 @@ LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {"roll": _IN_BED, "lie-down": 
 def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Generator], Array | None]:
     """Return a function that draws an action in place of a motion; None for a kind that is not drawn, and for a motion
     that is too short for it."""
-    others = LEFT_TO_NETWORKS.get(action)
+    draws = is_drawn(action)
 
     def drawn(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
         del fps
-        if others is not None and others.search(wish.prompt.lower()):
+        if not draws(wish):
             return None
         chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
         times = min(wish.count or 1, MOST) if action in AGAIN else 1
@@ -218,6 +218,12 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
         return drawn_in_place(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames, chance)
 
     return drawn
+
+
+def is_drawn(action: str) -> Callable[[FineWish], bool]:
+    """Return a function that tells if a movement of an action is drawn as its prompt asks for it."""
+    others = LEFT_TO_NETWORKS.get(action)
+    return lambda wish: others is None or not others.search(wish.prompt.lower())
 
 
 def drawn_in_place(

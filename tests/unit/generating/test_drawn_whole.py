@@ -1,0 +1,95 @@
+"""Motions that are drawn whole, without a network."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from marey.core.errors import InvalidInput
+from marey.generation.asked import AskedMotion, generate_as_asked
+from marey.generation.drawn_whole import drawn_whole
+from marey.generation.fine_wish import FineWish
+from marey.generation.port import Limits, NoControl, Request
+from marey.generation.shots.windows import no_text
+from marey.motion.features import HUMANML3D_263
+from marey.selector.motion import Motion
+from marey.selector.repetitions import REPETITIONS
+
+LAYOUT = HUMANML3D_263
+
+
+class Network:
+    """A generator that counts what it is asked for."""
+
+    layout = LAYOUT
+    limits = Limits(16, 196, 20.0, 4)
+    bundle = SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True))
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.dropped: set[int] = set()
+        self.reports: list[tuple[int, int]] = []
+
+    def generate(self, requests: Any, settings: Any, *, control: Any) -> list[Any]:
+        self.asked = [request.text.prompt for request in requests]
+        control.progress(1, 1)
+        self.dropped = control.dropped()
+        return [SimpleNamespace(features=np.zeros((40, LAYOUT.dim), np.float32)) for _ in requests]
+
+
+def ask(prompt: str, **more: Any) -> Request:
+    return Request(replace(no_text(4), prompt=prompt, rewritten=prompt), 1, **more)
+
+
+def test_a_network_is_asked_for_what_is_not_drawn_alone() -> None:
+    network = Network()
+
+    class Control(NoControl):
+        def progress(self, done: int, total: int) -> None:
+            network.reports.append((done, total))
+
+        def dropped(self) -> set[int]:
+            return {1, 2}
+
+    prompts = ["a man kneels", "a man walks", "a man claps", "a man dances"]
+    made = generate_as_asked(network, [ask(each) for each in prompts], control=Control())  # type: ignore[arg-type]
+    assert network.asked == ["a man walks", "a man dances"]
+    assert network.dropped == {0}
+    assert network.reports == [(400, 400)]
+    assert [isinstance(each, AskedMotion) and "drawn" in each.changes for each in made] == [True, False, True, False]
+
+
+def test_no_network_is_asked_where_all_is_drawn() -> None:
+    network = Network()
+    network.generate = None  # type: ignore[assignment,method-assign]
+    (made,) = generate_as_asked(network, [ask("a man kneels")])  # type: ignore[arg-type]
+    assert isinstance(made, AskedMotion)
+    with pytest.raises(InvalidInput, match="300 frames is out of range"):
+        generate_as_asked(network, [ask("a man kneels", frames=300)])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("action", ["walk", "run", "dance", "sneak", ""])
+def test_ways_and_dances_are_left_to_networks(action: str) -> None:
+    assert drawn_whole(LAYOUT, action, FineWish(), 1, None) is None
+
+
+@pytest.mark.parametrize("count", [None, 2, 3])
+def test_nods_are_drawn_on_a_body_that_stands(count: int | None) -> None:
+    drawn = drawn_whole(LAYOUT, "nod", FineWish(count), 1, None)
+    assert drawn is not None
+    joints = LAYOUT.decode(drawn.features)
+    if count is not None:
+        assert len(REPETITIONS["nod"](Motion(joints, LAYOUT.fps))) == count
+    assert 1.5 < len(joints) / LAYOUT.fps < 4.5
+    assert np.ptp(joints[:, 0, [0, 2]], axis=0).max() < 0.05
+
+
+def test_the_number_of_frames_is_kept_where_it_is_fixed() -> None:
+    for action in ("kneel", "nod", "crawl", "clap"):
+        drawn = drawn_whole(LAYOUT, action, FineWish(fixed=True), 1, 120)
+        assert drawn is not None
+        assert len(drawn.features) == 120
