@@ -27,6 +27,7 @@ def wave(rng: random.Random) -> Gesture:
     hold = {"brief": (1.3 / rate, 1.7 / rate), "": (2.0 / rate, 3.4), "long": (4.2, 6.5)}[length]
     pace = GesturePace.draw(rng, (0.35, 0.9), hold)
     side = rng.choices([*SIDES, BOTH], (4, 4, 1))[0]
+    form = "wave-high" if side == BOTH and form == "wave-low" else form  # who waves both is to be seen from afar
     arms = {one: drawn_arm(rng, _WAVES[form]) for one in arms_of(side)}
     whole = rng.uniform(0.5, 0.9) if form == "wave-whole" else rng.uniform(0, 0.15)
     twist, sway = rng.uniform(-2, 8), rng.uniform(0, 4)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from marey.drawing.aims import aim, shoot_basket
 from marey.drawing.archery import draw_bow
-from marey.drawing.arms import clap, guide, raise_arm
+from marey.drawing.arms import clap, guide, raise_arm, wave
 from marey.drawing.bends import bend_over, pick_up, squat
 from marey.drawing.blades import slash, stab
 from marey.drawing.cheers import cheer
@@ -77,6 +77,7 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "talk": talk,
     "twist": twist,
     "wash": wash,
+    "wave": wave,
 }
 """Functions of a random generator that draw one movement of an action. `flinch` and `hang` are left out: what is drawn
 of them in place of a failed motion passes the referee less often, on development prompts."""

@@ -56,11 +56,13 @@ def kneel(rng: random.Random) -> Gesture:
     while done.times[-1] < end:
         spine, neck = (lean + rng.uniform(-4, 6), rng.uniform(-2, 2), rng.uniform(-6, 6)), (rng.uniform(-6, 16), 0, 0)
         done.then(rng.uniform(0.6, 1.1), replace(low, spine=spine, neck=neck), rng.uniform(0.1, 0.6))
-    if begin == "stand" and rng.random() < 0.5:
+    rises = begin == "stand" and rng.random() < 0.5
+    if rises:
         if not one:
             done.then(0.8 * pace, half)
         done.then(0.45 * pace, replace(way, hands={RIGHT: _PRAYS["kneel-front"][RIGHT]}))
         done.then(0.55 * pace, STAND)
     down = "kneel-down" if begin == "stand" else "kneel-stay"
     kinds = ["kneel", "kneel-one" if one else "kneel-both", down]
-    return done.either(rng).gesture(rng, [*kinds, "kneel-clasped" if hands == "kneel-clasped" else ""])
+    kinds += ["kneel-clasped" if hands == "kneel-clasped" else "", "kneel-up" if rises else ""]
+    return done.either(rng).gesture(rng, kinds)

@@ -25,7 +25,6 @@ from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
 from marey.generation.raising import stated_action
-from marey.generation.redrawn import redrawn
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
 from marey.generation.stepped import frames_of_steps, stepped
@@ -64,7 +63,7 @@ class AskedMotion:
     Attributes:
         features: (T, D), in the layout's own units.
         changes: for the manifest: `mirrored`, true where left and right are exchanged; `drawn`, the action whose
-            movement is drawn on what the network made or in its place (`marey.generation.fine`, `redrawn`);
+            movement is drawn on what the network made or in its place (`marey.generation.fine`, `drawn_whole`);
             `repetitions`, how often the network `made` and the prompt `asked` for the action; `turn`, degrees from
             the first frame to the last, positive to the left, as the network `made` them and as they are `shown`;
             `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
@@ -240,7 +239,7 @@ def _as_asked(
     if whole is not None:
         changes["drawn"] = wish.action
     elif layout.skeleton.name == HUMANML3D.name:
-        drawn = _drawn(features, layout, wish, request, redraws=_draws(generator))
+        drawn = _drawn(features, layout, wish, request)
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action
     if layout.skeleton.name == HUMANML3D.name:
@@ -261,12 +260,9 @@ def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: in
     return not drawn and wish.action in ALIKE and seed % 2 == 1
 
 
-def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request, *, redraws: bool) -> Float32 | None:
-    """Return the motion of a network with what is drawn of its action, or one that is drawn in its place; None if it
-    stays."""
-    if wish.action not in FINE:
-        return redrawn(features, layout, wish.action, wish.fine(request), request.seed) if redraws else None
-    if _shows(features, layout, wish, request):
+def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
+    """Return the motion of a network with what is drawn of its action; None if it stays."""
+    if wish.action not in FINE or _shows(features, layout, wish, request):
         return None
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
 

@@ -1,37 +1,50 @@
 """Motions that are drawn whole, without a network: movements whose form is known better than a network learned it.
 
-Networks that learned an action from few takes lead into it for long, do it twice, begin in the air, or end in another
-posture. What is drawn begins and ends with a body that stands, on the side, as often and in the form that the prompt
-names. Walks, runs, dances and everything else stay theirs.
+Networks that learned an action from few takes lead into it for long, do it twice, begin in the air, end in another
+posture, or do something else. What is drawn begins and ends with a body that stands, on the side, as often and in the
+form that the prompt names, as the made clips of the training data are. Walks, runs, dances and everything else stay
+theirs, and what has no room in a length that is fixed.
 """
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.drawing.forms import misfit
+from marey.drawing.gesture import Gesture
+from marey.drawing.kinds import DRAWINGS
 from marey.generation.fine import FINE
 from marey.generation.fine_wish import FineWish
-from marey.generation.redrawn import drawn_alone
 from marey.generation.stated import stated_features
 from marey.generation.striking import stands
 from marey.generation.whole_body import CHOICES, is_drawn
 from marey.motion.features import FeatureLayout, encode_all
 from marey.posing.limbs import FPS
+from marey.posing.standing import LEFT, RIGHT, StandingBody
 from marey.posing.still import standing_still
+from marey.quality.record import SHOWN
+from marey.selector.motion import SHORTEST, Motion
+from marey.selector.rules import RULES
 
 Float32 = NDArray[np.float32]
+Array = NDArray[np.floating]
 
-NETWORKS_FIRST: frozenset[str] = frozenset()
-"""Actions of which networks make the better motions, where these show them."""
 NODS_S = (2.6, 4.0)
 """Seconds of a body that nods, where nothing is said of them; a stated number takes what it takes."""
 NOD_S = 0.75
 """Seconds of one nod of a stated number."""
+TRIES = 40
+"""Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
+DRAWN = 6
+"""Movements that are drawn and graded at most."""
+SHORTER = 0.85
+"""Share of its own length to which a movement is cut at most, where the length is fixed: at its end the body waits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +61,8 @@ class DrawnWhole:
 
 
 def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, frames: int | None) -> DrawnWhole | None:
-    """Return a motion that shows an action as its prompt asks, drawn on a body that stands; None if it is a network's.
+    """Return a motion that shows an action as its prompt asks, drawn on a body that stands; None if it is a network's,
+    or none of those that the prompt asks for shows the action.
 
     Args:
         layout: of the features, on the skeleton of HumanML3D.
@@ -60,15 +74,17 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
     stated = stated_features(layout, action, wish, frames, seed)
     if stated is not None:
         return DrawnWhole(stated, exact=True)
+    rng = np.random.default_rng([seed, len(action)])
     if action in ALONE and ALONE[action](wish):
-        rng = np.random.default_rng([seed, len(action)])
         body = standing_still(frames or _frames(action, wish, rng), random.Random(f"{seed} stands"))  # noqa: S311
         joints = FINE[action].draw(body, FPS, wish, rng)
         return None if joints is None else DrawnWhole(encode_all(layout, joints))
-    if action in NETWORKS_FIRST:
+    if action not in DRAWINGS or action not in RULES or (frames is not None and frames < SHORTEST):
         return None
-    alone = drawn_alone(layout, action, wish, seed, frames)
-    return None if alone is None else DrawnWhole(alone)
+    joints = _shown(action, wish, random.Random(f"{seed} {action}"), frames)  # noqa: S311
+    if joints is not None and action in FINE and wish.count is not None:
+        joints = FINE[action].draw(joints, FPS, wish, rng)
+    return None if joints is None else DrawnWhole(encode_all(layout, joints))
 
 
 def _frames(action: str, wish: FineWish, rng: np.random.Generator) -> int:
@@ -85,3 +101,40 @@ ALONE: Mapping[str, Callable[[FineWish], bool]] = {
     "punch": stands,
 }
 """Actions of `FINE`, by what prompts are drawn without what a network made."""
+
+
+def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> Array | None:
+    """Return joints (T, 22, 3) of the first movement that shows its action; None if none does."""
+    for number, gesture in enumerate(_asked_for(action, wish, rng, frames)):
+        if number == DRAWN:
+            break
+        joints = _drawn(gesture, frames, rng)
+        side = wish.side if gesture.side in (LEFT, RIGHT) else ""
+        if RULES[action](Motion(joints, FPS), side) >= SHOWN:
+            return joints
+    return None
+
+
+def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> Iterator[Gesture]:
+    """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
+    says first."""
+    text = wish.prompt.lower()
+    drawn = [DRAWINGS[action](rng) for _ in range(TRIES)]
+    yield from (
+        gesture
+        for gesture in sorted(drawn, key=lambda each: misfit(each, action, text, wish.count))
+        if _may_be(gesture, text, wish.side, frames)
+    )
+
+
+def _may_be(gesture: Gesture, text: str, side: str, frames: int | None) -> bool:
+    other_side = side and gesture.side in (LEFT, RIGHT) and gesture.side != side
+    too_long = frames is not None and SHORTER * gesture.seconds * FPS > frames
+    untrue = gesture.untrue and re.search(gesture.untrue, text)
+    return not (gesture.base or other_side or too_long or untrue)
+
+
+def _drawn(gesture: Gesture, frames: int | None, rng: random.Random) -> Array:
+    body = StandingBody(standing_still(frames or max(round(gesture.seconds * FPS), SHORTEST), rng))
+    gesture.change(body)
+    return body.solved()
