@@ -80,9 +80,10 @@ def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     assert uppercut[:, 1].max() > 0.05
 
 
-def test_the_feet_stay() -> None:
+def test_the_feet_of_a_body_that_punches_on_and_on_stay() -> None:
     made = drawn("punch")
-    assert np.abs(made - BEFORE[: len(made)])[:, LEGS].max() < 0.03
+    assert np.abs(made - made[0])[:, LEGS].max() < 0.01
+    assert abs(len(made) - len(BEFORE)) <= 1
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -22,9 +22,9 @@ _SQUATS = {
 _PAST_FACE = (0.08, 0.08, 0.26)  # hands go past the face on their way behind the head
 
 
-def squat(rng: random.Random) -> Gesture:
+def squat(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(list(_SQUATS), (4, 3, 2, 2, 3))[0]
-    times = rng.choices((1, 2, 3), (5, 2, 3))[0]
+    times = times or rng.choices((1, 2, 3), (5, 2, 3))[0]
     tempo = rng.choice(["quick", "", "", "slow"] if times < 3 else ["quick", ""])
     deep = rng.random() < 0.5
     height = rng.uniform(0.36, 0.5) if deep else rng.uniform(0.5, 0.65)
@@ -64,10 +64,10 @@ def squat(rng: random.Random) -> Gesture:
     return done.gesture(rng, kinds, times=times)
 
 
-def bend_over(rng: random.Random) -> Gesture:
+def bend_over(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(["bend-toes", "bend-hang", "bend-knees", "bend-one"], (4, 3, 2, 2))[0]
     side = rng.choice(SIDES) if form == "bend-one" else ""
-    times = rng.choices((1, 2, 3), (6, 1, 1))[0] if form == "bend-toes" else 1
+    times = times or (rng.choices((1, 2, 3), (6, 1, 1))[0] if form == "bend-toes" else 1)
     tempo = rng.choice(["quick", "", "", "slow"])
     fall, hold = rng.uniform(*TEMPOS[tempo]), rng.uniform(0.2, 2.2)
     pitch, spine = rng.uniform(54, 66), rng.uniform(40, 52)

@@ -19,12 +19,12 @@ _STABS: dict[str, tuple[Point, Point, Point]] = {
 """Where the hand with the weapon waits, is drawn back to, and thrusts."""
 
 
-def stab(rng: random.Random) -> Gesture:
+def stab(rng: random.Random, *, times: int | None = None) -> Gesture:
     form, side = rng.choices(list(_STABS), (3, 3, 2, 3))[0], rng.choice(SIDES)
     lead = rng.choice(SIDES) if form != "stab-spear" else OTHER_SIDE[side]
     ready, start, stance = begun(rng, lead)
     guard, back, end = (near(rng, place) for place in _STABS[form])
-    number = rng.choices((1, 2, 3), (5, 2, 2))[0]
+    number = times or rng.choices((1, 2, 3), (5, 2, 2))[0]
     lunges = rng.random() < 0.4
     stride = rng.uniform(0.28, 0.5)
     blows: list[Blow] = []
@@ -82,11 +82,11 @@ _SLASHES: dict[str, tuple[Point, Point, Point]] = {
 _TWO_HANDED = ("slash-down", "slash-down", "slash-diagonal", "slash-diagonal", "slash-across")
 
 
-def slash(rng: random.Random) -> Gesture:
+def slash(rng: random.Random, *, times: int | None = None) -> Gesture:
     side, lead = rng.choices(SIDES, (2, 3))[0], rng.choice(SIDES)
     ready, start, stance = begun(rng, lead)
     both = rng.random() < 0.4
-    number = rng.choices((1, 2, 3), (5, 3, 2))[0]
+    number = times or rng.choices((1, 2, 3), (5, 3, 2))[0]
     forms = _TWO_HANDED if both else tuple(_SLASHES)
     form = rng.choice(forms) if number == 1 or rng.random() < 0.4 else ""
     heavy = rng.random() < 0.4

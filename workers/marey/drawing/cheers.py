@@ -31,13 +31,13 @@ _PUMPS = {
 """Where a fist is down and up while it is pumped: outward, up and forward of the middle of the shoulders, metres."""
 
 
-def cheer(rng: random.Random) -> Gesture:
+def cheer(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(list(_PUMPS), (5, 3, 4, 4, 4))[0]
     low, high = (np.array([rng.uniform(*limits) for limits in _PUMPS[form][name]]) for name in ("low", "high"))
     side = rng.choice(SIDES) if form in ("cheer-one", "cheer-yes") else BOTH
     if form == "cheer-yes" and rng.random() < 0.4:
         side = BOTH
-    times = rng.choices((1, 2, 3, 4, 6), (3, 3, 3, 2, 1))[0]
+    times = times or rng.choices((1, 2, 3, 4, 6), (3, 3, 3, 2, 1))[0]
     start, wind, up, down = (
         rng.uniform(0.1, 0.8),
         rng.uniform(0.3, 0.5),

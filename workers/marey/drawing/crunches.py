@@ -24,12 +24,12 @@ _HALF = {"quick": (0.3, 0.4), "": (0.42, 0.6), "slow": (0.75, 1.1)}
 """Seconds of coming together."""
 
 
-def knee_to_elbow(rng: random.Random) -> Gesture:
+def knee_to_elbow(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choice(list(_GUARD))
     cross = rng.random() < 0.75
     tempo = rng.choice(["quick", "", "", "slow"])
     half = rng.uniform(*_HALF[tempo])
-    times = rng.randint(1, min(8, int(6.4 / (2.1 * half))))
+    times = times or rng.randint(1, min(8, int(6.4 / (2.1 * half))))
     alternate = times > 1 and rng.random() < 0.65
     arms = both(replace(_GUARD[form], at=near(rng, _GUARD[form].at)))
     ready = Posture((0.0, 0.92, -0.01), spine=(2, 0, 0), hands=arms)

@@ -23,8 +23,8 @@ _PARTS = (0.2, 0.32, 0.52, 0.72, 0.84, 1.0)
 _ASIDE = 0.12  # share of the way between its places at which a foot rises and falls
 
 
-def jumping_jacks(rng: random.Random) -> Gesture:
-    times = rng.randint(2, 6)
+def jumping_jacks(rng: random.Random, *, times: int | None = None) -> Gesture:
+    times = times or rng.randint(2, 6)
     half = rng.uniform(0.36, 0.52)
     wide, hop, dip = rng.uniform(0.3, 0.42), rng.uniform(0.07, 0.12), rng.uniform(0.04, 0.09)
     start, crouch = rng.uniform(0.2, 0.7), 0.3
@@ -87,12 +87,12 @@ _TRUNK = 0.545
 """Metres from the hips to the shoulders of a straight body, along it."""
 
 
-def push_ups(rng: random.Random) -> Gesture:
+def push_ups(rng: random.Random, *, times: int | None = None) -> Gesture:
     knees = rng.random() < 0.25
     tempo = rng.choice(["quick", "", "", "slow"])
     half = {"quick": (0.4, 0.55), "": (0.6, 0.9), "slow": (1.1, 1.6)}[tempo]
     down = rng.uniform(*half)
-    times = rng.randint(1, min(5, int(_LONGEST / (2 * down + 0.3))))
+    times = times or rng.randint(1, min(5, int(_LONGEST / (2 * down + 0.3))))
     base, leg = (0.06, 0.39) if knees else (0.155, 0.795)
     top, bottom = rng.uniform(0.49, 0.52), rng.uniform(0.2, 0.29)
     wide, ahead = rng.uniform(0.22, 0.34), rng.uniform(-0.03, 0.06)
@@ -130,12 +130,12 @@ _CRUNCHES = {
 }
 
 
-def sit_ups(rng: random.Random) -> Gesture:
+def sit_ups(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choice(list(_CRUNCHES))
     crunch = rng.random() < 0.3
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = rng.uniform(*{"quick": (0.5, 0.7), "": (0.75, 1.1), "slow": (1.2, 1.7)}[tempo])
-    times = rng.randint(1, min(5, int(_LONGEST / (2.2 * rise + 0.3))))
+    times = times or rng.randint(1, min(5, int(_LONGEST / (2.2 * rise + 0.3))))
     hand = _CRUNCHES[form]
     legs: dict[str, FootPlace] = dict.fromkeys(SIDES, FootPlace((0.11, 0.07, rng.uniform(0.4, 0.5))))
     lying = on_back(0.0, feet=legs, knees=rng.uniform(0.0, 0.25))

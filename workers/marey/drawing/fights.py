@@ -91,9 +91,9 @@ _BLOCKS: dict[str, tuple[dict[str, Point], Point]] = {
 """Where the hand that blocks and the other one go, and where the elbow points."""
 
 
-def block(rng: random.Random) -> Gesture:
+def block(rng: random.Random, *, times: int | None = None) -> Gesture:
     form, side = rng.choices(list(_BLOCKS), (3, 3, 2, 2, 2))[0], rng.choice(SIDES)
-    number = rng.choices((1, 2, 3), (6, 2, 1))[0]
+    number = times or rng.choices((1, 2, 3), (6, 2, 1))[0]
     stands = rng.random() < 0.45
     lead = rng.choice(SIDES)
     ready, start, stance = (0.1, -2.0, None) if stands else begun(rng, lead)

@@ -40,9 +40,9 @@ _ARMS = {
 }
 
 
-def hop(rng: random.Random) -> Gesture:
+def hop(rng: random.Random, *, times: int | None = None) -> Gesture:
     """Drawn for the right foot and mirrored for the left one; the left foot is lifted."""
-    drawn = _Hops(rng)
+    drawn = _Hops(rng, times)
     times, form, stride = drawn.times, drawn.form, drawn.stride
     kinds = ["hop", "hop-ahead" if stride else "hop-place", "hop-once" if times == 1 else "hop-many", form]
     if form == "hop-bent":
@@ -66,10 +66,10 @@ class _Hops:
         starts, lift, after: seconds of standing before, of lifting the foot, and of standing after it.
     """
 
-    def __init__(self, rng: random.Random) -> None:
+    def __init__(self, rng: random.Random, times: int | None) -> None:
         self.side = rng.choice(SIDES)
         self.flight, self.ground = rng.uniform(0.22, 0.36), rng.uniform(0.24, 0.4)
-        self.times = rng.randint(1, min(9, int(_LONGEST / (self.flight + self.ground)) - 2))
+        self.times = times or rng.randint(1, min(9, int(_LONGEST / (self.flight + self.ground)) - 2))
         self.stride = rng.choice((0.0, rng.uniform(0.2, 0.55)))
         self.form = rng.choices(list(_FREE), (4, 3, 2))[0]
         free, self.knee = _FREE[self.form]
@@ -141,18 +141,19 @@ _SWUNG = {
 }
 
 
-def jump(rng: random.Random) -> Gesture:
-    return _jump(rng, ahead=0.0)
+def jump(rng: random.Random, *, times: int | None = None) -> Gesture:
+    return _jump(rng, 0.0, times)
 
 
-def jump_forward(rng: random.Random) -> Gesture:
-    return _jump(rng, ahead=rng.choice((rng.uniform(0.68, _FAR), rng.uniform(_FAR, 1.5))))
+def jump_forward(rng: random.Random, *, times: int | None = None) -> Gesture:
+    return _jump(rng, rng.choice((rng.uniform(0.68, _FAR), rng.uniform(_FAR, 1.5))), times)
 
 
-def _jump(rng: random.Random, ahead: float) -> Gesture:
+def _jump(rng: random.Random, ahead: float, times: int | None) -> Gesture:
     form = rng.choices(["jump-small", "jump-mid", "jump-high"], (3, 4, 3) if not ahead else (0, 3, 2))[0]
     flight = rng.uniform(*{"jump-small": (0.32, 0.37), "jump-mid": (0.38, 0.47), "jump-high": (0.48, 0.56)}[form])
-    times = rng.choices((1, 2, 3, 5), (5, 2, 2, 2 if form != "jump-high" and not ahead else 0))[0]
+    usual = 2 if form != "jump-high" and not ahead else 0
+    times = times or rng.choices((1, 2, 3, 5), (5, 2, 2, usual))[0]
     flight = min(max(flight, ahead / 2.9), 0.58)
     tuck = rng.uniform(0.12, 0.24) if flight > 0.44 and rng.random() < 0.35 else rng.uniform(0.0, 0.04)
     name = "ahead" if ahead else "jump"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
 from marey.drawing.aims import aim, shoot_basket
 from marey.drawing.archery import draw_bow
@@ -20,7 +21,8 @@ from marey.drawing.gesture import Gesture
 from marey.drawing.guards import fight_stance
 from marey.drawing.hands import reach_forward, talk
 from marey.drawing.hops import hop, jump, jump_forward
-from marey.drawing.kicks import balance, kick
+from marey.drawing.idles import idle
+from marey.drawing.kicks import balance, kick, kick_ball
 from marey.drawing.kneels import kneel
 from marey.drawing.laughs import laugh
 from marey.drawing.lifts import arm_circles, drink, reach_up
@@ -28,21 +30,44 @@ from marey.drawing.seats import sit, sit_down, stand_up
 from marey.drawing.shots import shoot
 from marey.drawing.signs import signal
 from marey.drawing.spells import cast_spell
-from marey.drawing.trunk import bow
+from marey.drawing.throws import throw
+from marey.drawing.trunk import bow, shiver
 from marey.drawing.twists import twist
 from marey.drawing.washes import wash
 from marey.drawing.wheels import drive
 
-DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
-    "aim": aim,
-    "arabesque": arabesque,
+
+class Counted(Protocol):
+    """A function that draws a movement as often as is asked for."""
+
+    def __call__(self, rng: random.Random, *, times: int | None = None) -> Gesture:
+        """Draw `times` movements, some if it is None."""
+        ...
+
+
+COUNTED: Mapping[str, Counted] = {
     "arm-circles": arm_circles,
-    "balance": balance,
     "bend-over": bend_over,
     "block": block,
     "bow": bow,
     "cast-spell": cast_spell,
     "cheer": cheer,
+    "hop": hop,
+    "jump": jump,
+    "jump-forward": jump_forward,
+    "jumping-jacks": jumping_jacks,
+    "knee-to-elbow": knee_to_elbow,
+    "push-ups": push_ups,
+    "sit-ups": sit_ups,
+    "slash": slash,
+    "squat": squat,
+    "stab": stab,
+}
+DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
+    **COUNTED,
+    "aim": aim,
+    "arabesque": arabesque,
+    "balance": balance,
     "clap": clap,
     "crouch": crouch,
     "draw-bow": draw_bow,
@@ -50,31 +75,25 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "drive": drive,
     "fight-stance": fight_stance,
     "guide": guide,
-    "hop": hop,
-    "jump": jump,
-    "jump-forward": jump_forward,
-    "jumping-jacks": jumping_jacks,
+    "idle": idle,
     "kick": kick,
-    "knee-to-elbow": knee_to_elbow,
+    "kick-ball": kick_ball,
     "kneel": kneel,
     "laugh": laugh,
     "pick-up": pick_up,
-    "push-ups": push_ups,
     "raise-arm": raise_arm,
     "reach-forward": reach_forward,
     "reach-up": reach_up,
     "shoot": shoot,
     "shoot-basket": shoot_basket,
+    "shiver": shiver,
     "signal": signal,
     "sit": sit,
     "sit-down": sit_down,
     "sit-floor": sit_floor,
-    "sit-ups": sit_ups,
-    "slash": slash,
-    "squat": squat,
-    "stab": stab,
     "stand-up": stand_up,
     "talk": talk,
+    "throw": throw,
     "twist": twist,
     "wash": wash,
     "wave": wave,

@@ -121,14 +121,14 @@ def reach_up(rng: random.Random) -> Gesture:
 _FORWARD, _BACKWARD = -1.0, 1.0
 
 
-def arm_circles(rng: random.Random) -> Gesture:
+def arm_circles(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(["circles-one", "circles-both", "circles-mill"], (4, 4, 2))[0]
     side = rng.choice(SIDES) if form == "circles-one" else BOTH
     across = form != "circles-mill" and rng.random() < 0.22
     way_round = rng.choice((_FORWARD, _BACKWARD))
     tempo = rng.choice(["slow", "", "", "fast"])
     rate = {"slow": rng.uniform(0.35, 0.5), "": rng.uniform(0.5, 0.9), "fast": rng.uniform(0.9, 1.4)}[tempo]
-    number = rng.randint(1, max(2, int(6.0 * rate)))
+    number = times or rng.randint(1, max(2, int(6.0 * rate)))
     ramp = 0.45 / rate
     start, late = rng.uniform(0.1, 0.8), 0.5 / rate if form == "circles-mill" else 0.0
     whole = max(number / rate - ramp, 0.05)

@@ -46,11 +46,11 @@ _CASTS = {
 """Hands while a spell gathers, and when it is sent off; one hand is the right one."""
 
 
-def cast_spell(rng: random.Random) -> Gesture:
+def cast_spell(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(list(_CASTS), (5, 3, 5, 2, 4, 3, 2))[0]
     gather, send = (_near_hands(rng, hands, 0.03) for hands in _CASTS[form])
     slow = form in ("cast-rise", "cast-staff") and rng.random() < 0.6
-    times = rng.choices((1, 2, 3), (6, 2, 1))[0]
+    times = times or rng.choices((1, 2, 3), (6, 2, 1))[0]
     lifts = form in ("cast-rise", "cast-staff", "cast-spread")
     steps = not lifts and rng.random() < 0.45
     turn = {"cast-hip": -rng.uniform(18, 34), "cast-one": -rng.uniform(8, 24)}.get(form, 0.0)

@@ -15,9 +15,9 @@ _SLIGHT, _DEEP = 36.0, 66.0
 """Degrees of a bow from the hips to the neck; the trunk as a whole tilts by three quarters of this."""
 
 
-def bow(rng: random.Random) -> Gesture:
+def bow(rng: random.Random, *, times: int | None = None) -> Gesture:
     degrees = rng.choice([rng.uniform(24, _SLIGHT), rng.uniform(_SLIGHT, _DEEP), rng.uniform(_DEEP, 90)])
-    times = rng.choices((1, 2, 3), (8, 1, 1))[0]
+    times = times or rng.choices((1, 2, 3), (8, 1, 1))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = {"quick": (0.35, 0.55), "": (0.6, 1.1), "slow": (1.0, 1.6)}[tempo]
     hold = {"quick": (0.05, 0.2), "": (0.15, 0.9), "slow": (1.0, 2.0)}[tempo]

@@ -42,6 +42,18 @@ THROW_TWIST, THROW_TRUNK = (0.0, 34.0, 36.0, -24.0, -36.0, 0.0), (0.0, -8.0, -10
 """Degrees of the trunk at these times: towards the hand that throws, and forward."""
 
 
+_MOVES = re.compile(
+    r"\b(?:walk|jog|run|mov|advanc|dash|charg|circl|past|around|toward|forward|backward|cross|turn|spin|fak|juk|step"
+    r"|(?:up|down|along|across) (?:the )?court)"
+)
+"""Words of feet that move with the ball."""
+
+
+def dribbles_on_spot(wish: FineWish) -> bool:
+    """Return True if the feet of who dribbles stay where they are."""
+    return not _MOVES.search(wish.prompt.lower())
+
+
 def dribbled(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array:
     """Return joints (T, 22, 3) of a body whose hand goes up and down with a ball; the other arm stays."""
     side = wish.side or str(rng.choice([LEFT, RIGHT, RIGHT]))

@@ -26,7 +26,7 @@ _DUCKS = re.compile(r"\b(?:ducks?|ducking|ducked|crouch\w*|under|below)\b")
 _BACK = re.compile(r"\b(?:back|backwards?|away from)\b")
 _SPRINGS = re.compile(r"\b(?:hop|jump|leap|spr[iau]ng|dash|div|roll|step|skip|run|rush|scurr)")
 """Words of dodges in which the feet leave their place."""
-ASIDE, BACK, DOWN = (0.13, 30.0), (0.10, 26.0), (0.24, 24.0)
+ASIDE, BACK, DOWN = (0.13, 30.0), (0.10, 26.0), (0.34, 26.0)
 """Metres that the hips go, and degrees that the trunk leans: to a side, back, and down."""
 LOWEST = 0.56
 """Metres over the floor to which the hips go down at most."""
@@ -37,7 +37,12 @@ READY, COVERS = (0.14, -0.22, 0.24), (0.11, -0.10, 0.26)
 def dodges_well(joints: Array, fps: float, wish: FineWish) -> bool:
     """Return True if the feet are to leave their place, which is not drawn."""
     del joints, fps
-    return bool(_SPRINGS.search(wish.prompt.lower()))
+    return not stays(wish)
+
+
+def stays(wish: FineWish) -> bool:
+    """Return True if the feet stay where they are."""
+    return not _SPRINGS.search(wish.prompt.lower())
 
 
 def dodged(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from marey.drawing.forms import misfit
 from marey.drawing.gesture import Gesture
-from marey.drawing.kinds import DRAWINGS
+from marey.drawing.kinds import COUNTED, DRAWINGS
+from marey.generation.ball_games import dribbles_on_spot
+from marey.generation.dodging import stays
 from marey.generation.fine import FINE
 from marey.generation.fine_wish import FineWish
 from marey.generation.stated import stated_features
@@ -35,14 +37,21 @@ from marey.selector.rules import RULES
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
 
-NODS_S = (2.6, 4.0)
-"""Seconds of a body that nods, where nothing is said of them; a stated number takes what it takes."""
-NOD_S = 0.75
-"""Seconds of one nod of a stated number."""
+SECONDS: Mapping[str, tuple[float, float]] = {
+    "dodge": (2.2, 2.8),
+    "dribble": (4.0, 6.0),
+    "nod": (2.6, 4.0),
+    "punch": (3.5, 5.0),
+}
+"""Seconds of a body that moves on and on, where nothing is said of them; others bring their own."""
+ROUNDS_S: Mapping[str, tuple[float, float]] = {"dodge": (2.1, 1.2), "nod": (0.75, 1.0)}
+"""Seconds of each of a stated number, and beside them."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
 DRAWN = 6
 """Movements that are drawn and graded at most."""
+MOST = 20
+"""Times that a movement is drawn at most; a larger number is made of these (`marey.generation.repetitions`)."""
 SHORTER = 0.85
 """Share of its own length to which a movement is cut at most, where the length is fixed: at its end the body waits."""
 
@@ -89,14 +98,16 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
 
 def _frames(action: str, wish: FineWish, rng: np.random.Generator) -> int:
     """Return the frames of a body that stands until its movement is drawn; most movements bring their own."""
-    seconds = float(rng.uniform(*NODS_S))
-    if action == "nod" and wish.count is not None:
-        seconds = wish.count * NOD_S + 0.4 * NODS_S[0]
-    return round(seconds * FPS)
+    once, before = ROUNDS_S.get(action, (0.0, 0.0))
+    if wish.count is not None and once:
+        return round((wish.count * once + before) * FPS)
+    return round(float(rng.uniform(*SECONDS[action])) * FPS) if action in SECONDS else SHORTEST
 
 
 ALONE: Mapping[str, Callable[[FineWish], bool]] = {
     **{action: is_drawn(action) for action in CHOICES},
+    "dodge": stays,
+    "dribble": dribbles_on_spot,
     "nod": lambda wish: True,
     "punch": stands,
 }
@@ -119,12 +130,19 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
     says first."""
     text = wish.prompt.lower()
-    drawn = [DRAWINGS[action](rng) for _ in range(TRIES)]
+    drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
     yield from (
         gesture
         for gesture in sorted(drawn, key=lambda each: misfit(each, action, text, wish.count))
         if _may_be(gesture, text, wish.side, frames)
     )
+
+
+def _draw(action: str, rng: random.Random, count: int | None) -> Gesture:
+    """Draw a movement by chance, as often as is asked for where it can be."""
+    if count is not None and count <= MOST and action in COUNTED:
+        return COUNTED[action](rng, times=count)
+    return DRAWINGS[action](rng)
 
 
 def _may_be(gesture: Gesture, text: str, side: str, frames: int | None) -> bool:

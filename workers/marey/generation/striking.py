@@ -103,14 +103,15 @@ def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator)
     """Return joints (T, 22, 3) of a body in guard that punches, `count` times or in rows of a few; None if there is no
     time for a punch."""
     kinds, count = _row(wish, rng)
-    on_spot = _is_on_spot(wish, count)
-    seconds = len(joints) / fps if wish.fixed or not on_spot else None
+    on_spot = stands(wish)
+    own_end = on_spot and count is not None and not wish.fixed
+    seconds = None if own_end else len(joints) / fps
     strikes = list(_timed(seconds, kinds, count, rng))
     if not strikes:
         return None
     if on_spot:
         ends = strikes[-1][0] + strikes[-1][1].seconds + float(rng.uniform(*AFTER_S))
-        frames = len(joints) if wish.fixed else round(ends * fps)
+        frames = round(ends * fps) if own_end else len(joints)
         body = _in_stance(frames, random.Random(int(rng.integers(2**62))))  # noqa: S311
     else:
         body = StandingBody(joints)
@@ -118,12 +119,8 @@ def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator)
 
 
 def stands(wish: FineWish) -> bool:
-    """Return True if the punches are those of a body that stands in guard, which is drawn as a whole."""
-    return _is_on_spot(wish, _row(wish, np.random.default_rng(0))[1])
-
-
-def _is_on_spot(wish: FineWish, count: int | None) -> bool:
-    return count is not None and not _FOOTWORK.search(wish.prompt.lower())
+    """Return True if the punches are those of a body that stays in guard, which is drawn as a whole."""
+    return not _FOOTWORK.search(wish.prompt.lower())
 
 
 def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, str]], *, drives: bool) -> Array:

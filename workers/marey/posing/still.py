@@ -20,7 +20,7 @@ _APART, _TURNED = (0.085, 0.13), (4.0, 16.0)
 """Metres of the ankles from the middle, and degrees by which the feet point outward."""
 _BEHIND = -0.035
 """Metres of the ankles before the hips: the weight is over the middle of the feet."""
-_BENT = 0.988
+_BENT = 0.994
 """Share of the length of a straight leg between hip and ankle."""
 _UPPER, _FORE = ((6.0, 16.0), (-4.0, 8.0)), ((8.0, 22.0), (6.0, 18.0))
 """Degrees by which an arm that hangs is turned outward and forward."""
