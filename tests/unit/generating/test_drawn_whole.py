@@ -48,7 +48,7 @@ def ask(prompt: str, **more: Any) -> Request:
 def test_a_network_is_asked_for_what_is_not_drawn_alone() -> None:
     network = Network()
 
-    class Control(NoControl):
+    class Cancelled(NoControl):
         def progress(self, done: int, total: int) -> None:
             network.reports.append((done, total))
 
@@ -56,7 +56,7 @@ def test_a_network_is_asked_for_what_is_not_drawn_alone() -> None:
             return {1, 2}
 
     prompts = ["a man kneels", "a man walks", "a man claps", "a man dances"]
-    made = generate_as_asked(network, [ask(each) for each in prompts], control=Control())  # type: ignore[arg-type]
+    made = generate_as_asked(network, [ask(each) for each in prompts], control=Cancelled())  # type: ignore[arg-type]
     assert network.asked == ["a man walks", "a man dances"]
     assert network.dropped == {0}
     assert network.reports == [(400, 400)]

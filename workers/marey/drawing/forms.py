@@ -17,7 +17,7 @@ _BOTH = re.compile(r"\b(?:both (?:\w+ )?(?:arms?|hands?)|(?:his|her|their|the|wi
 _ONE = re.compile(r"\b(?:(?:one|a|an|single) (?:\w+ )?(?:arm|hand)|one[- ](?:armed|handed))\b")
 _LONG = re.compile(r"\b(?:long|while|minutes?|seconds?|keeps?|hold\w*|stay\w*|remain\w*|continu\w*|on and on)\b")
 NAMED, UNASKED, OTHER = 8, 4, 1
-"""What it counts that a movement lacks a form that is named, is in one that is to be named, or is unusual or long."""
+"""Weights of a form that is named and missing, of one that is drawn and not named, and of an unusual or long one."""
 
 
 @dataclass(frozen=True)
