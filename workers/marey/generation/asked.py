@@ -138,7 +138,7 @@ class _Wish:
         fixed = request.frames is not None and not request.open
         return FineWish(self.count, self.side, request.text.said, fixed, request.beside)
 
-    def drawn(self, request: Request, limits: Limits) -> Request:
+    def for_network(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
         fixed."""
         if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
@@ -188,7 +188,7 @@ def generate_as_asked(
     wishes = [_Wish.of(request) for request in requests]
     whole = [_whole(generator, request, wish) for request, wish in zip(requests, wishes, strict=True)]
     left = [row for row, drawn in enumerate(whole) if drawn is None]
-    asked = [wishes[row].drawn(requests[row], generator.limits) for row in left]
+    asked = [wishes[row].for_network(requests[row], generator.limits) for row in left]
     watched = PassControl(control or NoControl(), left, len(requests) - len(left), len(requests))
     made = dict(zip(left, generator.generate(asked, settings, control=watched) if left else (), strict=True))
     return [
@@ -206,7 +206,7 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     if not _draws(generator) or not wish.action:
         return None
     generator.limits.check(request)
-    frames = (request if wish.action in AT_PACE else wish.drawn(request, generator.limits)).frames
+    frames = (request if wish.action in AT_PACE else wish.for_network(request, generator.limits)).frames
     fine = wish.fine(request)
     held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
     return drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
