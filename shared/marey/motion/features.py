@@ -103,10 +103,20 @@ class PosedLayout(FeatureLayout, Protocol):
         ...
 
 
+LIFTED = 0.1
+"""Metres over the floor that a body which hangs or swims never comes nearer to it."""
+
+
 def encode_all(layout: FeatureLayout, joints: Array) -> Float32:
     """Encode a motion (T, J, 3) as features (T, D): those of a frame hold the step to the next, so the last step is
-    repeated."""
-    return layout.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+    repeated. A body that stays over the floor y = 0, as one that hangs does, keeps its height; every other one is put
+    onto the floor, as by `canonicalize`."""
+    whole = np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]])
+    lowest = float(whole[..., 1].min())
+    if lowest < LIFTED:
+        return layout.encode(whole)
+    on_floor = whole[-1:] - [0.0, float(whole[-1, :, 1].min()), 0.0]  # a frame more, of which the floor is found
+    return layout.encode(np.concatenate([whole, on_floor]))[:-1]
 
 
 def canonicalize(joints: Array, skeleton: Skeleton) -> Array:

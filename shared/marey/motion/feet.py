@@ -49,6 +49,7 @@ LONG_SWING = 0.8  # seconds; in a longer swing the correction returns to zero in
 RELEASE = 0.35  # seconds of that return
 FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint is inside the foot, so it stands at up to 3 cm
 PRESS = 0.002  # metres that a foot may sink, so that it meets the floor without a jerk
+AIR = 0.5  # metres; toes that are never lower are those of a body that hangs or flies
 STILL = 0.015  # metres of noise of an ankle, or of a toe's height; a larger movement is a heel or foot that rolls
 
 
@@ -106,7 +107,7 @@ def floor_height(joints: Array, skeleton: Skeleton) -> float:
     body that lies or kneels on other parts, its feet raised, is let down no further than these.
     """
     height = float(np.quantile(joints[:, list(skeleton.feet[1::2]), 1].min(axis=1), 0.1))
-    if height > 0.5:
+    if height > AIR:
         return 0.0
     floor = height - float(np.clip(height, *FLOOR_BAND))
     if floor > 0 and skeleton.joint_names == HUMANML3D.joint_names:
@@ -118,7 +119,8 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     """Detect foot contacts (T, 4): L ankle, L toe, R ankle, R toe.
 
     A foot begins to stand when it is low and slow, and stands until it is high or clearly moving. Low is relative to
-    the tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
+    the tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits. Feet
+    of a body in the air do not stand, however still they are.
     """
     if len(skeleton.feet) != 4:
         raise InvalidInput("this skeleton's feet are unknown", where=skeleton.name)
@@ -126,6 +128,7 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps if len(joints) > 1 else np.zeros((1, 4))
     ground = np.quantile(places[..., 1], 0.1, axis=0)
     ground = np.minimum(ground, ground[OTHER_FOOT])
+    ground = np.where(ground > AIR, 0.0, ground)
     low = places[..., 1] - ground < np.array([rule.ankle_height, rule.toe_height] * 2)
     stands = np.zeros(speed.shape, bool)
     for foot in range(4):

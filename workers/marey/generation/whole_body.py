@@ -22,6 +22,7 @@ from marey.drawing.hops import jump_turned
 from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
+from marey.generation.holding import climb, drives, hangs
 from marey.posing.limbs import FPS
 from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, way_through
 from marey.posing.still import standing_still
@@ -194,6 +195,9 @@ CHOICES: Mapping[str, Choice] = {
     "lie": _lie,
     "get-up": _get_up,
     "swim": _swim,
+    "climb-ladder": climb,
+    "hang": hangs,
+    "drive": drives,
     "jump-turn": _jump_turn,
 }
 """Movements by action."""
