@@ -101,7 +101,8 @@ class TrainedReaders:
         read = self._read_bare(bare)
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
-            return ReadPrompt(bare.prompt, movements)
+            one = len(movements) == 1  # "drives, then swerves"
+            return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, movements)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
         return ReadPrompt.of(bare.prompt, read.likely(UNSPLIT) if self._movements else read.action, surely=surely)
 

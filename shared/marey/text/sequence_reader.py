@@ -104,6 +104,22 @@ _END = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """Clauses of the end of a movement, which comes by itself."""
+_PERSON = r"(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?"
+_GOES_ON: Mapping[str, re.Pattern[str]] = {
+    "drive": re.compile(
+        rf"""{_PERSON}(?:(?:look|glanc|check|peer)\w*\b|(?:swerv|steer|honk|brak|accelerat)\w*\b
+        |(?:takes?|makes?)\s(?:an?\s)?(?:sharp|hard|left|right)\b|turns?\s(?:sharply\s|hard\s)?(?:left|right|the\swheel)\b
+        |(?:shift|chang)\w*\s(?:up|down|gears?))""",
+        re.IGNORECASE | re.VERBOSE,
+    ),
+    "hang": re.compile(
+        rf"""{_PERSON}(?:shimm\w*\b|(?:does|do)\s(?:\w+\s)?(?:pull|chin)[ -]?ups?\b
+        |(?:kick|rais|lift|swing)\w*\s(?:(?:his|her|their|both|the)\s)+(?:legs|feet|knees)\b
+        |(?:swing|sway)\w*(?:$|\s(?:gently|slowly|back|to|from|a\slittle)\b))""",
+        re.IGNORECASE | re.VERBOSE,
+    ),
+}
+"""Words of what is done at the wheel, or by the hands that hold, and is part of the movement before it."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -190,7 +206,7 @@ class SequenceReader(Reader):
         action: str | None = None,
     ) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
-        other, or that is in doubt.
+        other, or that is in doubt. There is one where all else is done at a wheel or by hands that hold.
 
         Standing still beside the one action that a prompt is taken for is no movement but at the end of a way, nor is
         the way before a turn.
@@ -204,7 +220,11 @@ class SequenceReader(Reader):
         """
         if way := way_to_rest(bare.prompt, action):
             return ReadMovement(way, action), _rest()
-        groups = in_order(_with_belongings(self._clauses(bare, encoding, pooled)))
+        written = self._clauses(bare, encoding, pooled)
+        whole = _with_belongings(written)
+        if len(whole) == 1 < len(written) and whole[0].name in _GOES_ON:
+            return (ReadMovement(bare.prompt, whole[0].name),)
+        groups = in_order(whole)
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
@@ -376,10 +396,13 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
 
 def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
     """Return clauses; what comes behind "from", says how, or is the end of a movement belongs to the one before: "gets
-    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"."""
+    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"; and so does what is done
+    at a wheel or by hands that hold: "drives | and swerves left", "hangs from a ledge | and shimmies along"."""
     found: list[ReadClause] = []
     for clause in clauses:
-        belongs = _MANNER.match(clause.text) or _END.fullmatch(without_joints(clause.text))
+        text = without_joints(clause.text)
+        goes_on = _GOES_ON.get(found[-1].name) if found else None
+        belongs = _MANNER.match(clause.text) or _END.fullmatch(text) or (goes_on and goes_on.match(text))
         if found and (belongs or found[-1].text.lower().endswith(" from")):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:

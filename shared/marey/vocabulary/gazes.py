@@ -11,8 +11,9 @@ Glance = Literal["left", "right", "up", "down", "around", "shake"]
 """`around`: to one side and to the other; `shake`: quickly to and fro."""
 
 _WHERE = {
-    "left": r"left|leftwards?|over (?:his|her|their|the) left shoulder",
-    "right": r"right(?! (?:at|into|in|through|past)\b)|rightwards?|over (?:his|her|their|the) right shoulder",
+    "left": r"left|leftwards?|over (?:his|her|their|the) left shoulder|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
+    "right": r"(?:(?:in|at|into) )?(?:the|his|her) (?:right|rear-?view|rear view|driving) mirror"
+    r"|right(?! (?:at|into|in|through|past)\b)|rightwards?|over (?:his|her|their|the) right shoulder",
     "up": r"up(?! (?:the|to) )|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
     "down": r"down(?! the )|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
     "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left"
@@ -22,7 +23,7 @@ _WHERE = {
 _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
 _LOOKS = re.compile(
-    r"\b(?:look|glanc|gaz|peer|star|scan)(?:s|e|es|ing|ed)?\b"
+    r"\b(?:look|glanc|gaz|peer|star|scan|check)(?:s|e|es|ing|ed)?\b"
     r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|the) )?head\b(?: (?:to|and) (?:look|glance|peer)s?\b)?"
 )
 _STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")

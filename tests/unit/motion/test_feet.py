@@ -112,6 +112,13 @@ def test_a_body_in_the_air_is_not_pulled_down():
     assert contacts.shape == (120, 4)
 
 
+def test_still_feet_of_a_body_that_hangs_do_not_stand():
+    joints = np.repeat(stepping()[:1], 40, axis=0) + np.array([0, 1.0, 0])
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert not contacts.any()
+    np.testing.assert_allclose(clean, joints, atol=1e-6)
+
+
 def test_a_foot_that_means_to_slide_slides():
     joints = np.tile(HUMANML3D.rest.astype(float), (60, 1, 1))
     joints[..., 2] += np.linspace(0, 0.6, 60)[:, None]  # on ice, 0.2 m/s

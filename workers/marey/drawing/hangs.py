@@ -205,7 +205,7 @@ class _Traverse:
 
     def gesture(self, rng: random.Random, count: int | None, lasts: float) -> Gesture:
         """Return the movement over so many grips, or seconds."""
-        done = Sequel([rng.uniform(0.3, 0.6)], [self.at(0.0)])
+        done = Sequel([rng.uniform(1.15, 1.4)], [self.at(0.0)])
         pace, rest, roll = rng.uniform(0.42, 0.6), rng.uniform(0.06, 0.2), rng.uniform(2.0, 5.0)
         grips, moves = 0, self.side
         while grips < count if count else done.times[-1] + pace + rest < lasts or grips < 2:

@@ -41,6 +41,8 @@ _HEEL, _TOES = 0.07, (0.1, -0.15, 0.95)
 are so low that the floor is found below them."""
 _TRUNK = 0.46
 """Metres from the hips to the middle of the shoulders."""
+_FOLLOWS = 0.2
+"""Share of a look by which the shoulders follow; the hips stay."""
 _STEP = 22.0
 """Degrees by which the wheel turns from one posture to the next at most."""
 _RATES = {"calm": (45, 80), "": (80, 140), "hard": (140, 220)}
@@ -81,7 +83,7 @@ class Way:
         manner: calm, hard, or empty for neither; None = at random.
         turns: sides to which the wheel is turned, in turn.
         sharp: it is turned far.
-        looks: sides to which the driver looks, in turn, before the wheel is turned; None = at random.
+        looks: now and then to a side; None = at random.
         lets_go: what a hand does that leaves the wheel: `shift` or `rest`.
         side: of that hand.
         seconds: for about how long.
@@ -91,7 +93,7 @@ class Way:
     manner: str | None = None
     turns: tuple[str, ...] = ()
     sharp: bool = False
-    looks: tuple[str, ...] | None = None
+    looks: bool | None = None
     lets_go: str = ""
     side: str = RIGHT
     seconds: float | None = None
@@ -134,7 +136,7 @@ class _Driver:
     def at(self) -> Posture:
         """The driver leans a little out of the turn and looks into it."""
         pressed = replace(self.pedals[RIGHT], at=(0.08, _HEEL, self.feet + 0.03 + self.rng.choice((0.0, 0.02))))
-        spine = (self.seated.spine[0], -0.05 * self.turned, 0.0)
+        spine = (self.seated.spine[0], -0.05 * self.turned, _FOLLOWS * self.look)
         neck = (self.seated.neck[0], 0.05 * self.turned, self.look)
         hands = {side: self.wheel.hand(side, self.turned) for side in SIDES}
         if self.free:
@@ -152,13 +154,6 @@ class _Driver:
         self.turned = goal + self.rng.uniform(-4, 4)
         self.done.then(self.rng.uniform(0.15, 0.6), self.at())
         self.turned = goal
-
-    def glance(self, side: str) -> None:
-        """Look at a mirror, or over a shoulder, and back to the road."""
-        self.look = SIGN[side] * self.rng.uniform(38, 58)
-        self.done.then(self.rng.uniform(0.35, 0.5), self.at(), self.rng.uniform(0.3, 0.6))
-        self.look = 0.0
-        self.done.then(self.rng.uniform(0.35, 0.5), self.at())
 
     def take_off(self, hold: float) -> None:
         """Take a hand off the wheel for so many seconds, and put it back."""
@@ -191,16 +186,14 @@ def drive(rng: random.Random, way: Way | None = None) -> Gesture:
     way = way or Way()
     driver = _Driver(rng, way)
     end = rng.uniform(2.6, 7.8) if way.seconds is None else way.seconds - 0.5
-    random_looks = way.looks is None and rng.random() < 0.4
+    looks = rng.random() < 0.4 if way.looks is None else way.looks
     number = 0
-    while number < max(1, 2 * len(way.looks or ()), len(way.turns)) or driver.done.times[-1] < end:
-        if way.looks and number < len(way.looks):
-            driver.glance(way.looks[number])
+    while number < max(1, len(way.turns)) or driver.done.times[-1] < end:
         if way.lets_go and number == 1:
             driver.take_off(0.25 * end if way.lets_go == "rest" else rng.uniform(0.3, 0.6))
-        driver.steer(driver.goal(number), rng.uniform(-45, 45) if random_looks and rng.random() < 0.5 else None)
+        driver.steer(driver.goal(number), rng.uniform(-45, 45) if looks and rng.random() < 0.5 else None)
         number += 1
     form, manner = driver.form, driver.manner
-    kinds = ["drive", form, f"drive-{manner}" if manner else "", "drive-look" if random_looks or way.looks else ""]
+    kinds = ["drive", form, f"drive-{manner}" if manner else "", "drive-look" if looks else ""]
     untrue = "car" if form == "drive-truck" else "truck|bus"
     return replace(driver.done.gesture(rng, kinds), untrue=untrue)

@@ -110,10 +110,13 @@ def judged(clip: MotionClip, request: Request, *, as_made: MotionClip | None = N
 
 
 def _prompts(request: Request) -> list[str]:
+    """Return what a motion shows in words: its prompts, and as what they are read."""
     if request.timeline is not None:
-        whole = [request.text.prompt] if request.is_sequence else []
-        return [*whole, *(row.text.prompt for row in request.timeline)]
-    return [request.text.prompt] if request.recording is None else [prompt for _, prompt in request.recording.prompts]
+        rows = [said for row in request.timeline for said in (row.text.prompt, row.text.rewritten)]
+        return [request.text.prompt, *rows] if request.is_sequence else rows
+    if request.recording is not None:
+        return [prompt for _, prompt in request.recording.prompts]
+    return [request.text.prompt, request.text.rewritten]
 
 
 def _match(clip: MotionClip, request: Request) -> PromptMatch:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import random
 import re
 
-from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.gesture import Gesture
 from marey.drawing.hangs import Hold, hang
 from marey.drawing.ladders import Ascent, climb_ladder
 from marey.drawing.wheels import Way, drive
 from marey.generation.fine_wish import FineWish
 from marey.posing.standing import LEFT, RIGHT
 from marey.vocabulary.counts import stated_count
+from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.lengths import TO_TWENTY
 from marey.vocabulary.paces import stated_pace
 
@@ -26,7 +27,9 @@ LOW_RUNGS = 2, 3
 _GOES_ON = re.compile(r"\b(?:climb|hang|dangl|clamber|hoist|pull|scal)\w*|\b(?:onto|over) (?:the|a)\b")
 """Words of movements that go on from a ladder, and not from the floor."""
 _NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split(), 1)}
-_RUNGS = re.compile(rf"\b(\d{{1,2}}|{'|'.join(_NUMBERS)}|couple of|few) (?:more )?(?:rungs?|steps?|holds?)\b")
+_RUNGS = re.compile(
+    rf"\b(\d{{1,2}}|{'|'.join(_NUMBERS)}|couple of|few) (?:more )?(?:rungs?|steps?|holds?)\b(?! (?:at|after|by)\b)"
+)
 _DOWN = re.compile(r"\b(?:down|downwards?|descend\w*|descent\w*|lowers?|rappel\w*|abseil\w*)\b")
 _UP = re.compile(r"\b(?:up|upwards?|ascend\w*|ascent|higher)\b")
 _WALLS = re.compile(
@@ -69,7 +72,6 @@ _HARD = re.compile(rf"\b(?:{_FAR}|{_RACES}|wild\w*|frantic\w*|chase\w*|sudden\w*
 _CALM = re.compile(
     r"\b(?:calm\w*|relax\w*|slow\w*|weary|tired|cruis\w*|gent\w*|slight\w*|careful\w*|leisure\w*|straight)\b"
 )
-_LOOKS = re.compile(r"\b(?:mirrors?|shoulder|blind spot|look\w*|glanc\w*|check\w*)\b")
 _SHIFTS = re.compile(r"\b(?:shift\w*|gears?|stick|radio|handbrake)\b")
 _LEFT_OFF = re.compile(r"\bright hand on the wheel\b|\bleft hand off\b")
 _ONE_ON_WHEEL = re.compile(r"\b(?:one|single)[ -]hand(?:ed(?:ly)?)?\b|\b(?:left|right) hand (?:on|off) the wheel\b")
@@ -131,9 +133,9 @@ def _form_of_hang(text: str) -> str:
 
 
 def drives(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    """Return a driver who steers, looks and shifts as the prompt says."""
+    """Return a driver who steers and shifts as the prompt says; glances are drawn on the finished motion."""
     text = wish.prompt.lower()
-    looks, sides = _LOOKS.search(text) is not None, tuple(_SIDE.findall(text))
+    sides = tuple(_SIDE.findall(without_gaze(text)))
     if _ONE_ON_WHEEL.search(text):
         lets_go, sides = "rest", ()
     else:
@@ -142,9 +144,9 @@ def drives(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture
     way = Way(
         car=car,
         manner="hard" if _HARD.search(text) else "calm" if _CALM.search(text) else "",
-        turns=() if looks else sides,
+        turns=sides,
         sharp=_SHARP.search(text) is not None,
-        looks=(sides or (rng.choice(SIDES),)) if looks else (),
+        looks=False,
         lets_go=lets_go,
         side=LEFT if _LEFT_OFF.search(text) else RIGHT,
         seconds=seconds or rng.uniform(4.5, 7.0),
