@@ -70,6 +70,21 @@ def test_movements_come_in_the_order_of_time(prompt: str, actions: list[str]) ->
     assert [movement.action for movement in read(prompt)] == actions
 
 
+@pytest.mark.parametrize(
+    ("prompt", "action"),
+    [
+        ("drives the car and swerves left and right", "drive"),
+        ("hangs from a bar, then does pull-ups", "hang"),
+    ],
+)
+def test_what_is_done_at_a_wheel_or_by_hands_that_hold_is_part_of_it(prompt: str, action: str) -> None:
+    assert read(prompt) == (ReadMovement(prompt, action),)
+
+
+def test_who_hangs_and_walks_away_does_two_things() -> None:
+    assert [movement.action for movement in read("hangs from a bar, then walks away")] == ["hang", "walk"]
+
+
 def test_a_movement_keeps_its_words_but_those_that_join_it() -> None:
     assert [movement.text for movement in read("He takes two steps back, and then he waves his left hand.")] == [
         "He takes two steps back",

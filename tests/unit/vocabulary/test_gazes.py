@@ -11,6 +11,9 @@ from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
     ("prompt", "gaze"),
     [
         ("look left, look right", ("left", "right")),
+        ("drives and checks the left mirror", ("left",)),
+        ("glances in the rear-view mirror", ("right",)),
+        ("looks in the mirror", ()),
         ("walk forward, stop, look around", ("around",)),
         ("she glances over her shoulder", ("around",)),
         ("look over the right shoulder", ("right",)),

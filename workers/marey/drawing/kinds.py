@@ -34,7 +34,6 @@ from marey.drawing.throws import throw
 from marey.drawing.trunk import bow, shiver
 from marey.drawing.twists import twist
 from marey.drawing.washes import wash
-from marey.drawing.wheels import drive
 
 
 class Counted(Protocol):
@@ -72,7 +71,6 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "crouch": crouch,
     "draw-bow": draw_bow,
     "drink": drink,
-    "drive": drive,
     "fight-stance": fight_stance,
     "guide": guide,
     "idle": idle,
@@ -98,5 +96,5 @@ DRAWINGS: Mapping[str, Callable[[random.Random], Gesture]] = {
     "wash": wash,
     "wave": wave,
 }
-"""Functions of a random generator that draw one movement of an action. `flinch` and `hang` are left out: what is drawn
-of them in place of a failed motion passes the referee less often, on development prompts."""
+"""Functions of a random generator that draw one movement of an action. `flinch` is left out: what is drawn of it in
+place of a failed motion passes the referee less often, on development prompts."""
