@@ -12,6 +12,7 @@ from typing import Any
 from marey.core.errors import InvalidInput
 from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.bones import bone_fit
+from marey.motion.carrying import carrying_contacts
 from marey.motion.clip import MotionClip
 from marey.motion.features import FeatureLayout, PosedLayout
 from marey.motion.feet import clean_feet, find_contacts, need_feet, rule_for
@@ -66,7 +67,8 @@ def finish_motion(
         hands = interpolate(hands, times)
     joints = forward_kinematics(skeleton, rotations, root)
     if clean:
-        joints, contacts = clean_feet(joints, skeleton, rate, rule=rule_for(joints, rate))
+        contacts = carrying_contacts(joints, skeleton, rate, rule=rule_for(joints, rate))
+        joints, contacts = clean_feet(joints, skeleton, rate, contacts=contacts)
         joints = clear_arms(join_hands(joints, hands, skeleton), skeleton, rate)
         if isinstance(layout, PosedLayout):
             rotations, root = aim_bones(joints, rotations, skeleton), joints[:, 0]
