@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.motion.courses import SWING_S
 from marey.motion.feet import RULE, ContactRule, find_contacts, runs
-from marey.motion.rotations import Array
+from marey.motion.rotations import Array, normalize
 from marey.motion.skeleton import OTHER_FOOT, Skeleton
 
 Bool = NDArray[np.bool_]
@@ -18,14 +19,18 @@ Bool = NDArray[np.bool_]
 TOUCHES_M, CARRIES_M = 0.05, 0.08
 """Metres over its standing height up to which a foot touches the floor, and up to which one of them carries the body
 meanwhile."""
+UPRIGHT = 0.5
+"""Share of the height of the root over the feet in the rest pose that it has over feet that carry it, at least."""
 SLIDES = 0.3
 """Metres a second from which a foot does not stand."""
-FASTEST = 1.3
+FASTEST = 1.6
 """Metres a second of a foot that is made to stand, at most; a faster one swings."""
-SWING_S = 0.15
-"""Seconds between two stands of a foot, at least."""
-STRAYS = 0.8
-"""Share of the slide of a `ContactRule` by which a foot is moved at most, so that it is no slide on purpose."""
+SPREADS = 0.4
+"""Metres a second of each of two feet that move apart or together in a hop."""
+EVEN = 0.6
+"""Share of the speed of the faster one of them that the slower one has, at least."""
+SHORTEST_S = 0.15
+"""Seconds of a stand, at least: shorter ones would stick and slip."""
 
 
 def carrying_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: ContactRule = RULE) -> Bool:
@@ -38,15 +43,21 @@ def carrying_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Co
         rule: thresholds in metres and seconds.
     """
     stands, height = find_contacts(joints, skeleton, fps, rule=rule), _heights(joints, skeleton)
-    toes, speed = joints[:, list(skeleton.feet[1::2])], _carrying_speed(joints, stands, height, skeleton, fps)
-    swing, most = max(round(SWING_S * fps), 2), STRAYS * rule.slide
+    toes, speed = (
+        joints[:, list(skeleton.feet[1::2])][..., [0, 2]],
+        _carrying_speed(joints, stands, height, skeleton, fps),
+    )
+    swing, shortest = (max(round(seconds * fps), 2) for seconds in (SWING_S, SHORTEST_S))
     while speed.size and speed.min() < FASTEST:
         step, side = (int(k) for k in np.unravel_index(speed.argmin(), speed.shape))
         own = stands[:, 2 * side + 1]
-        grown = _grown(toes[:, side], speed[:, side], step, most)
-        begin, end = _beside(grown, toes[:, side], height[:, 2 * side + 1] < CARRIES_M, own, most, swing)
-        own[begin:end] = True
-        speed[begin : max(end - 1, begin)] = np.inf
+        grown = _grown(toes[:, side], speed[:, side], step, rule.slide)
+        begin, end = _beside(grown, toes[:, side], height[:, 2 * side + 1] < CARRIES_M, own, rule.slide, swing)
+        if end - begin > shortest:
+            own[begin:end] = True
+            speed[begin : end - 1] = np.inf
+        if grown[1] - grown[0] <= shortest:
+            speed[grown[0] : grown[1] - 1, side] = np.inf
         speed[step, side] = np.inf
     return stands
 
@@ -65,6 +76,7 @@ def _carrying_speed(joints: Array, stands: Bool, height: Array, skeleton: Skelet
     low, high = np.minimum(height[1:], height[:-1]), np.maximum(height[1:], height[:-1])
     stand = ((low < CARRIES_M) & (speed < SLIDES)) | (stands[1:] & stands[:-1])
     slides = (low < TOUCHES_M).any(axis=1) & ~stand.any(axis=1)
+    slides &= _upright(joints, skeleton)[1:] & ~_spread(joints[:, list(skeleton.feet[1::2])], fps)
     return np.where(slides[:, None] & (high[:, 1::2] < CARRIES_M), speed[:, 1::2], np.inf)
 
 
@@ -73,7 +85,7 @@ def _grown(toe: Array, speed: Array, step: int, most: float) -> tuple[int, int]:
     not stray from its mean place.
 
     Args:
-        toe: (T, 3) metres.
+        toe: (T, 2) metres, over the floor.
         speed: (T - 1,) metres a second from each frame to the next; infinity where the toe may not stand.
         step: that is grown from.
         most: metres that the toe strays at most.
@@ -89,11 +101,11 @@ def _grown(toe: Array, speed: Array, step: int, most: float) -> tuple[int, int]:
 
 
 def _beside(grown: tuple[int, int], toe: Array, low: Bool, stands: Bool, most: float, swing: int) -> tuple[int, int]:
-    """Return a stand (begin, end) that goes on in those beside it, or keeps away from them; empty if there is no room.
+    """Return a stand (begin, end) that goes on in those beside it, or keeps away from them.
 
     Args:
         grown: frames of the stand.
-        toe: (T, 3) metres.
+        toe: (T, 2) metres, over the floor.
         low: (T,) where the toe is low enough to stand.
         stands: (T,) where it stands already.
         most: metres that the toe strays at most in a stand.
@@ -110,10 +122,26 @@ def _beside(grown: tuple[int, int], toe: Array, low: Bool, stands: Bool, most: f
             begin = max(begin, last + swing)
         else:
             end = min(end, first - swing)
-    return (begin, end) if end - begin > 1 else (begin, begin)
+    return begin, end
+
+
+def _upright(joints: Array, skeleton: Skeleton) -> Bool:
+    """Return True (T,) where the root is high over the feet: who swims or crawls is not carried by them."""
+    feet, rest = list(skeleton.feet), skeleton.rest[:, 1]
+    return joints[:, 0, 1] - joints[:, feet, 1].min(axis=1) > UPRIGHT * (rest[0] - rest[feet].min())
+
+
+def _spread(toes: Array, fps: float) -> Bool:
+    """Return True (T - 1,) where both of two toes (T, 2, 3) move away from each other, or towards each other, as those
+    of a body that hops: neither carries it."""
+    apart = toes[:, 0] - toes[:, 1]
+    line = normalize(apart[1:] + apart[:-1])[:, None]
+    left, right = ((np.diff(toes, axis=0) * line).sum(axis=-1) * fps).T
+    slower, faster = np.sort(np.abs([left, right]), axis=0)
+    return (left * right < 0) & (slower > np.maximum(SPREADS, EVEN * faster))
 
 
 def _stray(places: Array) -> float:
-    """Return how far places (n, 3) get from their mean over the floor, metres."""
-    flat = places[:, [0, 2]]
-    return float(np.linalg.norm(flat - flat.mean(axis=0), axis=1).max())
+    """Return how far places (n, 2) get from their mean, metres."""
+    off = places - places.sum(axis=0) / len(places)
+    return float(np.sqrt((off * off).sum(axis=1).max()))
