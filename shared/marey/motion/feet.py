@@ -62,7 +62,7 @@ def clean_feet(
         joints: (T, J, 3) metres, Y up.
         skeleton: must have feet, hips and legs.
         fps: frames a second.
-        contacts: (T, 4) bool; None = detect them.
+        contacts: (T, 4) bool; None = detect them. Feet above the floor have none.
         rule: thresholds in metres and seconds.
 
     Returns:
@@ -74,7 +74,8 @@ def clean_feet(
     joints = np.array(joints, np.float64)
     need_feet(skeleton)
     joints[..., 1] -= floor_height(joints, skeleton)
-    stands = _on_floor(joints, skeleton, fps, rule) if contacts is None else np.array(contacts, bool)
+    stands = find_contacts(joints, skeleton, fps, rule=rule) if contacts is None else np.array(contacts, bool)
+    stands &= _over_floor(joints, skeleton, rule)
     before = joints.copy()
     for side in range(2):
         ankle, toe = skeleton.feet[2 * side : 2 * side + 2]
@@ -147,11 +148,11 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     return stands
 
 
-def _on_floor(joints: Array, skeleton: Skeleton, fps: float, rule: ContactRule) -> Bool:
-    """Detect foot contacts (T, 4) of a body over a floor at y = 0; feet that are held still above it have none."""
-    stands = find_contacts(joints, skeleton, fps, rule=rule)
+def _over_floor(joints: Array, skeleton: Skeleton, rule: ContactRule) -> Bool:
+    """Return the frames (T, 4) in which the foot of each joint can stand on a floor at y = 0: one that is held still
+    above it does not."""
     low = joints[:, list(skeleton.feet[1::2]), 1] < FLOOR_BAND[1] + rule.toe_height
-    return stands & np.repeat(low, 2, axis=1)
+    return np.repeat(low, 2, axis=1)
 
 
 def runs(mask: Bool) -> list[tuple[int, int]]:

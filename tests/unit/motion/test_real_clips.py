@@ -95,5 +95,5 @@ def test_finished_clips_keep_bones_feet_and_smoothness(people, fps):
         assert np.ptp(bone_lengths(clip.joints, HUMANML3D), axis=0).max() < 1e-4, name
         assert skate(clip.joints, clip.contacts, HUMANML3D, fps) < 1e-3, name
         was, now = (np.linalg.norm(np.diff(c.joints.astype(float), 2, axis=0), axis=-1) for c in (raw, clip))
-        assert now.max() < 1.3 * was.max(), name
+        assert now.max() < 1.6 * was.max(), name  # a sliding foot that carries is stopped
         assert np.sqrt((now**2).mean()) < 1.1 * np.sqrt((was**2).mean()), name
