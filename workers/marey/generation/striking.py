@@ -85,7 +85,8 @@ _KINDS: Mapping[str, tuple[_Strike, str]] = {
 }
 """Way of each kind of punch, and the hand that does it if none is named; empty = the one that did not strike last."""
 _FOOTWORK = re.compile(
-    r"\b(?:step|walk|advanc|retreat|circl|footwork|bounc|hop|jump|lung|run|dash|mov|charg|danc|spin|turn|shuffl|kick)"
+    r"\b(?:step|walk|advanc|retreat|circl|footwork|bounc|hop|jump|lung|run|dash|mov|charg|danc|spin|turn|shuffl|kick"
+    r"|shadow|spar(?:s|ring)\b|boxes\b)"
 )
 """Words of feet that move."""
 STRIDE_M = 0.04
