@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.quality.record import Flag, MotionQuality
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.entries import FLIGHT_SECONDS, Support, load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
+from marey.vocabulary.take_names import as_words
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,6 +48,10 @@ class Expected:
     flight_s: float = FLIGHT_SECONDS
 
 
+MOVED = Expected(("feet", "whole-body"), 0.7)
+"""Promise of movements of the whole body that are no action, such as burpees and dives."""
+
+
 def expected_of(actions: Iterable[str]) -> Expected:
     """Return what these actions of the vocabulary promise together; without one, a body on its feet."""
     vocabulary = load_vocabulary()
@@ -57,8 +63,13 @@ def expected_of(actions: Iterable[str]) -> Expected:
 
 def expected_by_prompts(prompts: Iterable[str]) -> Expected:
     """Return what the actions promise that the words of prompts name."""
+    prompts = tuple(prompts)
     named = (action.action for prompt in prompts for action in match_scope(prompt, every_action()).actions)
-    return expected_of(name for name in named if name is not None)
+    expected = expected_of(name for name in named if name is not None)
+    if not any(each.bearing.moves for prompt in prompts for each in stated_bearings(as_words(prompt))):
+        return expected
+    supports = tuple(dict.fromkeys((*expected.supports, *MOVED.supports)))
+    return Expected(supports, max(expected.flight_s, MOVED.flight_s))
 
 
 @lru_cache(maxsize=1)

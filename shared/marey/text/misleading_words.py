@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from marey.text.action_reader import named_actions
+from marey.vocabulary.scope import STANDING
+
 _UP_TO = re.compile(
     r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
     (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
@@ -82,6 +85,62 @@ _AT_WHEEL = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """The hands of who drives, which are where they are anyway."""
+_ACTS_THEMSELVES = (
+    "guard|sentry|boxer|archer|climber|drinker|swimmer|dancer|ballerina|jogger|runner|walker|pilot|driver|referee"
+    "|goalkeeper|goalie|kicker|puncher|fighter|wrestler|fencer|crawler|shooter|golfer|skater|skier|diver|kickboxer"
+)
+_DOER = re.compile(
+    rf"""^(?P<who>\W*(?:(?:a|an|the|this|that|one|another)\ )?
+    (?:(?!(?:a|an|the|my|your|his|her|just|do|keep|point)\ )[\w-]+\ )??)
+    (?:{_ACTS_THEMSELVES})
+    (?P<does>(?:\ (?:(?:who|that)\ )?is)?(?:\ \w+ly)?\ (?P<verb>[a-z'-]+)\b[^,;]*)$""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The subject of one movement whose noun is that of an action: "the guard waits", "a boxer stands up"."""
+_PREPARED = re.compile(r"\b(?:stance|fists?|guard|ready|bounc\w+|shadow)\b", re.IGNORECASE)
+"""Words of who stands as the noun says: "a boxer stands ready"."""
+_JOINED = re.compile(r"\b(?:and(?! (?:forth|fro|right|left))|then|before|until|after)\b", re.IGNORECASE)
+_AN = re.compile(r"\ban (?=$)", re.IGNORECASE)
+_BACK_TO_WALL = re.compile(
+    r"""\b(?:(?:press|lean|flatten|push|put|rest|brac)(?P<s>e?s)?|(?P<ing>press|lean|flatten|push|putt|rest|brac)ing)
+    (?:\ (?:his|her|their|its)\ back|\ (?:him|her|them|it)sel\w+|\ back(?=\ (?:against|to)))
+    (?:\ (?:flat|firmly|hard|up|tight\w*))*\ (?P<where>(?:against|to|on|onto|at)\ (?:a|an|the|his|her)\ (?:\w+\ )?
+    (?:wall|pillar|column|door|fence|tree|rock|cover|corner))\b""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body at rest against something, of which models read a push."""
+_STUMBLES_BACK = re.compile(
+    r"\b(?P<verb>(?:stumbl|stagger|reel|totter|lurch|wobbl)(?:es?|s|ing|ed)?)(?P<how> \w+ly)? back"
+    r"(?!wards?\b| and forth\b| (?:to|into|onto|in|home|up|on)\b)",
+    re.IGNORECASE,
+)
+"""A step that catches a body which loses its balance: "stumbles back"."""
+_HIT_AND_STUMBLES = re.compile(
+    r"""(?P<hit>\b(?:gets?|got|is|takes?|receives?|being|getting)\ (?:\w+ly\ )?(?:an?\ )?
+    (?:(?:hard|heavy|strong|big)\ )?
+    (?:hit|struck|punched|kicked|slapped|shoved|pushed|blow|punch|shot)\b[^,.;]{0,40}?)
+    (?:,|,?\ and|,?\ then|,?\ and\ then)\ (?:(?:he|she)\ )?(?:stumbl|stagger|reel)(?:es|s|ing)?\ (?:\w+ly\ )?
+    (?:a\ (?:bit|little|step)\ )?back(?:wards?)?(?=$|[.,;]|\ (?:and|then)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A blow and the step back that it takes, which are one movement."""
+_ON_FLOOR = re.compile(
+    r"""\b(?P<sits>sit|sits|sitting|sat)(?:\ down)?(?P<how>\ \w+ly)?
+    (?P<legs>\ (?:cross(?:ed)?[ -]legged|in\ (?:a\ |the\ )?lotus(?:\ (?:pose|position))?
+    |with\ (?:(?:his|her|their)\ )?(?:legs\ crossed|crossed\ legs)))(?!\ (?:on|in|at|upon)\ )""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A seat on the floor that does not say so: "sits down cross-legged"."""
+_SEAT = re.compile(
+    r"\b(?:floor|ground|grass|mat|carpet|rug|sand|bed|chair|bench|sofa|couch|seat|stool|throne|table|cushion|pillow)\b",
+    re.IGNORECASE,
+)
+_SIDEWAYS = re.compile(
+    r"""\b(?P<way>(?:sneak|creep|prowl|tip-?toe|crouch(?:ed|ing)?[ -]?walk)(?:s|ing|ed)?)(?P<how>\ \w+ly)?
+    (?=\ (?:to\ (?:the|his|her|their)\ )?(?:left|right|side)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A crouched way to a side, of which models read one ahead."""
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -117,14 +176,42 @@ def without_misleading(prompt: str) -> str:
     a climb. Who "walks back to his car" or "turns around and walks back" walks ahead, who "paces back and forth" turns
     on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
+    A guard that does something else than to guard is a person.
     """
-    prompt = _AT_WHEEL.sub(r"\g<drives>", prompt)
+    prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
+    prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
+    prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
-    return _HIT_LEG.sub(r"\g<hit>\g<how>", _SHOT.sub("gets hit", text))
+    text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
+    return _HIT_LEG.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
+
+
+def _as_person(found: re.Match[str]) -> str:
+    """Return a prompt of one movement whose subject is a person, if its other words name an action; else as it is."""
+    does, verb = found["does"], found["verb"].lower()
+    named = named_actions(f"a person{does}")
+    if not named or _JOINED.search(does) or (verb != STANDING and not named_actions(f"a person {verb}")):
+        return found[0]
+    if named == {STANDING} and _PREPARED.search(does):
+        return found[0]
+    return f"{_AN.sub('a ', found['who'] or 'a ')}person{does}"
+
+
+def _against(found: re.Match[str]) -> str:
+    """Return a body that stands with its back to something."""
+    stands = "standing" if found["ing"] else "stands" if found["s"] else "stand"
+    return f"{stands} with the back {found['where']}"
+
+
+def _on_floor(found: re.Match[str]) -> str:
+    """Return a seat on the floor, unless the prompt names another one."""
+    if _SEAT.search(found.string):
+        return found[0]
+    return f"{found['sits']} down{found['how'] or ''} on the floor{found['legs']}"
 
 
 def _with_turns(found: re.Match[str]) -> str:

@@ -37,7 +37,7 @@ _DENIED = re.compile(
 )
 _AT_ONCE = re.compile(r"\b(?:while|as|still|whilst)\W*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$", re.IGNORECASE)
 _AND = re.compile(r"\b(?:and|then)\b\W*(?:(?:he|she|they|it)\s+)?$", re.IGNORECASE)
-_AT_ONCE_AFTER = re.compile(r"^\W*(?:while|as|whilst|during|when)\b", re.IGNORECASE)
+_AT_ONCE_AFTER = re.compile(r"^\W*(?:while|as|whilst|during|when|seated|sitting)\b", re.IGNORECASE)
 _UNTIDY = tuple(
     re.compile(pattern)
     for pattern in (
@@ -130,7 +130,7 @@ _BRINGING = frozenset(
 _GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
 """Nouns of ways before which an adjective is one of the person: "sad walk"."""
 _GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
-_POSTURES = re.compile(r"\b(?:kneel\w*|knelt|crouch\w*|squat\w*|sit|sits|sitting|sat|knees?)\b")
+_POSTURES = re.compile(r"\b(?:kneel\w*|knelt|crouch\w*|squat\w*|sit|sits|sitting|sat|seated|knees?)\b")
 _WAYS = (
     r"(?:walk(?:s|ing|ed)?|runs?|running|jog(?:s|ging)?|sprint(?:s|ing)?|stroll(?:s|ing)?|march(?:es|ing)?|turns?|turning"
     r"|(?:side)?steps?|back(?:s|ing)|advanc(?:e|es|ing)|strafe?s?|strafing|creeps?|creeping|paces?|pacing)"
@@ -321,6 +321,8 @@ def _matches(text: str) -> Iterator[_Words]:
                 yield from _gait(text, match, stated, _LOAD if kind == "loads" else "")
             elif kind in ("beings", "people"):
                 yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
+            elif kind == "read":
+                yield _Words(*match.span(), stated, match[0])
             elif kind == "beside":
                 if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
                     yield _Words(*match.span(), stated)
@@ -407,7 +409,7 @@ def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
 def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield kind and pattern; adjectives of a movement are of the kind `how`: "sad walk", "walks home tired"."""
     either = "|".join(entries)
-    if kind in ("how", "beside"):
+    if kind in ("how", "beside", "read"):
         yield kind, "|".join(map(_expanded, entries))
     elif kind in ("gaits", "loads"):
         for verbs, tail in map(_verbs_and_tail, entries):

@@ -17,7 +17,7 @@ from typing import Any, Literal, cast
 from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
-Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", "stomp", "shuffle", "rope", ""]
+Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", "stomp", "shuffle", "rope", "tiptoe", ""]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 
@@ -45,7 +45,7 @@ _BRINGS = re.compile(
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
-WORDS = ("how", "beside", "gaits", "loads", "adjectives", "beings", "people")
+WORDS = ("how", "beside", "read", "gaits", "loads", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
 
@@ -103,6 +103,8 @@ class Bearing:
         keys: what the body goes through; None = it stays as it is.
         load: something is carried in it.
         work: something that is done ("saws a plank"), not a way to do something else.
+        moves: it is a movement of the whole body (`marey.generation.named`), made in place of a body that stands.
+        also: actions beside which all of it is drawn, though the body is not upright in them, or its arms not free.
         arms: by `left` and `right`, those that it moves.
     """
 
@@ -127,6 +129,8 @@ class Bearing:
     hold_s: tuple[float, float] = (1.0, 2.0)
     load: bool = False
     work: bool = False
+    moves: bool = False
+    also: tuple[str, ...] = ()
     keys: Keys | None = None
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
 
@@ -183,7 +187,9 @@ class StatedBearing:
         Beside what the arms do it is only what is said of the person.
         """
         bearing = self.bearing
-        if action in UPRIGHT:
+        if bearing.moves:
+            return "body" if action == "idle" else ""
+        if action in UPRIGHT or action in bearing.also:
             return "body"
         leans = bearing.trunk or bearing.head
         if action in ARMS_FREE:

@@ -66,6 +66,17 @@ def stated_count(prompt: str, action: str) -> int | None:
     return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
 
 
+def stated_number(words: str) -> int | None:
+    """Return the first number in words for what is done: "three" of "does three burpees", "twice"; None = none.
+
+    Args:
+        words: in lower case.
+    """
+    found = re.search(rf"{_NUMBER}\b", words)
+    value = next(_of_times(words), None) or (None if found is None else _value(found["number"]))
+    return value if value is not None and 0 < value <= MOST else None
+
+
 def _of_times(text: str) -> Iterator[int]:
     """Yield numbers of times: "twice", "x3"."""
     yield from (_value(match["number"]) for match in _TIMES.finditer(text))

@@ -34,6 +34,17 @@ _SAID_NOTHING = frozenset(
     test tk unarmed v var variant variation ver wip""".split()  # noqa: SIM905 - a list of words
 )
 """Parts that say who, which or how it is kept, but not what is done."""
+_CATEGORIES = frozenset(
+    "emote emotes emt trv trav traversal gesture gestures gest interact interaction act action".split()  # noqa: SIM905
+)
+"""First parts that say what kind of take it is, where others say what is done: "EMOTE_facepalm"."""
+_HITS = frozenset({"hit", "hitreact", "hitreaction", "hr"})
+"""First parts of takes of who is hit."""
+_REACTS = frozenset({"react", "reaction", "reacts"})
+_STRUCK_PARTS = frozenset(
+    "head face chest stomach belly gut torso shoulder arm leg knee back side".split()  # noqa: SIM905
+)
+"""Parts of the body that are hit."""
 _SLASHED = re.compile(r"(?<!\w)w/o?(?=\s|\w)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^(?:v|tk|take|sc|shot|var|seq)?\d+[a-z]?$")
 _ANGLE = re.compile(r"^(45|90|135|180|270|360)(?:deg)?$")
@@ -54,8 +65,24 @@ def as_words(text: str) -> str:
 
 def _words_of(name: re.Match[str]) -> str:
     parts = [part for piece in name[0].split("_") for part in _pieces(piece)]
-    words = [_word(part, after) for part, after in itertools.pairwise([*parts, ""])]
-    return " ".join(word for word in words if word) or name[0].replace("_", " ")
+    said = [word for part, after in itertools.pairwise([*parts, ""]) if (word := _word(part, after))]
+    if len(said) > 1 and said[0] in _CATEGORIES:
+        said = said[1:]
+    return " ".join(_of_hit(said)) or name[0].replace("_", " ")
+
+
+def _of_hit(said: list[str]) -> list[str]:
+    """Return the words of a take of who is hit as a sentence: "gets hit in the left shoulder" of "hit shoulder left";
+    any others as they are."""
+    rest = [word for word in said[1:] if word not in _REACTS]
+    struck = [word for word in rest if word in _STRUCK_PARTS]
+    if not said or said[0] not in _HITS or not struck or len(said) < 2:
+        return said
+    sides = [word for word in rest if word in ("left", "right")]
+    others = [word for word in rest if word not in (*struck, *sides)]
+    if struck == ["back"]:
+        return ["gets hit from behind", *sides, *others]
+    return ["gets hit in the", *sides[:1], struck[0], *others]
 
 
 def _pieces(piece: str) -> list[str]:

@@ -154,3 +154,39 @@ def clap_times(rng: random.Random, count: int, *, high: bool = False) -> Gesture
             body.hold(side, way, point, lag=0.0)
 
     return Gesture(seconds, ("clap-times",), change, BOTH, count)
+
+
+_OVERHEAD_HZ, _WILDLY_HZ = (0.95, 1.3), (1.4, 1.8)
+_OUT, _IN = 0.34, -0.06
+"""Metres of each hand outward of its shoulder, between which both go to and fro over the head."""
+
+
+def wave_overhead(
+    rng: random.Random, count: int | None = None, *, seconds: float | None = None, wild: bool = False
+) -> Gesture:
+    """Both arms that go up and swing to and fro over the head, and come down.
+
+    Args:
+        rng: decides the rest.
+        count: of the swings to and fro; None = as many as fill the time.
+        seconds: to be filled; None = three to four.
+        wild: fast, and with a body that goes up and down.
+    """
+    rate = rng.uniform(*(_WILDLY_HZ if wild else _OVERHEAD_HZ))
+    start, rise, fall = rng.uniform(0.15, 0.4), rng.uniform(0.5, 0.65), rng.uniform(0.55, 0.75)
+    least = start + rise + fall + 0.5
+    hold = count / rate if count else max((seconds or rng.uniform(4.2, 5.2)) - least, 1.0)
+    crosses, bounce = rng.random() < 0.6, (0.02 if wild else 0.006)
+
+    def change(body: StandingBody) -> None:
+        way = envelope(len(body.joints), start, rise, hold, fall)
+        phase = np.clip((np.arange(len(way)) / FPS - start - 0.6 * rise) * rate, 0.0, None)
+        body.shift(-bounce * way * (1.0 + np.cos(4 * np.pi * phase)))
+        for side in SIDES:
+            swing = np.cos(2 * np.pi * phase + (np.pi if not crosses and side == SIDES[0] else 0.0))
+            out = 0.5 * (_OUT + _IN) + 0.5 * (_OUT - _IN) * swing
+            up = 0.47 - 0.5 * np.maximum(out - 0.08, 0.0) ** 2
+            point = np.stack([out, up, np.full(len(way), 0.07)], axis=-1)
+            body.move_arm(side, way, *body.reach(side, point), 0.0)
+
+    return Gesture(least + hold, ("wave-overhead",), change, BOTH, count or 1)

@@ -140,6 +140,7 @@ def _stand_there(rng: random.Random, done: Sequel, guard: bool) -> None:
 
 _WOUND = {
     "head": HandPlace((-0.06, 0.14, 0.1), "trunk", (1.0, -0.4, 0.3)),
+    "chest": HandPlace((-0.1, -0.16, 0.18), "trunk", (0.9, -0.6, 0.1)),
     "stomach": HandPlace((-0.14, -0.36, 0.2), "trunk", (0.9, -0.3, 0.1)),
     "shoulder": HandPlace((-0.26, -0.06, 0.16), "trunk", (0.8, -0.7, 0.3)),
     "back": HandPlace((0.14, -0.3, -0.16), "trunk", (0.9, 0.0, -0.6)),
@@ -147,16 +148,27 @@ _WOUND = {
 _FLUNG = HandPlace((0.34, -0.28, 0.28), "trunk", (0.6, -0.7, -0.5))
 
 
-def flinch(rng: random.Random) -> Gesture:
-    """One hit, or two: a jerk away from it, then back to standing, after a step where it is heavy."""
-    form = rng.choices(["head", "stomach", "shoulder", "leg", "back", "side"], (4, 4, 3, 2, 3, 3))[0]
-    heavy = rng.random() < 0.4
-    begin = STAND if rng.random() < 0.7 else _stance(rng, True)
-    on_left = rng.random() < 0.5
+def flinch(
+    rng: random.Random, form: str = "", *, side: str = "", heavy: bool | None = None, times: int | None = None
+) -> Gesture:
+    """One hit, or two: a jerk away from it, then back to standing, after a step where it is heavy.
+
+    Args:
+        rng: decides everything that is not given.
+        form: part that is hit: head, chest, stomach, shoulder, leg, back or side; a given one is hit standing.
+        side: left or right, on which it is.
+        heavy: a step catches the body.
+        times: how often.
+    """
+    stands = bool(form)
+    form = form or rng.choices(["head", "stomach", "shoulder", "leg", "back", "side"], (4, 4, 3, 2, 3, 3))[0]
+    heavy = rng.random() < 0.4 if heavy is None else heavy
+    begin = STAND if stands or rng.random() < 0.7 else _stance(rng, True)
+    on_left = side == LEFT if side else rng.random() < 0.5
     done = Sequel([rng.uniform(0.2, 0.9)], [begin])
-    times = rng.choice((1, 1, 1, 2))
+    times = times or rng.choice((1, 1, 1, 2))
     for _ in range(times):
-        _hit(rng, done, begin, form, heavy)
+        _hit(rng, done, begin, form, heavy, rng.uniform(*((1.15, 1.45) if heavy or stands else (0.8, 1.05))))
     told = done if on_left else done.mirrored()
     side = ("left" if on_left else "right") if form in ("shoulder", "leg", "side") else ""
     told = told.gesture(
@@ -170,12 +182,12 @@ def flinch(rng: random.Random) -> Gesture:
     return replace(told, untrue=rf"({'|'.join([*untrue, 'wince'] if heavy else untrue) or 'wince'})")
 
 
-def _hit(rng: random.Random, done: Sequel, begin: Posture, form: str, heavy: bool) -> None:
-    """Hit on the left side, or from in front or behind."""
-    hard = rng.uniform(1.15, 1.45) if heavy else rng.uniform(0.8, 1.05)
+def _hit(rng: random.Random, done: Sequel, begin: Posture, form: str, heavy: bool, hard: float) -> None:
+    """Hit on the left side, or from in front or behind; `hard`: factor of how far the body goes."""
     turn = rng.uniform(-12, 12)
     pelvis, tilt, spine, neck = {
         "head": ((0.0, -0.03, -0.05), (-6, 0, 0), (-15, 0, turn), (-26, rng.uniform(-10, 10), 2 * turn)),
+        "chest": ((0.0, -0.04, -0.11), (-5, 0, 0), (-20, 0, turn), (20, 0, 0)),
         "stomach": ((0.0, -0.07, -0.12), (16, 0, 0), (30, 0, turn), (6, 0, 0)),
         "shoulder": ((-0.03, -0.03, -0.05), (-3, 4, 12), (-6, 8, 30), (-4, 6, -14)),
         "leg": ((0.02, -0.16, -0.04), (10, -6, 0), (18, -10, 8), (10, 0, 0)),
@@ -184,7 +196,7 @@ def _hit(rng: random.Random, done: Sequel, begin: Posture, form: str, heavy: boo
     }[form]
     x, y, z = begin.pelvis or (0.0, _STANDS, 0.0)
     scaled = (x + hard * pelvis[0], y + hard * pelvis[1], z + hard * pelvis[2])
-    flung = both(_FLUNG) if form in ("head", "back", "shoulder", "side") else {}
+    flung = both(_FLUNG) if form in ("head", "chest", "back", "shoulder", "side") else {}
     jerk = replace(
         begin,
         pelvis=scaled,

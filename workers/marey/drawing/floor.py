@@ -86,10 +86,17 @@ def _down_to_seat(rng: random.Random, done: Sequel, seat: Posture, pace: float) 
     done.then(0.7 * pace, seat)
 
 
-def sit_floor(rng: random.Random) -> Gesture:
-    form = rng.choices(["floor-crossed", "floor-bent", "floor-stretched"], (5, 3, 2))[0]
+def sit_floor(rng: random.Random, form: str = "", *, down: bool | None = None) -> Gesture:
+    """A body that sits on the floor.
+
+    Args:
+        rng: decides everything that is not given.
+        form: floor-crossed, floor-bent or floor-stretched, by the legs.
+        down: it stands at first, and sits down.
+    """
+    form = form or rng.choices(["floor-crossed", "floor-bent", "floor-stretched"], (5, 3, 2))[0]
     seat = _floor_seats(rng, form)
-    down = rng.random() < 0.35
+    down = rng.random() < 0.35 if down is None else down
     done = Sequel([rng.uniform(0.15, 0.6)], [STAND if down else seat])
     if down:
         _down_to_seat(rng, done, seat, rng.uniform(0.9, 1.3))

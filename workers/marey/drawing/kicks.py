@@ -7,10 +7,15 @@ import math
 import random
 from dataclasses import replace
 
+import numpy as np
+
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT
+from marey.motion.rotations import from_rotvec, rotate
+from marey.posing.curves import monotone
+from marey.posing.limbs import FPS, LEVEL
+from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody
 
 _LEG = 0.785
 """Metres from hip to ankle of a leg that is almost straight."""
@@ -38,6 +43,39 @@ def _swinging(rng: random.Random, share: float) -> dict[str, HandPlace]:
 def kick(rng: random.Random) -> Gesture:
     form = rng.choices(["kick-front", "kick-side", "kick-round", "kick-low"], (5, 2, 2, 2))[0]
     guard = rng.random() < 0.5
+    return _side(rng, _kicked(rng, form, guard), ["kick", form, "kick-guard" if guard else ""])
+
+
+_SPUN = ((0, 0.0), (1, 25.0), (2, 185.0), (3, 262.0), (4, 285.0), (5, 345.0), (6, 360.0))
+"""Postures of a kick by their number, and degrees by which a spinning body has turned at them."""
+
+
+def spin_kick(rng: random.Random, side: str = "") -> Gesture:
+    """A kick with the heel or the sole of a body that turns all the way round on its other foot.
+
+    Args:
+        rng: decides everything that is not given.
+        side: of the leg that kicks.
+    """
+    side = side or rng.choice(SIDES)
+    done = _kicked(rng, "kick-side", guard=False)
+    told = done if side == LEFT else done.mirrored()
+    times, degrees = zip(*((done.times[number], turned) for number, turned in _SPUN), strict=True)
+    gesture = told.gesture(rng, ["kick", "kick-spin"], side)
+
+    def change(body: StandingBody) -> None:
+        gesture.change(body)
+        joints = body.joints
+        turned = monotone(np.array(times), np.array(degrees)[:, None], np.arange(len(joints)) / FPS)
+        pivot = joints[:, LEGS[OTHER_SIDE[side]][-1]].mean(0) * LEVEL
+        about = np.array([0.0, 1.0, 0.0]) * np.radians(SIGN[side] * turned)
+        joints[:] = pivot + rotate(from_rotvec(about)[:, None], joints - pivot)
+
+    return replace(gesture, change=change)
+
+
+def _kicked(rng: random.Random, form: str, guard: bool) -> Sequel:
+    """The postures of a kick with the left leg."""
     height = {"kick-front": (0.7, 1.2), "kick-side": (0.62, 1.0), "kick-round": (0.7, 1.1), "kick-low": (0.52, 0.66)}
     up = rng.uniform(*height[form])
     high = (up - 0.5) / 0.7
@@ -67,7 +105,7 @@ def kick(rng: random.Random) -> Gesture:
     done.then(rng.uniform(0.35, 0.55), Posture(hands=arms) if guard else STAND, 0.1)
     if guard:
         done.then(rng.uniform(0.5, 0.8), STAND)
-    return _side(rng, done, ["kick", form, "kick-guard" if guard else ""])
+    return done
 
 
 def _ahead(up: float) -> tuple[FootPlace, FootPlace, Point]:

@@ -39,7 +39,7 @@ def roll(
     pace = rng.uniform(*_PACES[tempo])
     done = Tumble(times=[rng.uniform(0.1, 0.6)])
     steps = not stands and form in ("forward", "shoulder") and tempo != "slow" and rng.random() < 0.45
-    start = _steps_in(rng, done, pace) if steps else 0.0
+    start = steps_in(rng, done, pace) if steps else 0.0
     if form == "sideways":
         end = _roll_aside(rng, done, pace)
     elif form == "backward":
@@ -79,7 +79,7 @@ def _turned_on(whole: Whole, before: Whole) -> Whole:
     return replace(whole, tilt=(whole.tilt[0] + turns[0], whole.tilt[1] + turns[1], whole.tilt[2] + turns[2]))
 
 
-def _steps_in(rng: random.Random, done: Tumble, pace: float) -> float:
+def steps_in(rng: random.Random, done: Tumble, pace: float) -> float:
     """Steps forward, two or four; returns how far, metres."""
     far, at = rng.uniform(0.42, 0.6), 0.0
     feet = {LEFT: 0.0, RIGHT: 0.0}
@@ -182,7 +182,7 @@ def flip(rng: random.Random, form: str = "", *, stands: bool = False) -> Gesture
     turn = 1.0 if form == "front" else -1.0
     done = Tumble(times=[rng.uniform(0.15, 0.8)])
     steps = not stands and form == "front" and rng.random() < 0.6
-    start = _steps_in(rng, done, 0.9) if steps else 0.0
+    start = steps_in(rng, done, 0.9) if steps else 0.0
     far = rng.uniform(0.9, 1.3) if steps else rng.uniform(0.35, 0.8)
     end, lasts = start + turn * far, rng.uniform(0.62, 0.72)
     swung = pair(Limb((0.22, -0.34, -0.24), towards=(0.7, 0.1, -0.7)))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import smooth
 from marey.generation.asked import action_of
 from marey.generation.gaits import GAITS
+from marey.generation.hits import hit_part
 from marey.generation.port import MotionFeatures, Request
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
@@ -73,6 +74,7 @@ class BorneSpan:
         stated: in the order of the vocabulary.
         action: id of the action, which leaves some parts of the body free for them.
         seed: decides sizes and times.
+        said: the prompt.
     """
 
     begin: int
@@ -80,6 +82,7 @@ class BorneSpan:
     stated: tuple[StatedBearing, ...]
     action: str
     seed: int
+    said: str = ""
 
     def record(self) -> list[dict[str, str]]:
         """Return what the manifest says."""
@@ -115,36 +118,41 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         return []
     if request.timeline is None:
         action = action_of(request.text)
-        stated = fitting(_with_drawn(stated_bearings(request.text.said), action), action)
-        return [BorneSpan(0, frames, stated, action, request.seed)] if stated else []
+        said = request.text.said
+        stated = fitting(_with_drawn(stated_bearings(said), action, said), action)
+        return [BorneSpan(0, frames, stated, action, request.seed, said)] if stated else []
     whole = [each for each in stated_bearings(request.text.said) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
         action, own = action_of(row.text), stated_bearings(row.text.said)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
-        stated = fitting(_with_drawn([*whole, *kept, *own], action), action)
+        stated = fitting(_with_drawn([*whole, *kept, *own], action, row.text.said), action)
         if request.is_sequence:
             carried = [each for each in (*kept, *own) if each in stated and each.bearing.lasts]
         if stated:
             end = min(round(row.end * fps), frames)
-            found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k))
+            found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k, row.text.said))
     return found
 
 
-def _with_drawn(stated: Sequence[StatedBearing], action: str) -> list[StatedBearing]:
+def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list[StatedBearing]:
     """Return bearings with the one that an action is drawn as; a load that the prompt names takes its place."""
     names_load = action in DRAWN_ON and any(each.bearing.load for each in stated)
-    return [*stated, *([] if names_load else _drawn_as(action))]
+    if action in DRAWN_AS and hit_part(said):  # who is hit and "stumbles back" takes a step, and is not drunk
+        stated = [each for each in stated if each.whole or not each.bearing.gait]
+    return [*stated, *([] if names_load else _drawn_as(action, said))]
 
 
-def _drawn_as(action: str) -> list[StatedBearing]:
-    """Return the bearing that an action is drawn as, in a list; an empty one if a network shows it."""
-    return [StatedBearing(_ACTS[action])] if action in _ACTS else []
+def _drawn_as(action: str, said: str) -> list[StatedBearing]:
+    """Return the bearing that an action is drawn as, in a list; an empty one if a network shows it, or its prompt
+    states the form in which it is drawn whole."""
+    is_whole = action in DRAWN_AS and bool(hit_part(said))
+    return [StatedBearing(_ACTS[action])] if action in _ACTS and not is_whole else []
 
 
 def actions_alone(spans: Sequence[BorneSpan]) -> list[BorneSpan]:
     """Return the parts of a motion whose action itself is drawn, with nothing but that."""
-    return [replace(span, stated=tuple(_drawn_as(span.action))) for span in spans if span.action in _ACTS]
+    return [replace(span, stated=tuple(acts)) for span in spans if (acts := _drawn_as(span.action, span.said))]
 
 
 def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
@@ -156,7 +164,9 @@ def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
 def fitting(stated: Sequence[StatedBearing], action: str) -> tuple[StatedBearing, ...]:
     """Return the bearings that an action can have, each once, in the order of the vocabulary."""
     order = list(load_bearings())
-    once = {each.name: each for each in stated if each.shown_in(action)}
+    shown = [each for each in stated if each.shown_in(action)]
+    moves = [each for each in shown if each.bearing.moves]  # no pose is drawn on a movement of the whole body
+    once = {each.name: each for each in moves or shown}
     return tuple(sorted(once.values(), key=lambda each: order.index(each.name)))
 
 
@@ -169,6 +179,7 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
         spans: by `borne_spans`.
     """
     features: Float32 = motion.features
+    spans = [span for span in spans if not any(each.bearing.moves for each in span.stated)]
     if not spans or len(features) < SHORTEST or layout.skeleton.name != HUMANML3D.name:
         return features
     joints = layout.decode(features).astype(np.float64)

@@ -9,6 +9,7 @@ from typing import Any
 from marey.generation.asked import changes_of
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
+from marey.generation.named import names_movement
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.shots.timelines import TimelineMotion
@@ -122,8 +123,8 @@ def _prompts(request: Request) -> list[str]:
 def _match(clip: MotionClip, request: Request) -> PromptMatch:
     """Match a clip with its prompt, by its words or else by its meaning.
 
-    Recordings of streams, which hold several prompts, have none.
+    Recordings of streams, which hold several prompts, have none, nor have movements that are no action.
     """
-    if request.recording is not None:
+    if request.recording is not None or names_movement(request.text.said):
         return PromptMatch()
     return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)

@@ -1,5 +1,5 @@
-"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps and feet that are
-dragged; and, drawn on a body that stands, a foot that taps and hops over a rope.
+"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps, steps on the toes and
+feet that are dragged; and, drawn on a body that stands, a foot that taps and hops over a rope.
 
 A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
 slower. Frames are played at other times, so standing feet stay. Knees are lifted while their feet pass the other ones;
@@ -17,6 +17,7 @@ from marey.checks.kinematics import smooth
 from marey.generation.turned import bent_along
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
+from marey.motion.skeleton import HUMANML3D
 from marey.posing.limbs import BONE_LENGTHS
 from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, StandingBody, eased
 from marey.vocabulary.bearings import Gait
@@ -54,6 +55,11 @@ ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.085, 0.035
 """Seconds of a hop over a rope, the share of them in the air, and metres by which the body rises, and sinks between."""
 TOES_DOWN = 0.025
 """Metres by which the toes of who hops hang below where they stand."""
+HEELS_UP, TIPTOE_LEG, TIPTOE_UPRIGHT = 42.0, 0.965, 0.85
+"""Degrees by which the feet of who goes on the toes point further down, the longest that a leg gets as a share of its
+length, and the share of the lean of the trunk that is taken back."""
+TIPTOE_RISE = 0.22
+"""Metres by which its hips rise at most over those of the walk below, which may be a crouched one."""
 SHANK_BACK = 14.0
 """Degrees by which the shank below it hangs back."""
 APART = 0.03
@@ -177,6 +183,32 @@ def shuffling(joints: Array, layout: FeatureLayout, begin: int, end: int, side: 
     return body.solved()
 
 
+def on_toes(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` go on the toes, upright, however low the
+    walk is; see `limping`."""
+    del side, rng
+    fps, inside = layout.fps, _inside(len(joints), begin, end, layout.fps)
+    body = StandingBody(joints)
+    reach: list[Array] = []
+    for leg, (hip, knee, ankle, toe) in LEGS.items():
+        foot = body.local(body.joints[:, ankle] - body.joints[:, toe], leg)
+        angle = np.radians(HEELS_UP) * inside
+        up = foot[:, 1] * np.cos(angle) - foot[:, 2] * np.sin(angle)
+        back = foot[:, 1] * np.sin(angle) + foot[:, 2] * np.cos(angle)
+        tipped = np.stack([foot[:, 0], up, back], axis=-1)
+        body.joints[:, ankle] = body.joints[:, toe] + body.world(tipped, leg)
+        longest = TIPTOE_LEG * (BONE_LENGTHS[knee] + BONE_LENGTHS[ankle])
+        apart = body.joints[:, hip] - body.joints[:, ankle]
+        level = np.linalg.norm(apart[:, [0, 2]], axis=-1)
+        reach.append(np.sqrt(np.maximum(longest**2 - level**2, 0.0)) - apart[:, 1])
+    room = np.clip(smooth(np.minimum(*reach), 0.12, fps), 0.0, TIPTOE_RISE)
+    body.shift(inside * np.minimum(room, np.minimum(*reach)))
+    trunk = body.local(body.joints[:, HUMANML3D.index("neck")] - body.joints[:, 0], LEFT)
+    lean = np.degrees(np.arctan2(smooth(trunk[:, 2], 0.3, fps), smooth(trunk[:, 1], 0.3, fps)))
+    body.lean(-TIPTOE_UPRIGHT * inside * np.maximum(lean, 0.0), "left")
+    return body.solved()
+
+
 def over_rope(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
     """Return joints (T, 22, 3) of a body that stands, and hops on both feet in the frames `begin` to `end`; see
     `limping`."""
@@ -241,6 +273,7 @@ GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Ge
     "stomp": stomping,
     "shuffle": shuffling,
     "rope": over_rope,
+    "tiptoe": on_toes,
 }
 """Gaits of bearings, by their name in `bearings.toml`."""
 

@@ -1,5 +1,6 @@
 """Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
-or in a direction, a number of claps, and steps aside by number or at a pace.
+or in a direction, a number of claps, steps aside by number or at a pace, blows to a part of the body, kicks with a
+spin, waves of both arms over the head, seats on the floor with crossed legs, and movements that have a name alone.
 
 A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
 nothing stays as the network makes it.
@@ -14,10 +15,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.arms import clap_times
+from marey.drawing.arms import clap_times, wave_overhead
+from marey.drawing.floor import sit_floor
 from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.kicks import spin_kick
 from marey.drawing.sidesteps import sidestep
 from marey.generation.fine_wish import FineWish
+from marey.generation.hits import stated_hit
+from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
@@ -32,6 +37,15 @@ None."""
 AT_PACE = frozenset({"sidestep"})
 """Actions that are drawn at the pace that is asked for."""
 _HIGH = re.compile(r"\boverhead\b|\b(?:above|over) (?:(?:his|her|their|the|your) )?heads?\b")
+_BOTH = re.compile(r"\b(?:both|arms|hands)\b")
+_WILD = re.compile(r"\b(?:wild\w*|frantic\w*|desperate\w*|franticly|attention|for help)\b")
+_GOES = re.compile(r"\b(?:walk|run|jog|sit|kneel|jump|turn|danc)\w*")
+"""Words of what else a body does that waves."""
+_SPINS = re.compile(r"\b(?:spin\w*|spun|tornado|turning|360|whirl\w*|wheel[ -]kick|back[ -]?hook)\b")
+_CROSSED = re.compile(
+    r"\bcross(?:ed|ing)?[ -]leg\w*|\blegs (?:\w+ )?crossed\b|\b(?:crossed|crosses (?:his|her|their)) legs\b|\blotus\b"
+)
+_DOWN = re.compile(r"\bdown\b|\btakes? a seat\b|\bfrom standing\b")
 _TO_AND_FRO = re.compile(r"\b(?:side to side|back and forth|to and fro|left and right|right and left|both)\b")
 
 
@@ -48,7 +62,37 @@ def _steps_aside(wish: FineWish, rng: random.Random, seconds: float | None) -> G
     return sidestep(rng, side, count=count, pace=pace, seconds=seconds or rng.uniform(2.6, 3.6))
 
 
-STATED: Mapping[str, Statement] = {"raise-arm": stated_raise, "clap": _claps, "sidestep": _steps_aside}
+def _spin_kick(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    del seconds
+    return spin_kick(rng, wish.side) if _SPINS.search(wish.prompt.lower()) and (wish.count or 1) == 1 else None
+
+
+def _wave_overhead(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    text = wish.prompt.lower()
+    both = _BOTH.search(text)
+    if not both or not (_HIGH.search(text) or _WILD.search(text)) or _GOES.search(text):
+        return None
+    return wave_overhead(rng, wish.count, seconds=seconds, wild=bool(_WILD.search(text)))
+
+
+def _cross_legged(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    del seconds
+    text = wish.prompt.lower()
+    if not _CROSSED.search(text):
+        return None
+    return sit_floor(rng, "floor-crossed", down=True if _DOWN.search(text) else None)
+
+
+STATED: Mapping[str, Statement] = {
+    "raise-arm": stated_raise,
+    "clap": _claps,
+    "sidestep": _steps_aside,
+    "idle": named_movement,
+    "flinch": stated_hit,
+    "kick": _spin_kick,
+    "wave": _wave_overhead,
+    "sit-floor": _cross_legged,
+}
 """Movements by action."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.shots.timelines import gaps_of, plan_timeline
 from marey.generation.timed import TimedText
@@ -90,7 +91,10 @@ def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> Motion
 
 
 def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, Any]]) -> PromptMatch:
-    """Return the match of a row without the transition that it begins with: who stops first ends a step."""
+    """Return the match of a row without the transition that it begins with: who stops first ends a step. Movements that
+    are no action have none."""
+    if names_movement(row.text.said):
+        return PromptMatch()
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
     frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))
     return match_of(clip, row.text.actions or (row.text.rewritten,), row.scope, frames=frames)

@@ -1,0 +1,76 @@
+"""Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, moonwalks, dives
+to a side, slides.
+
+Readers and networks know nothing of them. Their words are those of bearings that move (`moves` in `bearings.toml`), so
+that they are read as what is done by a body that stands, and the movement is drawn in its place.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Mapping
+
+from marey.drawing.burpees import burpees
+from marey.drawing.dives import ground_slide, side_dive
+from marey.drawing.gesture import Gesture
+from marey.drawing.moonwalks import moonwalk
+from marey.generation.fine_wish import FineWish
+from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.bearings import StatedBearing
+from marey.vocabulary.counts import stated_number
+
+MOST = 8
+"""Times that a movement is done at most."""
+_RISES = re.compile(
+    r"\b(?:gets?|getting|stands?|rises?|jumps?|springs?|picks?|scrambles?)\b.*\bup\b|\brises?\b"
+    r"|\bto (?:his|her) feet\b"
+)
+
+
+def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    """Return the movement that a prompt asks for by name; None if it names none. See `marey.generation.stated`."""
+    for stated in stated_bearings(wish.prompt):
+        if stated.bearing.moves:
+            return NAMED[stated.name](stated, wish, rng, seconds)
+    return None
+
+
+def names_movement(prompt: str) -> bool:
+    """Return True if a prompt asks for a movement by name: no rule of an action is for it."""
+    return any(each.bearing.moves for each in stated_bearings(prompt))
+
+
+def _times(stated: StatedBearing) -> int | None:
+    number = stated_number(stated.words)
+    return None if number is None else min(number, MOST)
+
+
+def _burpees(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    single = re.search(r"\ba (?:\w+ )?burpee\b", stated.words)
+    return burpees(rng, _times(stated) or (1 if single else None))
+
+
+def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated, wish
+    return moonwalk(rng, seconds=seconds)
+
+
+def _side_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return side_dive(rng, stated.side)
+
+
+def _ground_slide(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated, seconds
+    return ground_slide(rng, rises=not _RISES.search(wish.beside[1].lower()))
+
+
+NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
+    "burpee": _burpees,
+    "moonwalk": _moonwalk,
+    "side-dive": _side_dive,
+    "ground-slide": _ground_slide,
+}
+"""Movements by the bearing that names them."""
