@@ -92,7 +92,7 @@ _ACTS_THEMSELVES = (
 _DOER = re.compile(
     rf"""^(?P<who>\W*(?:(?:a|an|the|this|that|one|another)\ )?
     (?:(?!(?:a|an|the|my|your|his|her|just|do|keep|point)\ )[\w-]+\ )??)
-    (?:{_ACTS_THEMSELVES})
+    (?P<doer>{_ACTS_THEMSELVES})
     (?P<does>(?:\ (?:(?:who|that)\ )?is)?(?:\ \w+ly)?\ (?P<verb>[a-z'-]+)\b[^,;]*)$""",
     re.IGNORECASE | re.VERBOSE,
 )
@@ -196,7 +196,7 @@ def _as_person(found: re.Match[str]) -> str:
     named = named_actions(f"a person{does}")
     if not named or _JOINED.search(does) or (verb != STANDING and not named_actions(f"a person {verb}")):
         return found[0]
-    if named == {STANDING} and _PREPARED.search(does):
+    if named & named_actions(found["doer"]) or (named == {STANDING} and _PREPARED.search(does)):
         return found[0]
     return f"{_AN.sub('a ', found['who'] or 'a ')}person{does}"
 

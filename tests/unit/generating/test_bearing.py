@@ -14,6 +14,7 @@ from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, wit
 from marey.generation.export import finish
 from marey.generation.gaits import (
     limping,
+    on_toes,
     over_rope,
     shuffling,
     skipping,
@@ -188,6 +189,17 @@ def test_who_skips_rope_leaves_the_floor_with_both_feet_over_and_over() -> None:
     np.testing.assert_allclose(after[:, TOES][..., [0, 2]], before[:, TOES][..., [0, 2]], atol=0.01)
 
 
+def test_who_goes_on_the_toes_is_upright_with_raised_heels() -> None:
+    crouched = drawn(walker(), named("sneaking"))
+    after = gait(crouched, on_toes)
+    heels, toes = after[10:-10, [7, 8], 1], after[10:-10, TOES, 1]
+    stands = toes < np.percentile(toes, 30, axis=0) + 0.005
+    assert (heels - toes)[stands].min() > (crouched[10:-10, [7, 8], 1] - crouched[10:-10, TOES, 1])[stands].max() + 0.02
+    assert (after[:, PELVIS, 1] - crouched[:, PELVIS, 1])[10:-10].min() > 0.1
+    assert np.abs(pitch(after)[10:-10]).mean() < 0.4 * pitch(crouched)[10:-10].mean()
+    np.testing.assert_allclose(after[:, TOES], crouched[:, TOES], atol=0.02)
+
+
 def test_who_stands_drunk_sways_on_feet_that_stay() -> None:
     before = standing(6.0)
     after = drawn(before, named("drunk"))
@@ -243,7 +255,7 @@ def test_a_bearing_of_a_part_leaves_the_rest() -> None:
     assert np.abs(np.diff(pitch(after))).max() * FPS < 120  # degrees a second
 
 
-@pytest.mark.parametrize("name", sorted(load_bearings()))
+@pytest.mark.parametrize("name", sorted(name for name, each in load_bearings().items() if not each.moves))
 def test_every_bearing_moves_a_walk_smoothly_and_keeps_its_bones(name: str) -> None:
     bearing, joints = load_bearings()[name], standing(5.0) if name == "foot-tap" else walker(5.0)
     before, after = drawn(joints), drawn(joints, named(name))
@@ -383,6 +395,23 @@ def test_a_bearing_that_does_not_fit_the_action_is_not_drawn(generator: Any) -> 
     request = asked(generator, "a tired soldier punches", "a person punches, a tired soldier punches")
     assert borne_spans(request, FPS, 80) == []
     assert borne_spans(replace(request, free=True), FPS, 80) == []
+
+
+def test_a_blow_to_a_part_of_the_body_is_drawn_whole_and_not_as_a_bearing(generator: Any) -> None:
+    flinches = "a person stands upright, breathing calmly, until hit"
+    (span,) = borne_spans(asked(generator, "gets hit", flinches), FPS, 80)
+    assert [each.name for each in span.stated] == ["flinch"]
+    assert borne_spans(asked(generator, "gets hit in the stomach and stumbles back", flinches), FPS, 80) == []
+
+
+def test_a_movement_that_has_a_name_is_drawn_without_a_pose_and_has_no_match(generator: Any) -> None:
+    request = asked(generator, "a tired man does burpees", "a person stands upright")
+    (made,) = generate_any(generator, [request])
+    assert made is not None
+    clip = finish(generator, request, made, generator.settings({}))
+    assert clip.manifest["bearing"] == [{"name": "burpee"}]
+    assert clip.manifest["quality"]["match"]["value"] is None
+    assert clip.joints[:, HEAD, 1].min() < 0.8 < 2.0 < clip.joints[:, WRISTS, 1].max()
 
 
 def test_a_bundle_that_reads_prompts_as_they_are_has_none(generator: Any) -> None:

@@ -11,6 +11,7 @@ from marey.generation.stated import stated_features
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
+from marey.selector.rules import RULES
 
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
@@ -164,3 +165,60 @@ def test_steps_aside_have_the_pace_that_is_stated(prompt: str, least: float, mos
 def test_steps_aside_without_number_or_pace_and_to_both_sides_are_left_as_they_are() -> None:
     for prompt in ("steps to the left", "quickly shuffles from side to side"):
         assert stated_features(LAYOUT, "sidestep", FineWish(prompt=prompt), 60, 1) is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_blow_moves_the_part_that_it_strikes(seed: int) -> None:
+    stomach = drawn("flinch", "is hit in the stomach", seed=seed)
+    trunk = stomach[:, 12] - stomach[:, 0]
+    assert np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1])).max() > 35
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        across = drawn("flinch", f"gets hit in the {side} shoulder", seed=seed)[:, SHOULDERS]
+        back = np.degrees(np.arctan2(-(across[:, 0] - across[:, 1])[:, 2], np.abs((across[:, 0] - across[:, 1])[:, 0])))
+        assert (sign * back).max() > 25
+    leg = drawn("flinch", "is shot in the left leg", seed=seed)
+    assert leg[:, 0, 1].min() < leg[0, 0, 1] - 0.1
+
+
+def test_a_blow_that_makes_who_is_hit_stagger_has_a_step() -> None:
+    for seed in SEEDS:
+        heavy = drawn("flinch", "gets hit in the chest and stumbles back", seed=seed)
+        assert np.ptp(heavy[:, [7, 8], 2], axis=0).max() > 0.15
+        light = drawn("flinch", "gets lightly hit in the chest", seed=seed)
+        assert np.ptp(light[:, [7, 8], 2], axis=0).max() < 0.05
+
+
+def test_a_blow_to_no_part_is_left_as_it_is() -> None:
+    assert stated_features(LAYOUT, "flinch", FineWish(prompt="gets hit and steps back"), 60, 1) is None
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_spin_kick_turns_all_the_way_round_and_strikes(side: str) -> None:
+    for seed in SEEDS:
+        joints = drawn("kick", "spin kick", side=side, seed=seed)
+        turned = np.degrees(np.unwrap(np.arctan2(*(joints[:, 1] - joints[:, 2])[:, [2, 0]].T)))
+        assert abs(abs(turned[-1] - turned[0]) - 360) < 10
+        foot = joints[:, 7 if side == "left" else 8]
+        assert foot[:, 1].max() > 0.55
+        assert RULES["kick"](Motion(joints, FPS), side) >= 0.5
+    assert stated_features(LAYOUT, "kick", FineWish(prompt="a high kick"), 60, 1) is None
+
+
+def test_both_arms_wave_over_the_head() -> None:
+    joints = drawn("wave", "waves both arms overhead")
+    up = hands(joints)[..., 1]
+    assert (up[len(up) // 3 : -len(up) // 3] > 0.3).all()
+    assert np.ptp(hands(joints)[len(up) // 3 : -len(up) // 3, :, 0], axis=0).min() > 0.2
+    assert up[-1].max() < -0.4
+    for prompt in ("waves the right hand overhead", "waves both hands", "walks and waves both arms overhead"):
+        assert stated_features(LAYOUT, "wave", FineWish(prompt=prompt), 60, 1) is None
+
+
+def test_who_sits_down_cross_legged_stands_at_first_and_crosses_the_legs() -> None:
+    for seed in SEEDS:
+        joints = drawn("sit-floor", "sit down cross-legged", seed=seed)
+        assert joints[0, 0, 1] > 0.8
+        assert joints[-1, 0, 1] < 0.3
+        assert joints[-1, 7, 0] < joints[-1, 1, 0] - 0.05  # the left foot on the right
+        assert joints[-1, 8, 0] > joints[-1, 2, 0] + 0.05
+    assert stated_features(LAYOUT, "sit-floor", FineWish(prompt="sits on the floor"), 60, 1) is None

@@ -110,6 +110,7 @@ def test_the_flight_of_an_action_is_no_floating():
 def test_a_prompt_names_what_its_motion_rests_on():
     assert expected_by_prompts(["a person climbs a ladder"]).supports == ("raised",)
     assert expected_by_prompts(["a person walks, then jumps"]).flight_s == 0.8
+    assert "whole-body" in expected_by_prompts(["a goalkeeper dives to the left"]).supports
     assert expected_by_prompts(["asdf qwer zxcv"]) == expected_by_prompts([]) == FEET
     assert set(expected_by_prompts(["he walks", "he lies down"]).supports) == {"feet", "whole-body"}
 

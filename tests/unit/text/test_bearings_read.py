@@ -29,6 +29,13 @@ def reading() -> TextPipeline:
         ("an old chair falls over", "an old chair falls over"),
         ("a man carries a heavy box to the door", "a person walks forward, a man walks to the door"),
         ("a person walks with a load", "a person walks with a load"),
+        ("does three burpees", STANDS),
+        ("guard waits", STANDS),
+        ("EMOTE_facepalm", STANDS),
+        ("CROUCH_walk_bwd", "a person walks backward, walk backward"),
+        ("CROUCH_walk_L", "a person steps sideways, walk sideways left"),
+        ("tiptoes across the room", "a person sneaks, a person tiptoes across the room"),
+        ("a man eats soup while seated", "a person sits on a chair, a man seated"),
         ("kneels on one knee and aims rifle", "a person kneels down, a person kneels on one knee"),
     ],
 )

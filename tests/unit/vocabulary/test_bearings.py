@@ -55,6 +55,24 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
         ("he shrugs while walking", "walking", ["shrug"]),
         ("a person walks while talking on the phone", "a person walks", ["phone-call"]),
         ("a drunk staggers home", "a person walks home", ["drunk"]),
+        ("look at watch", "", ["watch-check"]),
+        ("checks his wristwatch and waits", "waits", ["watch-check"]),
+        ("sneaks backward", "walks backward", ["sneaking"]),
+        ("crouch walk sideways left", "walk sideways left", ["sneaking"]),
+        ("walks backwards in a low crouch", "walks backwards", ["sneaking"]),
+        ("sneaks back to his room", "sneaks back to his room", []),
+        ("a burglar tiptoes through the house", "a burglar tiptoes through the house", ["tiptoe"]),
+        ("walks on her toes", "walks", ["tiptoe"]),
+        ("a man eats soup while seated", "a man seated", ["eating"]),
+        ("a man eats soup", "a man eats soup", []),
+        ("yawns and stretches", "", ["yawn-stretch"]),
+        ("points and shouts angrily", "points", ["shout"]),
+        ("does three burpees", "", ["burpee"]),
+        ("he moonwalks across the stage", "", ["moonwalk"]),
+        ("The goalkeeper dives to his right to save the ball", "", ["side-dive"]),
+        ("dives into the pool", "dives into the pool", []),
+        ("slides on the ground feet first", "", ["ground-slide"]),
+        ("slides on his knees", "slides on his knees", []),
         ("he is drunk and walks home", "walks home", ["drunk"]),
         ("walks with rifle at ready", "walks", ["rifle-ready"]),
         ("a guard stands with a rifle in his hands", "a guard stands", ["rifle-ready"]),
@@ -211,6 +229,8 @@ def test_what_is_said_of_the_person_holds_for_all_movements() -> None:
         ("walks with arms crossed and turns around", ()),  # held all along
         ("hammers a nail and walks away", ("hammers a nail", "walks away")),
         ("walks in and sweeps the floor", ("walks in", "sweeps the floor")),
+        ("runs forward, slides feet first and gets up", ("runs forward", "slides feet first", "gets up")),
+        ("a man eats soup seated at a table", ()),
     ],
 )
 def test_gestures_come_before_or_after_what_else_is_done(prompt: str, parts: tuple[str, ...]) -> None:
@@ -233,7 +253,8 @@ def test_every_bearing_has_words_and_a_pose_within_what_a_body_can() -> None:
         assert bool(words) != (name in DRAWN.values()), name
         assert re.fullmatch(r"[a-z-]+", name)
     for bearing in load_bearings().values():
-        assert bearing.arms or bearing.trunk or bearing.gait or bearing.shrug, bearing.id
+        posed = bearing.arms or bearing.trunk or bearing.gait or bearing.shrug
+        assert bool(posed) != bearing.moves, bearing.id
         assert set(bearing.arms) <= {"left", "right"}
         assert abs(bearing.trunk) <= 45
         assert abs(bearing.head) + abs(bearing.tilt) <= 40
@@ -297,3 +318,13 @@ def test_the_documentation_lists_every_bearing() -> None:
         for example in re.findall(r'"([^"]+)"', row):
             texts = (example, f"{example} walks", f"a man walks {example}")
             assert any(names & {each.name for each in stated_bearings(text)} for text in texts), example
+
+
+def test_a_movement_of_the_whole_body_is_made_by_who_stands_alone() -> None:
+    assert StatedBearing("burpee").shown_in("idle") == "body"
+    assert not any(StatedBearing("burpee").shown_in(action) for action in ("walk", "sit", "jump", "wave"))
+
+
+def test_who_sneaks_on_tiptoe_is_drawn_so_whole() -> None:
+    assert StatedBearing("tiptoe").shown_in("sneak") == "body"
+    assert not StatedBearing("sneaking").shown_in("sneak")

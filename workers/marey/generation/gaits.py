@@ -55,9 +55,9 @@ ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.085, 0.035
 """Seconds of a hop over a rope, the share of them in the air, and metres by which the body rises, and sinks between."""
 TOES_DOWN = 0.025
 """Metres by which the toes of who hops hang below where they stand."""
-HEELS_UP, TIPTOE_LEG, TIPTOE_UPRIGHT = 42.0, 0.965, 0.85
+HEELS_UP, TIPTOE_LEG, TIPTOE_UPRIGHT = 42.0, 0.965, 1.35
 """Degrees by which the feet of who goes on the toes point further down, the longest that a leg gets as a share of its
-length, and the share of the lean of the trunk that is taken back."""
+length, and degrees by which the spine is bent back for each one by which hips and neck lean."""
 TIPTOE_RISE = 0.22
 """Metres by which its hips rise at most over those of the walk below, which may be a crouched one."""
 SHANK_BACK = 14.0

@@ -22,6 +22,8 @@ from marey.vocabulary.counts import stated_number
 
 MOST = 8
 """Times that a movement is done at most."""
+BURPEE_S = 3.6
+"""Seconds of one of several burpees."""
 _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|rises?|jumps?|springs?|picks?|scrambles?)\b.*\bup\b|\brises?\b"
     r"|\bto (?:his|her) feet\b"
@@ -47,9 +49,10 @@ def _times(stated: StatedBearing) -> int | None:
 
 
 def _burpees(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    del wish, seconds
+    del wish
     single = re.search(r"\ba (?:\w+ )?burpee\b", stated.words)
-    return burpees(rng, _times(stated) or (1 if single else None))
+    room = None if seconds is None else min(max(int(seconds / BURPEE_S), 1), MOST)
+    return burpees(rng, _times(stated) or (1 if single else room))
 
 
 def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:

@@ -1,0 +1,86 @@
+"""Movements of the whole body that are asked for by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.generation.fine_wish import FineWish
+from marey.generation.named import NAMED, names_movement
+from marey.generation.stated import stated_features
+from marey.motion.features import HUMANML3D_263
+from marey.vocabulary.bearings import load_bearings
+
+LAYOUT = HUMANML3D_263
+FPS = LAYOUT.fps
+SEEDS = range(3)
+PELVIS, HEAD, ANKLES, TOES, WRISTS = 0, 15, [7, 8], [10, 11], [20, 21]
+
+
+def drawn(prompt: str, *, seed: int = 1, frames: int | None = None, after: str = "") -> np.ndarray:
+    wish = FineWish(prompt=prompt, fixed=frames is not None, beside=("", after))
+    features = stated_features(LAYOUT, "idle", wish, frames or 60, seed)
+    assert features is not None
+    return LAYOUT.decode(features).astype(np.float64)
+
+
+def test_every_bearing_that_moves_is_drawn() -> None:
+    assert {name for name, each in load_bearings().items() if each.moves} == set(NAMED)
+    assert stated_features(LAYOUT, "idle", FineWish(prompt="stands still"), 60, 1) is None
+    assert names_movement("does a burpee")
+    assert not names_movement("does a squat")
+
+
+@pytest.mark.parametrize(
+    "prompt", ["does burpees", "moonwalks", "dives to the left", "slides on the ground feet first"]
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_they_are_smooth_and_on_the_floor(prompt: str, seed: int) -> None:
+    joints = drawn(prompt, seed=seed)
+    assert joints[..., 1].min() > -0.03
+    assert joints[:, TOES, 1].min() < 0.03
+    assert np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).max() * FPS**2 < 160
+    assert joints[0, PELVIS, 1] > 0.85
+
+
+@pytest.mark.parametrize(("prompt", "times"), [("does three burpees", 3), ("a burpee", 1), ("burpees twice", 2)])
+def test_burpees_are_as_many_as_asked_for_each_with_a_plank_and_a_jump(prompt: str, times: int) -> None:
+    joints = drawn(prompt)
+    down = joints[:, HEAD, 1] < 0.7
+    assert (np.diff(down.astype(int)) == 1).sum() == times
+    behind = joints[:, PELVIS, 2] - joints[:, ANKLES, 2].max(axis=1)
+    assert ((behind > 0.6) & down).any()
+    assert joints[:, TOES, 1].min(axis=1).max() > 0.08
+    assert joints[:, WRISTS, 1].min(axis=1).max() > 1.7
+
+
+def test_a_moonwalk_glides_backward_on_a_flat_foot() -> None:
+    joints = drawn("moonwalks across the stage", frames=100)
+    assert len(joints) == 100
+    assert joints[-1, PELVIS, 2] < joints[0, PELVIS, 2] - 1.0
+    ahead = np.diff(joints[:, ANKLES, 2], axis=0) * FPS
+    assert ahead.max() < 0.25  # no foot steps ahead
+    glides = ahead < -0.8
+    assert (joints[1:, ANKLES, 1][glides] < 0.14).mean() > 0.8
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_goalkeeper_dives_to_the_side_that_is_named_and_lies_on_it(side: str, sign: float, seed: int) -> None:
+    joints = drawn(f"the goalkeeper dives to his {side} to save the ball", seed=seed)
+    way = joints[-1, PELVIS] - joints[0, PELVIS]
+    assert sign * way[0] > 1.4
+    assert abs(way[2]) < 0.3
+    assert joints[-1, [PELVIS, HEAD], 1].max() < 0.3
+    assert joints[:, [*ANKLES, *TOES, *WRISTS], 1].min(axis=1).max() > 0.1  # it flies
+    shoulders = joints[-1, 16, 1] - joints[-1, 17, 1]
+    assert sign * shoulders < -0.15  # on that shoulder
+
+
+def test_who_slides_runs_up_has_a_leg_ahead_and_gets_up_unless_that_comes_next() -> None:
+    joints = drawn("slides on the ground feet first")
+    assert joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] > 2.0
+    low = joints[:, PELVIS, 1] < 0.2
+    assert np.median(joints[low][:, ANKLES, 2].max(axis=1) - joints[low][:, PELVIS, 2]) > 0.6
+    assert joints[-1, PELVIS, 1] > 0.85
+    assert drawn("slides on the ground feet first", after="gets up and runs on")[-1, PELVIS, 1] < 0.25
