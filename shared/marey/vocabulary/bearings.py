@@ -45,7 +45,7 @@ _BRINGS = re.compile(
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
-WORDS = ("how", "beside", "read", "gaits", "loads", "adjectives", "beings", "people")
+WORDS = ("how", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
 

@@ -63,6 +63,7 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
         ("sneaks back to his room", "sneaks back to his room", []),
         ("a burglar tiptoes through the house", "a burglar tiptoes through the house", ["tiptoe"]),
         ("walks on her toes", "walks", ["tiptoe"]),
+        ("tiptoes backward", "walks backward", ["tiptoe"]),
         ("a man eats soup while seated", "a man seated", ["eating"]),
         ("a man eats soup", "a man eats soup", []),
         ("yawns and stretches", "", ["yawn-stretch"]),
