@@ -19,6 +19,7 @@ from marey.text.minilm_bundle import LAYERS, WIDTH, load_tokenizer, load_weights
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
 from marey.text.truncation import truncated_tokens
+from tests.support.processors import packs_bfloat16
 
 TEXT = "a person walks, and waves his left hand"
 LONG = " ".join(["a person walks forward and then turns left slowly"] * 20)
@@ -59,6 +60,7 @@ def test_minilm_gives_what_transformers_gives(monkeypatch: pytest.MonkeyPatch) -
     assert np.allclose(MiniLMEncoder(bundle).encode(TEXT).pooled, (mean / mean.norm()).numpy(), atol=2e-6)
 
 
+@packs_bfloat16
 def test_minilm_in_bfloat16_is_close_and_no_text_depends_on_others(monkeypatch: pytest.MonkeyPatch) -> None:
     bundle = find_encoder("minilm")
     texts = [TEXT, "a person bows", "wave", LONG]
