@@ -33,7 +33,7 @@ from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 5
+VERSION = 6
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -127,6 +127,11 @@ _STOP = re.compile(
     (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
     re.IGNORECASE | re.VERBOSE,
 )
+_TO_A_SEAT = re.compile(
+    r"\s(?:(?:over|up|back|out)\s)?(?:to|towards?)\s(?:the|an?|his|her|their|its)\s(?:\w+\s)?"
+    r"(?:throne|chair|armchair|seat|sofa|couch|bench|stool|bed)s?\b",
+    re.IGNORECASE,
+)
 _ACROSS = re.compile(r"\b(?:over|across)\b", re.IGNORECASE)
 _STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
 _STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
@@ -149,8 +154,10 @@ class ReadMovement:
 
     @property
     def worded(self) -> str:
-        """Its text as the model reads it, behind its action in plain words."""
-        return with_plain_action(self.text, self.action)
+        """Its text as the model reads it, behind its action in plain words; of a way without the seat that it leads to,
+        on which models would sit at once."""
+        text = _TO_A_SEAT.sub("", self.text) if self.action in WAYS else self.text
+        return with_plain_action(text, self.action)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from marey.bundles.manifest import BundleManifest
 from marey.core.errors import InvalidInput
 from marey.generation.candidates import DrawPlan, best_clips
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.export import finish
 from marey.generation.paced import SPEEDS
 from marey.generation.port import Request
+from marey.generation.posture import NO_POSTURE
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
+from marey.generation.shots.sequences import WAITS_S
+from marey.generation.shots.timelines import TimelineMotion
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.motion.edits.timeline_rows import cut_rows
 from marey.text.features import TextFeatures
+from marey.vocabulary.entries import load_vocabulary
 from tests.unit.generating.test_timelines import load, text_of
 
 PROMPT = "a person walks ahead and, once there, waves; then he bows"
@@ -145,3 +150,73 @@ def test_candidates_are_drawn_of_each_movement(generator: Any) -> None:
     assert clip is not None
     assert clip.manifest["prompt"] == PROMPT
     assert all("selection" in row for row in clip.manifest["timeline"]["rows"])
+
+
+def sequence_of(generator: Any, *movements: tuple[str, str]) -> TextFeatures:
+    """Features of a prompt of several movements: the plain words of the action of each, and its own."""
+    width = generator.limits.text_width
+    parts = [
+        replace(text_of(said, width), rewritten=f"{load_vocabulary().need(action).plain_words}, {said}")
+        for action, said in movements
+    ]
+    return replace(text_of(", ".join(said for _, said in movements), width), movements=tuple(parts))
+
+
+@pytest.fixture
+def drawing(generator: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The generator as one whose motions are drawn, too."""
+    monkeypatch.setattr(BundleManifest, "draws_bearings", property(lambda manifest: True))
+    return generator
+
+
+def test_movements_begin_where_the_one_before_ended(drawing: Any) -> None:
+    said = ("kneel", "he kneels"), ("clap", "claps"), ("get-up", "stands up"), ("walk", "walks off")
+    request = resolve_request(drawing, Request(sequence_of(drawing, *said), 3))
+    (made,) = generate_any(drawing, [request])
+    assert isinstance(made, TimelineMotion)
+    heights = drawing.layout.decode(made.features)[:, 0, 1]
+    kneels, claps, rises, _ = (slice(round(row.start * 20), round(row.end * 20)) for row in made.timeline)
+    assert heights[kneels][0] > 0.85
+    assert np.abs(heights[claps] - 0.52).max() < 0.05
+    assert np.abs(np.diff(heights[kneels.start : rises.stop])).max() < 0.1
+    assert heights[rises].min() > 0.45
+    assert heights[rises][-1] > 0.85
+    assert all(row.end - row.start < 4.0 for row in made.timeline[:3])
+    assert made.timeline[1].changes["posture"] == "knees"
+
+
+def test_models_that_draw_nothing_hand_no_posture_on(generator: Any) -> None:
+    said = ("kneel", "he kneels"), ("clap", "claps")
+    request = resolve_request(generator, Request(sequence_of(generator, *said), 3))
+    assert request.timeline is not None
+    assert {row.held for row in request.timeline} == {NO_POSTURE}
+
+
+def test_who_is_hit_and_dies_falls_at_once(generator: Any) -> None:
+    said = ("walk", "he walks"), ("flinch", "is shot in the chest"), ("die", "dies")
+    request = resolve_request(generator, Request(sequence_of(generator, *said), 3))
+    assert request.timeline is not None
+    assert [row.text.said for row in request.timeline] == ["he walks", "is shot in the chest and dies"]
+    alone = resolve_request(generator, Request(sequence_of(generator, *said[1:]), 3))
+    assert alone.timeline is None
+    assert alone.text.rewritten.endswith("dies")
+    assert alone.text.prompt == "is shot in the chest, dies"
+
+
+def test_what_makes_a_body_fall_is_part_of_the_fall(generator: Any) -> None:
+    text = sequence_of(generator, ("walk", "he walks"), ("die", "dies"))
+    for prompt, said in (
+        ("he walks, is shot in the chest and dies", "is shot in the chest and dies"),
+        ("he walks and then dies", "dies"),
+    ):
+        request = resolve_request(generator, Request(replace(text, prompt=prompt), 3))
+        assert request.timeline is not None
+        assert [row.text.said for row in request.timeline] == ["he walks", said]
+
+
+def test_who_stands_beside_other_movements_waits_for_no_longer_than_a_moment(generator: Any) -> None:
+    said = ("walk", "he walks"), ("idle", "waits"), ("walk", "walks on")
+    for seed in range(4):
+        request = resolve_request(generator, Request(sequence_of(generator, *said), seed))
+        assert request.timeline is not None
+        assert request.timeline[1].end - request.timeline[1].start <= WAITS_S + 0.01

@@ -280,3 +280,12 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
     save_file({"hidden": np.zeros((1, 1), np.float32)}, tmp_path / "other.safetensors")
     with pytest.raises(InvalidFile, match="not a reader of sequences"):
         SequenceReader.load(tmp_path / "other.safetensors")
+
+
+def test_a_way_to_a_seat_is_read_without_the_seat() -> None:
+    assert (
+        ReadMovement("A king walks over to the golden throne", "walk").worded
+        == ReadMovement("A king walks", "walk").worded
+    )
+    assert "chair" in ReadMovement("sits down on the chair", "sit-down").worded
+    assert "door" in ReadMovement("walks to the door", "walk").worded

@@ -60,6 +60,11 @@ def _low(rng: random.Random, form: str) -> tuple[Posture, bool]:
     ), hands == "head"
 
 
+def crouched(rng: random.Random) -> Posture:
+    """Return a crouched posture without a hand on the head."""
+    return _low(rng, rng.choice(("crouch-low", "crouch-half")))[0]
+
+
 def _moved(rng: random.Random, low: Posture, still: bool) -> Posture:
     """The same crouch a moment later, looking elsewhere."""
     left, up, forward = low.pelvis or (0.0, 0.5, 0.0)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from marey.drawing.crawls import on_fours
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
-from marey.drawing.sequels import FLOOR_PACES, Sequel, both
+from marey.drawing.sequels import FLOOR_PACES, Sequel, Step, both
 from marey.posing.standing import LEFT, RIGHT
 
 SUPINE = -85.0
@@ -27,6 +27,8 @@ _HALF_KNEEL = Posture(
     knees={LEFT: (0.05, -0.3, 1.0)},
 )
 """On the left knee, a hand on the other."""
+_BACK = -0.42
+"""Metres forward of the feet of a standing body at which its pelvis lies on the floor."""
 _UP: Point = (0.15, 1.0, 0.3)
 _DOWN: Point = (0.1, -1.0, 0.1)
 
@@ -40,9 +42,10 @@ def on_back(at: float, *, feet: dict[str, FootPlace], knees: float = 0.1) -> Pos
 # -- sitting -------------------------------------------------------------------------------------------------------
 
 
-def _floor_seats(rng: random.Random, form: str) -> Posture:
-    """A posture of sitting on the floor, the feet about where they stood."""
-    back = {"floor-crossed": -0.32, "floor-bent": -0.4, "floor-stretched": -0.5}[form] - rng.uniform(0, 0.04)
+def _floor_seats(rng: random.Random, form: str, back: float | None = None) -> Posture:
+    """A posture of sitting on the floor, the feet about where they stood, the pelvis `back` metres forward of there."""
+    if back is None:
+        back = {"floor-crossed": -0.32, "floor-bent": -0.4, "floor-stretched": -0.5}[form] - rng.uniform(0, 0.04)
     lean = {"floor-crossed": (-4, 6), "floor-bent": (-16, -4), "floor-stretched": (-12, -2)}[form]
     behind = HandPlace((rng.uniform(0.2, 0.32), 0.05, back - rng.uniform(0.22, 0.3)), "floor", (0.3, 0.0, -1.0))
     knee = HandPlace((-0.02, 0.06, 0.02), "knee", (0.7, -0.3, -0.6))
@@ -102,6 +105,58 @@ def sit_floor(rng: random.Random, form: str = "", *, down: bool | None = None) -
         _down_to_seat(rng, done, seat, rng.uniform(0.9, 1.3))
     _fidget(rng, done, seat, rng.uniform(2.0, 5.0))
     return done.either(rng).gesture(rng, ["sit-floor", form, "floor-down" if down else "floor-stay"])
+
+
+def seated_on_floor(rng: random.Random, form: str) -> tuple[Posture, tuple[Step, ...]]:
+    """Return a posture of sitting on the floor, and the steps to it from standing; one with stretched legs has the hips
+    where those of a body on its back are."""
+    seat, done = _floor_seats(rng, form, _BACK if form == "floor-stretched" else None), Sequel([0.0])
+    if form == "floor-stretched":
+        seat = replace(seat, hands=both(HandPlace((0.0, 0.1, -0.16), "knee", (0.7, -0.2, -0.6))))
+    _down_to_seat(rng, done, seat, rng.uniform(0.85, 1.1))
+    return seat, _steps(done)
+
+
+def rising_from_seat(rng: random.Random) -> tuple[Step, ...]:
+    """Return the steps of a body that sits on the floor and stands up."""
+    pace = rng.uniform(0.85, 1.1)
+    seat = replace(_floor_seats(rng, "floor-bent"), pelvis=(0.0, _SITS, _BACK), tilt=(-6, 0, 0), spine=(26, 0, 0))
+    behind = _behind(_BACK)
+    return ((0.6 * pace, replace(seat, hands=both(behind), feet={})), *_off_the_seat(behind, _BACK, pace))
+
+
+def slid(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the seat behind a leg that is stretched ahead, the other one bent under it, the steps to it
+    from a run, and those to standing."""
+    back, hand = -0.5, _behind(-0.6)
+    feet = {LEFT: FootPlace((0.1, 0.06, back + 0.8), (0.1, 0.8, 0.5)), RIGHT: FootPlace((0.0, 0.07, back + 0.42))}
+    poles: dict[str, Point] = {LEFT: (0.1, 1.0, 0.2), RIGHT: (0.9, 0.7, 0.3)}
+    hands = {LEFT: HandPlace((0.35, 0.1, 0.25)), RIGHT: hand}
+    low = Posture((0.0, _SITS, back), (-34, 0, 0), (10, 0, 0), (16, 0, 0), 0.0, hands, feet, poles)
+    way = replace(low, pelvis=(0.0, 0.5, 0.6 * back), tilt=(-18, 0, 0), hands={})
+    pace = rng.uniform(0.9, 1.1)
+    return low, ((0.35 * pace, way), (0.3 * pace, low)), rising_from_seat(rng)
+
+
+def _behind(back: float) -> HandPlace:
+    """Where a hand supports a body that sits on the floor, the pelvis `back` metres forward of its place."""
+    return HandPlace((0.24, 0.05, back - 0.24), "floor", (0.4, 0.1, -1.0))
+
+
+def _off_the_seat(behind: HandPlace, back: float, pace: float) -> tuple[Step, ...]:
+    """Return the steps from sitting on the floor, a hand on it behind the body, to standing."""
+    hands = {LEFT: behind, RIGHT: HandPlace((-0.02, 0.07, -0.02), "knee", (0.7, -0.3, -0.6))}
+    lifted = Posture((0.0, 0.36, 0.5 * back), (32, 0, 0), (34, 0, 0), (-16, 0, 0), 0.6, hands, knees=_APART)
+    high = Posture((0.0, 0.56, -0.12), (34, 0, 0), (26, 0, 0), (-12, 0, 0), 0.7, knees=_APART)
+    return (0.55 * pace, lifted), (0.45 * pace, high), (0.7 * pace, STAND)
+
+
+def _steps(done: Sequel) -> tuple[Step, ...]:
+    """Return the steps of a sequel behind its first posture."""
+    return tuple(
+        (after - before, posture)
+        for before, after, posture in zip(done.times[:-1], done.times[1:], done.postures[1:], strict=True)
+    )
 
 
 # -- lying ---------------------------------------------------------------------------------------------------------
@@ -195,6 +250,40 @@ def lie_down(rng: random.Random, form: str = "") -> Gesture:
     return done.either(rng).gesture(rng, ["lie-down", f"{form}-down", f"lie-down-{tempo}" if tempo else ""])
 
 
+def lying_back(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the back, the steps to it from standing, and those back; the first of these sits up."""
+    pace, done = rng.uniform(0.85, 1.1), Sequel([0.0])
+    lying = _lying(rng, _BACK, "lie-back")
+    seat = replace(_floor_seats(rng, "floor-bent"), pelvis=(0.0, _SITS, _BACK))
+    _down_to_seat(rng, done, seat, pace)
+    elbows = both(HandPlace((0.3, 0.05, _BACK - 0.14), "floor", (0.4, 0.0, -1.0)))
+    done.then(0.8 * pace, replace(_half_up(lying, elbows), pelvis=(0.0, 0.14, _BACK), tilt=(-48, 0, 0)))
+    done.then(0.7 * pace, lying)
+    rising = rising_from_seat(rng)
+    return lying, _steps(done), ((0.9 * pace, _half_up(lying, both(_behind(_BACK)))), *rising)
+
+
+def _half_up(lying: Posture, hands: dict[str, HandPlace]) -> Posture:
+    """Return the posture between lying on the back and sitting."""
+    return Posture((0.0, 0.15, _BACK + 0.06), (-28, 0, 0), (14, 0, 0), (10, 0, 0), 0.0, hands, lying.feet, lying.knees)
+
+
+def lying_front(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the front, the steps to it from standing, and those back."""
+    pace = rng.uniform(0.85, 1.1)
+    lying, way = _lying(rng, 0.06, "lie-front"), _prone_way(rng, pace)
+    aside = replace(lying, hands=both(_ASIDE))
+    down = (
+        *way,
+        (0.8 * pace, replace(lying, hands=way[-1][1].hands, neck=(-12, 0, 0))),
+        (0.5, aside),
+        (0.5, lying),
+    )
+    pressed = replace(lying, hands=way[0][1].hands, neck=(-14, 0, 0))
+    up = (0.45 * pace, aside), (0.4 * pace, pressed), (0.8 * pace, way[2][1]), way[1], (0.7 * pace, _HALF_KNEEL)
+    return lying, down, (*up, (0.7 * pace, STAND))
+
+
 def get_up(rng: random.Random, form: str = "") -> Gesture:
     """A body that lies and gets up to stand: `form` is lie-back, lie-front, or fours (from hands and knees); one of the
     first two if empty."""
@@ -217,19 +306,17 @@ def get_up(rng: random.Random, form: str = "") -> Gesture:
         else:
             done.then(*way[0])
     else:
-        back = -0.42
+        back = _BACK
         lying = _lying(rng, back, form)
         seat = replace(_floor_seats(rng, "floor-bent"), pelvis=(0.0, _SITS, back), tilt=(-6, 0, 0), spine=(26, 0, 0))
-        behind = HandPlace((0.24, 0.05, back - 0.24), "floor", (0.4, 0.1, -1.0))
+        behind = _behind(back)
         done = Sequel([rng.uniform(0.2, 0.8)], [lying])
         done.then(
             0.9 * pace,
             replace(seat, pelvis=(0.0, 0.15, back + 0.06), tilt=(-28, 0, 0), hands=both(behind), feet=lying.feet),
         )
         done.then(0.6 * pace, replace(seat, hands=both(behind), feet={}))
-        hands = {LEFT: behind, RIGHT: HandPlace((-0.02, 0.07, -0.02), "knee", (0.7, -0.3, -0.6))}
-        lifted = Posture((0.0, 0.36, 0.5 * back), (32, 0, 0), (34, 0, 0), (-16, 0, 0), 0.6, hands, knees=_APART)
-        done.then(0.55 * pace, lifted)
-        done.then(0.45 * pace, Posture((0.0, 0.56, -0.12), (34, 0, 0), (26, 0, 0), (-12, 0, 0), 0.7, knees=_APART))
+        for step in _off_the_seat(behind, back, pace)[:-1]:
+            done.then(*step)
     done.then(0.7 * pace, STAND, rng.uniform(0.3, 0.9))
     return done.either(rng).gesture(rng, ["get-up", f"{form}-up", f"get-up-{tempo}" if tempo else ""])

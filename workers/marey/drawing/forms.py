@@ -11,8 +11,8 @@ from pathlib import Path
 
 from marey.drawing.gesture import BOTH, SIDES, Gesture
 
-LONG_S = 6.5
-"""Seconds from which on a movement is longer than one is who asks for no length."""
+LONG_S, BRIEF_S = 6.5, 3.0
+"""Seconds from which on a movement is longer than one is who asks for no length, alone and beside others."""
 _BOTH = re.compile(r"\b(?:both (?:\w+ )?(?:arms?|hands?)|(?:his|her|their|the|with|two) (?:arms|hands))\b")
 _ONE = re.compile(r"\b(?:(?:one|a|an|single) (?:\w+ )?(?:arm|hand)|one[- ](?:armed|handed))\b")
 _LONG = re.compile(r"\b(?:long|while|minutes?|seconds?|keeps?|hold\w*|stay\w*|remain\w*|continu\w*|on and on)\b")
@@ -49,26 +49,40 @@ def load_forms() -> Mapping[str, Forms]:
     }
 
 
-def misfit(gesture: Gesture, action: str, text: str, count: int | None = None) -> int:
+@dataclass(frozen=True)
+class Asked:
+    """Everything that a prompt says of the form of a movement.
+
+    Attributes:
+        text: of the prompt, in lower case.
+        count: repetitions; None = any number.
+        side: `left` or `right` of the limb that acts; empty = either.
+        brief: it is one of several movements, whose length is open: short, and done once where no number is stated.
+    """
+
+    text: str
+    count: int | None = None
+    side: str = ""
+    brief: bool = False
+
+
+def misfit(gesture: Gesture, action: str, asked: Asked) -> float:
     """Return how far a movement is from what a prompt says of its form; 0 if it is as said.
 
     Args:
         gesture: drawn by chance.
         action: id in the vocabulary.
-        text: of the prompt, in lower case.
-        count: repetitions that are asked for; None = any number.
+        asked: what the prompt says.
     """
     forms = load_forms().get(action, Forms())
-    kinds = set(gesture.kinds)
+    kinds, text = set(gesture.kinds), asked.text
     named = {kind for kind, words in forms.named.items() if words.search(text)}
-    lacks = len(named - kinds)
-    unasked = len((forms.only & kinds) - named)
-    if gesture.side in SIDES and _BOTH.search(text):
-        unasked += 1
-    if gesture.side == BOTH and _ONE.search(text):
-        unasked += 1
-    if count is not None and gesture.times not in (1, count):
-        unasked += 1
+    lacks, unasked = len(named - kinds), len((forms.only & kinds) - named)
+    unasked += gesture.side in SIDES and bool(_BOTH.search(text))
+    unasked += gesture.side == BOTH and bool(_ONE.search(text) or asked.side)
+    unasked += gesture.times not in (1, asked.count) and (asked.count is not None or asked.brief)
     unusual = bool(forms.usual - kinds)
+    if asked.brief:
+        return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + max(gesture.seconds - BRIEF_S, 0.0))
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
     return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + too_long)

@@ -22,6 +22,16 @@ _PRAYS = {
 }
 
 
+def kneeling(rng: random.Random, *, one: bool) -> tuple[Posture, Posture, Posture]:
+    """Return a body on its way to its knees, on the left one, and on the one or both: kneeling for good."""
+    pelvis: Point = (0.0, rng.uniform(0.51, 0.525), -rng.uniform(0.23, 0.27))
+    half = Posture(pelvis, spine=(rng.uniform(0, 8), 0, 0), hang=0.8, feet={LEFT: _BACK}, knees={LEFT: _KNEE})
+    way = replace(half, pelvis=(0.0, 0.72, -0.2), tilt=(12, 0, 0), spine=(14, 0, 0))
+    low = replace(half, feet=dict.fromkeys(SIDES, _BACK), knees=dict.fromkeys(SIDES, _KNEE)) if not one else half
+    hands = _PRAYS["kneel-front" if one else rng.choice(("kneel-hang", "kneel-thighs"))]
+    return way, half, replace(low, hands=hands)
+
+
 def kneel(rng: random.Random) -> Gesture:
     """The left knee goes down, or both do, the left one first."""
     one = rng.random() < 0.5

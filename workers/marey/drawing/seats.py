@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
-from marey.drawing.sequels import Sequel, both, near
+from marey.drawing.sequels import Sequel, Step, both, near
 
 _PACES = {"quick": (0.6, 0.85), "": (0.9, 1.4), "slow": (1.6, 2.4)}
 """Seconds from standing to sitting or back."""
@@ -56,6 +56,15 @@ def _moved(rng: random.Random, seated: Posture) -> Posture:
         hands[side] = HandPlace(near(rng, _HANDS[form].at), "knee", _HANDS[form].elbow)
     neck = (rng.uniform(-8, 12), rng.uniform(-4, 4), rng.choice((0.0, rng.uniform(-35, 35))))
     return replace(seated, spine=spine, neck=neck, hands=hands)
+
+
+def seated_on_seat(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a seated posture, and the steps to it from standing and back."""
+    _, seated = _seated(rng)
+    fall, rise = (rng.uniform(*_PACES[""]) for _ in range(2))
+    down = ((0.55 * fall, _leaning(rng, seated, rng.uniform(0.35, 0.5))), (0.55 * fall, seated))
+    over, mid = (_leaning(rng, seated, rng.uniform(*share)) for share in ((0.0, 0.12), (0.5, 0.65)))
+    return seated, down, ((0.45 * rise, over), (0.35 * rise, mid), (0.55 * rise, STAND))
 
 
 def sit_down(rng: random.Random) -> Gesture:

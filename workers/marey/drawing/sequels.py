@@ -16,6 +16,10 @@ FLOOR_PACES = {"quick": (0.7, 0.85), "": (0.95, 1.25), "slow": (1.4, 1.8)}
 """Factors of the seconds of a way to the floor or back."""
 
 
+Step = tuple[float, Posture]
+"""Seconds in which a posture is reached, and the posture."""
+
+
 @dataclass
 class Sequel:
     """Postures and the times at which they are reached, seconds."""

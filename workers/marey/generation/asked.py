@@ -24,11 +24,12 @@ from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
+from marey.generation.postured import GOING_ON, drawn_posture, on_posture
 from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
 from marey.generation.stepped import frames_of_steps, stepped
-from marey.generation.timed import cut_of
+from marey.generation.timed import CUT, cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
 from marey.generation.whole_body import AGAIN
 from marey.items.values import MAX_SECONDS
@@ -69,7 +70,8 @@ class AskedMotion:
             `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
-            its end came after the action; `footed`, true where a run was held back by the slide of its feet.
+            its end came after the action; `footed`, true where a run was held back by the slide of its
+            feet; `posture`, in which a gesture is done (`marey.generation.postured`).
     """
 
     features: Float32 = field(repr=False)
@@ -192,7 +194,7 @@ def generate_as_asked(
     watched = PassControl(control or NoControl(), left, len(requests) - len(left), len(requests))
     made = dict(zip(left, generator.generate(asked, settings, control=watched) if left else (), strict=True))
     return [
-        _as_asked(generator, request, wish, drawn, made.get(row))
+        _in_posture(generator, request, wish, _as_asked(generator, request, wish, drawn, made.get(row)))
         for row, (request, wish, drawn) in enumerate(zip(requests, wishes, whole, strict=True))
     ]
 
@@ -203,16 +205,24 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    if not _draws(generator) or not wish.action:
+    if not draws(generator) or not (wish.action or request.held.is_drawn):
         return None
     generator.limits.check(request)
+    if request.held.is_drawn:
+        kept = None if request.open else wish.for_network(request, generator.limits).frames
+        drawn = drawn_posture(generator.layout, request.held, request.text.said, request.seed, kept)
+        return DrawnWhole(drawn, exact=True)
     frames = (request if wish.action in AT_PACE else wish.for_network(request, generator.limits)).frames
     fine = wish.fine(request)
     held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
-    return drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
+    drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
+    if drawn is None or held or not request.beside[0]:
+        return drawn
+    return replace(drawn, features=np.concatenate([drawn.features[:1].repeat(CUT, axis=0), drawn.features]))
 
 
-def _draws(generator: Generator[S]) -> bool:
+def draws(generator: Generator[Any]) -> bool:
+    """Return True if motions of a generator may be drawn, as those that it learned from."""
     return generator.bundle.manifest.draws_bearings and generator.layout.skeleton.name == HUMANML3D.name
 
 
@@ -229,15 +239,16 @@ def _as_asked(
         whole: drawn.
         made: by the network.
     """
-    if whole is None and made is None:
+    source = made or whole
+    if source is None:
         return None
-    layout, features = generator.layout, whole.features if made is None else made.features
+    layout, features = generator.layout, source.features
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
-    if _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
+    if not request.held.is_drawn and _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
     if whole is not None:
-        changes["drawn"] = wish.action
+        changes["drawn"] = wish.action or "idle"
     elif layout.skeleton.name == HUMANML3D.name:
         drawn = _drawn(features, layout, wish, request)
         if drawn is not None:
@@ -250,6 +261,22 @@ def _as_asked(
         features = _retimed(features, layout, wish, fixed, changes)
     changed = changes or made is None or len(features) != len(made.features)
     return AskedMotion(features, changes) if changed else made
+
+
+def _in_posture(
+    generator: Generator[S], request: Request, wish: _Wish, motion: MotionFeatures | None
+) -> MotionFeatures | None:
+    """Return the motion of a gesture in the posture of its row, and one that would go on and on as a short one; any
+    other motion as it is."""
+    held, fixed = request.held, request.frames is not None and not request.open
+    if motion is None or not draws(generator) or len(motion.features) < SHORTEST:
+        return motion
+    whole = fixed or wish.count is not None
+    goes_on = wish.action in GOING_ON and any(request.beside) and not whole
+    if not (held.carries or goes_on):
+        return motion
+    features = on_posture(motion.features, generator.layout, held, wish.action, fixed=fixed, whole=whole)
+    return AskedMotion(features, {**changes_of(motion), **({"posture": held.own} if held.own else {})})
 
 
 def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: int, *, drawn: bool) -> bool:

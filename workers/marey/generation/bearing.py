@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
+from marey.drawing.holds import LYING
 from marey.generation.asked import action_of
 from marey.generation.gaits import GAITS
 from marey.generation.hits import hit_part
 from marey.generation.port import MotionFeatures, Request
+from marey.generation.timed import TimedText
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
@@ -126,13 +128,22 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
     for k, row in enumerate(request.timeline):
         action, own = action_of(row.text), stated_bearings(row.text.said)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
-        stated = fitting(_with_drawn([*whole, *kept, *own], action, row.text.said), action)
+        posed = _posed(row, action)
+        stated = fitting(_with_drawn([*whole, *kept, *own], action, row.text.said), posed)
         if request.is_sequence:
             carried = [each for each in (*kept, *own) if each in stated and each.bearing.lasts]
         if stated:
             end = min(round(row.end * fps), frames)
-            found.append(BorneSpan(round(row.start * fps), end, stated, action, request.seed + k, row.text.said))
+            found.append(BorneSpan(round(row.start * fps), end, stated, posed, request.seed + k, row.text.said))
     return found
+
+
+def _posed(row: TimedText, action: str) -> str:
+    """Return the action that says which parts of the body are free in a row: who sits, kneels or crouches and does
+    nothing else has free arms."""
+    if row.held.begin != row.held.own or not row.held.own or action not in ("idle", *DRAWN_AS):
+        return action
+    return "lie" if row.held.own in LYING else "sit"
 
 
 def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list[StatedBearing]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.forms import misfit
+from marey.drawing.forms import Asked, misfit
 from marey.drawing.gesture import Gesture
 from marey.drawing.kinds import COUNTED, DRAWINGS
 from marey.generation.ball_games import dribbles_on_spot
@@ -44,6 +44,8 @@ SECONDS: Mapping[str, tuple[float, float]] = {
     "punch": (3.5, 5.0),
 }
 """Seconds of a body that moves on and on, where nothing is said of them; others bring their own."""
+BRIEF_S = (2.0, 2.6)
+"""The same of a body that does other things before or after."""
 ROUNDS_S: Mapping[str, tuple[float, float]] = {"dodge": (2.1, 1.2), "nod": (0.75, 1.0)}
 """Seconds of each of a stated number, and beside them."""
 TRIES = 40
@@ -101,7 +103,9 @@ def _frames(action: str, wish: FineWish, rng: np.random.Generator) -> int:
     once, before = ROUNDS_S.get(action, (0.0, 0.0))
     if wish.count is not None and once:
         return round((wish.count * once + before) * FPS)
-    return round(float(rng.uniform(*SECONDS[action])) * FPS) if action in SECONDS else SHORTEST
+    if action not in SECONDS:
+        return SHORTEST
+    return round(float(rng.uniform(*(BRIEF_S if any(wish.beside) else SECONDS[action]))) * FPS)
 
 
 ALONE: Mapping[str, Callable[[FineWish], bool]] = {
@@ -130,10 +134,11 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
     says first."""
     text = wish.prompt.lower()
+    asked = Asked(text, wish.count, wish.side, any(wish.beside) and not wish.fixed)
     drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
     yield from (
         gesture
-        for gesture in sorted(drawn, key=lambda each: misfit(each, action, text, wish.count))
+        for gesture in sorted(drawn, key=lambda each: misfit(each, action, asked))
         if _may_be(gesture, text, wish.side, frames)
     )
 

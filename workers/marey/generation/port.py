@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidInput
+from marey.generation.posture import NO_POSTURE, RowPosture
 from marey.generation.timed import TimedText
 from marey.items.values import MAX_SEED
 from marey.motion.features import FeatureLayout
@@ -55,6 +56,7 @@ class Request:
     timeline: tuple[TimedText, ...] | None = None  # prompts at stated times; `text` is that of the first
     open: bool = False  # `frames` were not asked for: what the prompt asks for may need more or fewer
     beside: tuple[str, str] = ("", "")  # prompts of the rows of a timeline before and after it; empty = none
+    held: RowPosture = NO_POSTURE  # postures of the row of a sequence
 
     @property
     def is_sequence(self) -> bool:

@@ -42,6 +42,7 @@ _HEIGHT: Mapping[str, re.Pattern[str]] = {
         )
         for height, part in _PARTS.items()
     },
+    "surrender": re.compile(r"\bsurrender\w*"),
 }
 """Words of heights; the first that fits counts."""
 _LEVEL = re.compile(
@@ -97,6 +98,8 @@ def stated_raise(wish: FineWish, rng: random.Random, seconds: float | None) -> G
     way = FRONT if front else SIDE if aside else rng.choice((FRONT, SIDE))
     named = _SIDE_NAMED.search(up)
     side = wish.side or (BOTH if _BOTH.search(up) else named[1] if named else rng.choice(SIDES))
+    if height == "surrender":
+        return raise_to(rng, Raise(BOTH, "head", SIDE, keeps=not lowers))
     kept = _KEEPS.search(up)
     hold = stated_length(up[kept.start() :]).seconds if kept else None
     return raise_to(rng, Raise(side, height, way, wish.count or 1, bool(kept and not lowers), hold))

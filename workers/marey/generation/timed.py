@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.posture import NO_POSTURE, RowPosture
 from marey.items.values import MAX_SEED
 from marey.text.features import TextFeatures
 
@@ -38,6 +39,7 @@ class TimedText:
         made: (t, D) features of the first window of the row, made before; None = they are generated.
         open: its times were not asked for, and may change with what is made.
         changes: of the motion of the row, as of `AskedMotion`.
+        held: its postures.
     """
 
     start: float
@@ -48,6 +50,7 @@ class TimedText:
     made: NDArray[np.float32] | None = field(default=None, repr=False, compare=False)
     open: bool = False
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    held: RowPosture = NO_POSTURE
 
 
 def part_seed(seed: int, part: str, number: int) -> int:

@@ -43,6 +43,7 @@ MOST = 4
 _BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
 _FRONT = re.compile(r"\b(?:forwards?|face|face[ -]?(?:first|down)|front|prone|stomach|belly|chest|trip\w*|stumbl\w*)\b")
 _SIDE = re.compile(r"\b(?:side|sides|sideways|left|right|over to (?:one|his|her|the) side)\b")
+_BACKWARD = re.compile(r"\bbackwards?\b|\bback(?:s|ing) (?:up|away|off)\b")
 _KNEES = re.compile(r"\bknees?\b")
 _SPINS = re.compile(r"\b(?:spins?|spinning|whirls?|twists?)\b")
 _HIT = re.compile(
@@ -86,8 +87,8 @@ def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
         *(["front"] if _FRONT.search(text) else []),
         *(["side"] if aside else []),
     ]
-    if _RISES.search(wish.beside[1].lower()):  # from the posture that `_get_up` begins in
-        forms = ["front" if _ends_on_front(text) else "back"]
+    if wish.beside[1]:  # what follows begins in a posture that is known
+        forms = ["front" if falls_on_front(text, wish.beside[0]) else "back"]
     first = forms[:1] if knees else forms  # the knees come first, then what is said beside them
     form = rng.choice(first) if first else rng.choices(list(FORMS), list(FORMS.values()))[0]
     named = _SIDE_NAMED.search(text) if form in ("side", "knees-side") else None
@@ -153,7 +154,7 @@ def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gestur
     if crawls or _ON_FOURS.search(text):
         return get_up(rng, "fours")
     return get_up(
-        rng, "lie-front" if _ends_on_front(before) or _CRAWLS.search(before) or _ONTO_FRONT.search(text) else "lie-back"
+        rng, "lie-front" if ends_on_front(before) or _CRAWLS.search(before) or _ONTO_FRONT.search(text) else "lie-back"
     )
 
 
@@ -173,7 +174,12 @@ def _swim(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     return swim(rng, form, seconds=seconds or rng.uniform(4.0, 7.0), moves=form != "tread")
 
 
-def _ends_on_front(before: str) -> bool:
+def falls_on_front(text: str, before: str) -> bool:
+    """Return True if a body falls onto its front: who walked backward before does not, though it trips."""
+    return ends_on_front(text) and not _BACKWARD.search(before.lower())
+
+
+def ends_on_front(before: str) -> bool:
     """Return True if a movement ends on the front, so far as its words say."""
     return bool(_ONTO_FRONT.search(before) or (_FRONT.search(before) and not _BACK.search(before)))
 
@@ -219,7 +225,8 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
         chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
         times = min(wish.count or 1, MOST) if action in AGAIN else 1
         frames = len(joints) if wish.fixed else None
-        return drawn_in_place(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames, chance)
+        tries = TRIES // 3 if any(wish.beside) else 1
+        return drawn_in_place(lambda seconds: CHOICES[action](wish, chance, seconds), times, frames, chance, tries)
 
     return drawn
 
@@ -231,7 +238,7 @@ def is_drawn(action: str) -> Callable[[FineWish], bool]:
 
 
 def drawn_in_place(
-    draw: Callable[[float | None], Gesture], times: int, frames: int | None, rng: random.Random
+    draw: Callable[[float | None], Gesture], times: int, frames: int | None, rng: random.Random, tries: int = 1
 ) -> Array | None:
     """Return joints (T, 22, 3) of a body that stands and moves as drawn; None if there is no time for it.
 
@@ -240,20 +247,23 @@ def drawn_in_place(
         times: that it is done, one after the other.
         frames: of the motion; None = as many as it takes.
         rng: decides how the body stands.
+        tries: movements of which the shortest is taken, where no length is given.
     """
-    gestures = _fitting(draw, times, frames)
+    gestures = _fitting(draw, times, frames, tries)
     return None if gestures is None else _joined(gestures, frames, rng)
 
 
-def _fitting(draw: Callable[[float | None], Gesture], times: int, frames: int | None) -> list[Gesture] | None:
+def _fitting(
+    draw: Callable[[float | None], Gesture], times: int, frames: int | None, tries: int
+) -> list[Gesture] | None:
     """Return as many movements as are asked for, the longest that have room in so many frames."""
     if frames is None:
-        return [draw(None) for _ in range(times)]
-    tries = [[draw(frames / FPS) for _ in range(times)] for _ in range(TRIES)]
-    lengths = [_frames(found) for found in tries]
+        return min(([draw(None) for _ in range(times)] for _ in range(tries)), key=_frames)
+    every = [[draw(frames / FPS) for _ in range(times)] for _ in range(TRIES)]
+    lengths = [_frames(found) for found in every]
     room = [length for length in lengths if length <= frames]
     best = max(room) if room else min(lengths)
-    return tries[lengths.index(best)] if QUICKER * best <= frames else None
+    return every[lengths.index(best)] if QUICKER * best <= frames else None
 
 
 def _frames(gestures: Sequence[Gesture]) -> int:
@@ -276,10 +286,10 @@ def _joined(gestures: Sequence[Gesture], frames: int | None, rng: random.Random)
         moved = (part[-1, 0] - idle[start + length - 1, 0]) * [1.0, 0.0, 1.0]
         start += length
     whole = np.concatenate(parts)
-    return whole if frames is None or len(whole) == frames else _retimed(whole, frames)
+    return whole if frames is None or len(whole) == frames else retimed(whole, frames)
 
 
-def _retimed(joints: Array, frames: int) -> Array:
+def retimed(joints: Array, frames: int) -> Array:
     """Return as many frames at another pace."""
     at = np.linspace(0.0, len(joints) - 1.0, frames)
     return way_through(at, np.arange(float(len(joints))), joints.reshape(len(joints), -1)).reshape(

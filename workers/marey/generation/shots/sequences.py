@@ -12,15 +12,22 @@ from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
 
+from marey.generation.asked import action_of, draws
 from marey.generation.lengths import resolved_length
 from marey.generation.port import Generator, Limits, Request
+from marey.generation.posture import NO_POSTURE
+from marey.generation.postured import gestures_s
+from marey.generation.row_postures import row_postures
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
 from marey.vocabulary.lengths import stated_length
+from marey.vocabulary.scope import STANDING
 
 SEED = "movement"
 """Part of the seed by which the length of a movement is drawn."""
+WAITS_S = 2.0
+"""Seconds of a body that stands and waits beside other movements."""
 
 
 def as_timeline(generator: Generator[Any], request: Request) -> Request:
@@ -37,22 +44,30 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    movements = request.text.movements
+    movements = _merged_falls(request.text)
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not (movements and alone and generator.limits.keeps):
         return request
     generator.limits.check(request)
     fps = generator.limits.fps
+    if len(movements) == 1:
+        return replace(request, text=replace(movements[0], prompt=request.text.prompt))
     stated = [_stated_frames(generator.limits, request, movement) for movement in movements]
-    lengths = [own or _drawn_frames(generator, request, number) for number, own in enumerate(stated)]
+    lengths = [
+        own or _drawn_frames(generator, request, movement, number)
+        for number, (own, movement) in enumerate(zip(stated, movements, strict=True))
+    ]
     if request.frames is not None:
         lengths = _shared(request.frames, lengths)
     if min(lengths) < MIN_ROW_SECONDS * fps:
         return request
     ends = list(accumulate(lengths))
+    postures = [NO_POSTURE] * len(movements)
+    if draws(generator):
+        postures = row_postures([(action_of(text), text.said.lower()) for text in movements], request.seed)
     rows = tuple(
-        TimedText((end - length) / fps, end / fps, text, open=own is None and request.frames is None)
-        for end, length, text, own in zip(ends, lengths, movements, stated, strict=True)
+        TimedText((end - length) / fps, end / fps, text, open=own is None and request.frames is None, held=held)
+        for end, length, text, own, held in zip(ends, lengths, movements, stated, postures, strict=True)
     )
     return replace(request, timeline=rows)
 
@@ -67,13 +82,39 @@ def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> 
     return limits.within(round(own * limits.fps)) if used and own is not None else None
 
 
-def _drawn_frames(generator: Generator[Any], request: Request, number: int) -> int:
-    """Return the frames that the model gives a movement alone."""
-    alone = Request(request.text.movements[number], part_seed(request.seed, SEED, number))
-    return resolved_length(generator, alone).frames or generator.limits.min_frames
+def _drawn_frames(generator: Generator[Any], request: Request, movement: TextFeatures, number: int) -> int:
+    """Return the frames that the model gives a movement alone; who stands and waits beside others does so for as long
+    as what is drawn on it takes."""
+    alone = Request(movement, part_seed(request.seed, SEED, number))
+    frames = resolved_length(generator, alone).frames or generator.limits.min_frames
+    if action_of(movement) != STANDING:
+        return frames
+    return min(frames, generator.limits.within(round(max(WAITS_S, gestures_s(movement.said)) * generator.limits.fps)))
+
+
+def _merged_falls(text: TextFeatures) -> tuple[TextFeatures, ...]:
+    """Return the movements of a text; a hit and the fall behind it are one: the body does not recover in between."""
+    found: list[TextFeatures] = []
+    for movement in text.movements:
+        if found and action_of(movement) == "die" and action_of(found[-1]) == "flinch":
+            found[-1] = replace(movement, prompt=f"{found[-1].prompt} and {movement.prompt}")
+        elif found and action_of(movement) == "die":
+            found.append(replace(movement, prompt=_with_words_before(text.prompt, found[-1].prompt, movement.prompt)))
+        else:
+            found.append(movement)
+    return tuple(found)
 
 
 def _shared(frames: int, lengths: Sequence[int]) -> list[int]:
     """Return lengths in the same ratio that sum up to `frames`."""
     ends = [round(frames * end / sum(lengths)) for end in accumulate(lengths, initial=0)]
     return [end - start for start, end in pairwise(ends)]
+
+
+def _with_words_before(prompt: str, before: str, movement: str) -> str:
+    """Return the words of a movement with those that lie between it and the one before it, which say what makes a body
+    fall: "is shot in the chest and dies"."""
+    _, _, rest = prompt.partition(before)
+    lost, found, _ = rest.partition(movement)
+    lost = lost.strip(" ,;.")
+    return f"{lost} {movement}" if found and len(lost.split()) > 2 else movement

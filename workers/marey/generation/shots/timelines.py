@@ -33,6 +33,9 @@ RISE, RISE_SPEED = 0.3, 0.6
 """Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
 stand up or to go down at this speed."""
 
+MEETS = 8
+"""Frames in which a row passes into the next one that begins in the same posture."""
+
 
 @dataclass(frozen=True, eq=False)
 class TimelineMotion:
@@ -180,6 +183,7 @@ class _Row(_Strand):
     def __init__(self, timeline: _Timeline, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
         super().__init__(timeline, part, timed.text, (limits.max_frames, limits.max_frames - CONTEXT))
         self.open = timed.open
+        self.held = timed.held
         self.beside: tuple[str, str] = ("", "")
         self.features: Float32 | None = None
         self.changes: Mapping[str, Any] = {}
@@ -187,7 +191,7 @@ class _Row(_Strand):
     def request(self) -> Request:
         """Return the request of the first window."""
         own_length = self.open and len(self.lengths) == 1
-        return Request(self.text, self.seed, self.lengths[0], open=own_length, beside=self.beside)
+        return Request(self.text, self.seed, self.lengths[0], open=own_length, beside=self.beside, held=self.held)
 
     def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
@@ -303,7 +307,11 @@ class _Timeline:
     def open_transitions(self) -> list[_Transition]:
         """Return the transitions, once the rows are made; none of a dropped timeline."""
         if not self.dropped:
-            self.transitions = [_Transition(self, number, self.limits) for number in range(len(self.plan.transitions))]
+            self.transitions = [
+                _Transition(self, number, self.limits)
+                for number, (_, after) in enumerate(pairwise(self.rows))
+                if not after.held.meets
+            ]
         return self.transitions
 
     def motion(self) -> TimelineMotion | None:
@@ -316,6 +324,8 @@ class _Timeline:
         for row in self.rows:
             assert row.features is not None
             frames[row.part.start : row.part.end] = row.features
+            if row.held.meets:
+                _passed_into(frames, row.part.start)
         for transition in self.transitions:
             frames = transition.write(frames)
         timeline = zip(self.timeline, self.rows, strict=True)
@@ -374,6 +384,14 @@ def _pelvis_heights(features: Float32 | None, layout: FeatureLayout) -> NDArray[
     """Return the height (T,) of the pelvis over the floor, metres."""
     assert features is not None
     return layout.decode(features)[:, 0, 1]
+
+
+def _passed_into(frames: Float32, start: int) -> None:
+    """Let features (T, D) pass from the last frame before `start` into those behind it; both are of one posture."""
+    count = min(MEETS, len(frames) - start)
+    if start and count > 0:
+        share = (np.arange(1, count + 1) / (count + 1))[:, None]
+        frames[start : start + count] = (1 - share) * frames[start - 1] + share * frames[start : start + count]
 
 
 def _is_raised(text: TextFeatures) -> bool:

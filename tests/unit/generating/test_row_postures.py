@@ -1,0 +1,109 @@
+"""Postures that are handed from one movement of a sequence to the next."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.generation.posture import RowPosture
+from marey.generation.row_postures import is_as_alone, row_postures
+
+
+def postures(*rows: tuple[str, str]) -> list[tuple[str, str, str]]:
+    return [(held.begin, held.own, held.end) for held in row_postures(rows, 1)]
+
+
+def test_gestures_are_done_where_the_body_is() -> None:
+    sits = ("walk", "walks to a seat"), ("sit-down", "sits down")
+    rows = row_postures([*sits, ("wave", "waves"), ("", "reads a book")], 1)
+    assert [(each.begin, each.own, each.end) for each in rows] == [
+        ("", "", ""),
+        ("", "seat", "seat"),
+        ("seat", "seat", "seat"),
+        ("seat", "seat", "seat"),
+    ]
+    assert [each.gesture for each in rows] == [False, False, True, True]
+    assert [each.is_drawn for each in rows] == [False, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("row", "posture"),
+    [
+        (("sit-down", "sits down"), "seat"),
+        (("sit-floor", "sits down on the floor"), "floor"),
+        (("kneel", "kneels"), "knees"),
+        (("kneel", "kneels on one knee"), "knee"),
+        (("crouch", "crouches"), "crouch"),
+        (("squat", "squats"), "crouch"),
+        (("lie-down", "lies down"), "back"),
+        (("lie-down", "lies down on his belly"), "front"),
+        (("die", "trips and falls"), "front"),
+    ],
+)
+@pytest.mark.parametrize(
+    "rises", [("get-up", "gets up"), ("stand-up", "stands up"), ("idle", "stands up"), ("", "scrambles up")]
+)
+def test_who_stands_up_does_so_from_there(row: tuple[str, str], posture: str, rises: tuple[str, str]) -> None:
+    down, up, walk = row_postures([row, rises, ("walk", "walks off")], 1)
+    assert (down.begin, down.own, down.end) == ("", posture, posture)
+    assert (up.begin, up.own, up.end, up.is_drawn) == (posture, "", "", True)
+    assert walk == RowPosture(seed=1)
+
+
+def test_who_stands_has_not_to_stand_up() -> None:
+    assert postures(("wave", "waves"), ("idle", "stands up")) == [("", "", "")] * 2
+
+
+def test_who_goes_on_without_a_word_stands_up_first() -> None:
+    assert postures(("sit-down", "sits down"), ("run", "runs away")) == [("", "seat", ""), ("", "", "")]
+    assert postures(("kneel", "kneels"), ("wave", "waves"), ("", "leaves the room"))[1] == ("knees", "knees", "")
+
+
+def test_who_lies_sits_up_once_and_stays() -> None:
+    rows = postures(("lie", "lies on his back"), ("sit-ups", "sits up"), ("idle", "yawns"), ("get-up", "gets up"))
+    assert rows == [
+        ("back", "back", "back"),
+        ("back", "upright", "upright"),
+        ("upright", "upright", "upright"),
+        ("upright", "", ""),
+    ]
+    assert postures(("walk", "walks"), ("sit-ups", "does sit-ups")) == [("", "", "")] * 2
+
+
+def test_who_walks_backward_falls_on_the_back() -> None:
+    assert postures(("walk-backward", "walks backwards"), ("die", "trips and falls"))[1] == ("", "back", "back")
+
+
+def test_a_slide_behind_the_feet_is_no_lying_body() -> None:
+    rows = postures(("run", "runs"), ("get-up", "slides feet first, gets up"), ("run", "runs on"))
+    assert rows == [("", "", ""), ("", "slide", ""), ("", "", "")]
+
+
+def test_falls_come_to_their_posture_by_themselves() -> None:
+    fall = row_postures([("die", "dies"), ("get-up", "gets up")], 1)[0]
+    assert fall.falls
+    assert not fall.is_drawn
+    seated = row_postures([("sit-down", "sits down"), ("die", "dies")], 1)[1]
+    assert seated.is_drawn
+
+
+def test_rules_of_actions_describe_rows_from_standing_alone() -> None:
+    down, wave, up = row_postures([("sit-down", "sits down"), ("wave", "waves"), ("stand-up", "stands up")], 1)
+    assert is_as_alone(down, "sit-down")
+    assert is_as_alone(wave, "wave")
+    assert is_as_alone(up, "stand-up")
+    kneel, rises, _ = row_postures([("kneel", "kneels"), ("get-up", "stands up"), ("walk", "walks")], 1)
+    assert is_as_alone(kneel, "kneel")
+    assert not is_as_alone(rises, "get-up")
+
+
+def test_who_is_in_a_posture_at_first_does_not_come_to_it() -> None:
+    assert postures(("kneel", "a man kneeling"), ("wave", "waves"))[0] == ("knees", "knees", "knees")
+    assert postures(("kneel", "a man kneels"), ("wave", "waves"))[0] == ("", "knees", "knees")
+    assert postures(("walk", "walks"), ("kneel", "kneeling"))[1] == ("", "knees", "knees")
+
+
+def test_who_crawled_lies_there() -> None:
+    crawl, lie, rises = row_postures([("crawl", "crawls"), ("lie", "stays lying flat"), ("get-up", "gets up")], 1)
+    assert crawl == RowPosture(seed=1)
+    assert (lie.begin, lie.own, lie.end, lie.meets) == ("front", "front", "front", False)
+    assert rises.meets

@@ -1,0 +1,128 @@
+"""Postures in which a body stays for a while, and its ways there from standing, back, and from one to another.
+
+The same name and the same generator of random numbers give the same posture, so that several parts of a motion that are
+drawn one by one meet in it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from marey.drawing.crouches import crouched
+from marey.drawing.floor import lying_back, lying_front, rising_from_seat, seated_on_floor, slid
+from marey.drawing.kneels import kneeling
+from marey.drawing.postures import STAND, Posture
+from marey.drawing.seats import seated_on_seat
+from marey.drawing.sequels import Sequel, Step
+
+SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
+CROUCH, BACK, FRONT, SLIDE = "crouch", "back", "front", "slide"
+"""Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
+on one; crouched; on the back, and on the front; on the seat behind the feet, after a slide."""
+SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE})
+LYING = frozenset({BACK, FRONT})
+BEGINS_S, STANDS_S = 0.3, 0.5
+"""Seconds in which a body waits before it moves, in a posture and standing."""
+SLIDES_M, SLIDES_S = 2.4, 1.2
+"""Metres and seconds for which a body slides on behind its feet."""
+PASSES_S = 0.8
+"""Seconds from one low posture to another."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A posture and the ways to it.
+
+    Attributes:
+        low: the posture.
+        down: seconds and posture of each step from standing, `low` the last.
+        up: the same back, standing the last.
+    """
+
+    low: Posture
+    down: tuple[Step, ...]
+    up: tuple[Step, ...]
+
+
+def hold_named(name: str, rng: random.Random) -> Hold:
+    """Return a posture by its name; `rng` decides what the name leaves open."""
+    return Hold(*_HOLDS[name](rng))
+
+
+def passing(begin: str, own: str, end: str, seconds: float, seed: str) -> Sequel:
+    """Return a body that goes from a posture to another, stays there, and goes on to a third; empty = standing.
+
+    Args:
+        begin: name of the first posture.
+        own: of the one that it stays in.
+        end: of the last one.
+        seconds: that it stays.
+        seed: decides the postures.
+    """
+    holds = {name: hold_named(name, random.Random(f"{seed} {name}")) for name in (begin, own, end) if name}  # noqa: S311
+    if LYING & set(holds) and UPRIGHT not in holds:
+        holds[UPRIGHT] = hold_named(UPRIGHT, random.Random(f"{seed} {UPRIGHT}"))  # noqa: S311
+    waits = BEGINS_S if begin else STANDS_S
+    done = Sequel([waits if begin != own != SLIDE else 0.0], [holds[begin].low if begin else STAND])
+    for step in _way(holds, begin, own):
+        done.then(*step)
+    if seconds > 0.0:
+        done.then(seconds, done.postures[-1])
+    for step in _way(holds, own, end):
+        done.then(*step)
+    return done
+
+
+def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
+    """Return the steps from a posture to another."""
+    if begin == end:
+        return ()
+    if not begin:
+        return holds[end].down
+    if not end:
+        return holds[begin].up
+    if begin == BACK and end == UPRIGHT:
+        return (*holds[BACK].up[:1], (0.6, holds[UPRIGHT].low))
+    if begin == UPRIGHT and end == BACK:
+        return holds[BACK].down[-2:]
+    if begin == BACK or end == BACK:
+        return (*_way(holds, begin, UPRIGHT), *_way(holds, UPRIGHT, end))
+    if begin == FRONT:
+        return (*holds[FRONT].up[:-1], (PASSES_S, holds[end].low))
+    if end == FRONT:
+        return holds[FRONT].down
+    if {begin, end} & SITTING and {begin, end} & KNEELING:  # legs do not pass under the hips
+        return (*holds[begin].up[:-1], *holds[end].down)
+    return ((PASSES_S, holds[end].low),)
+
+
+def _on_floor(rng: random.Random, form: str) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    low, down = seated_on_floor(rng, form)
+    return low, down, rising_from_seat(rng)
+
+
+def _on_knees(rng: random.Random, *, one: bool) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    way, half, low = kneeling(rng, one=one)
+    down = [(0.5, way), (0.4, low)] if one else [(0.5, way), (0.4, half), (0.6, low)]
+    up = [*([] if one else [(0.6, half)]), (0.45, way), (0.55, STAND)]
+    return low, tuple(down), tuple(up)
+
+
+def _crouched(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    low, seconds = crouched(rng), rng.uniform(0.7, 1.0)
+    return low, ((seconds, low),), ((1.1 * seconds, STAND),)
+
+
+_HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], tuple[Step, ...]]]] = {
+    SEAT: seated_on_seat,
+    FLOOR: lambda rng: _on_floor(rng, "floor-crossed"),
+    UPRIGHT: lambda rng: _on_floor(rng, "floor-stretched"),
+    KNEES: lambda rng: _on_knees(rng, one=False),
+    KNEE: lambda rng: _on_knees(rng, one=True),
+    CROUCH: _crouched,
+    BACK: lying_back,
+    FRONT: lying_front,
+    SLIDE: slid,
+}

@@ -1,0 +1,47 @@
+"""The posture in which a movement of a sequence begins, is done and ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RowPosture:
+    """Postures of a row of a timeline, by their names in `marey.drawing.holds`; empty = on the feet, or the network's.
+
+    Attributes:
+        begin: in which the row before has left the body.
+        own: in which the movement is done, or which it comes to.
+        end: in which the row after begins.
+        gesture: the movement is one of arms, head and trunk, made by itself and put onto the posture.
+        apart: the row before ends otherwise than this one begins.
+        falls: the movement comes to its posture by itself.
+        seed: of all rows, so that they meet in the same posture.
+    """
+
+    begin: str = ""
+    own: str = ""
+    end: str = ""
+    gesture: bool = False
+    apart: bool = False
+    falls: bool = False
+    seed: int = 0
+
+    @property
+    def meets(self) -> bool:
+        """True if the row before it ends in its posture, and nothing is to be generated between the two."""
+        return bool(self.begin) and not self.apart
+
+    @property
+    def is_drawn(self) -> bool:
+        """True if the whole movement is a change of posture, or a wait in one."""
+        return bool(self.begin or self.own) and not (self.gesture or self.falls)
+
+    @property
+    def carries(self) -> bool:
+        """True if the movement is put onto a posture."""
+        return self.gesture and bool(self.own)
+
+
+NO_POSTURE = RowPosture()
+"""Of a row that begins and ends on its feet, and of a motion that is no row."""

@@ -1,0 +1,187 @@
+"""Movements of a sequence in a posture: changes of posture are drawn whole, and gestures are put onto the posture.
+
+A gesture is made by a body that stands, by a network or drawn. Its arms are brought to where they are in it, and trunk
+and head are bent by as much, on a body that sits, kneels, crouches or lies.
+"""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import smooth
+from marey.drawing.holds import BACK, FRONT, SLIDE, SLIDES_M, SLIDES_S, passing
+from marey.drawing.passing import pose
+from marey.generation.posture import RowPosture
+from marey.generation.whole_body import retimed
+from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.rotations import normalize
+from marey.posing.limbs import FPS
+from marey.posing.standing import ARMS, LEFT, LEGS, NECK, StandingBody, eased
+from marey.posing.still import standing_still
+from marey.vocabulary.bearing_words import stated_bearings
+
+Float32 = NDArray[np.float32]
+Array = NDArray[np.floating]
+
+STAYS_S, WAITS_S = (0.9, 1.4), (1.5, 2.0)
+"""Seconds in a posture after it is reached, and of a movement that is nothing but a wait in it."""
+LONGEST_S = 4.2
+"""Seconds of a gesture that goes on and on, in a posture."""
+RESTS, ACTS = 12.0, 32.0
+"""Degrees by which an arm is off its place at the beginning of a gesture, at which it acts in nothing and in full."""
+PASSES_S = 0.12
+"""Standard deviation of the filter by which an arm passes from the posture into the gesture, seconds."""
+BENDS = 40.0
+"""Degrees by which a trunk bends in a gesture at most, on a posture."""
+WORK_S = 3.0
+"""Seconds of work in a posture at least."""
+LEG_JOINTS = [joint for leg in LEGS.values() for joint in leg]
+HEAD = 15
+BENDS_S = 0.15
+"""Seconds at both ends in which trunk and head pass into those of a gesture, which mostly begins and ends at rest."""
+EDGE_S = 0.4
+"""Seconds at both ends of a gesture in which the body is in the posture alone."""
+GOING_ON = frozenset({"wave"})
+"""Gestures that networks make on and on, for as long as they have time."""
+WAYS = frozenset(
+    {"aim", "shoot", "guide", "draw-bow", "throw", "wave", "raise-arm", "reach-forward", "reach-up", "cheer"}
+)
+"""Gestures whose arms have their way in the world; those of others have it before the chest."""
+
+
+def drawn_posture(layout: FeatureLayout, held: RowPosture, said: str, seed: int, frames: int | None) -> Float32:
+    """Return features (T, D) of a body that goes to a posture or back, or waits in it.
+
+    Args:
+        layout: of the features, on the skeleton of HumanML3D.
+        held: postures of the movement.
+        said: words of the movement; what they ask for beside it takes its time.
+        seed: of the movement.
+        frames: that it keeps; None = as many as it takes.
+    """
+    rng = random.Random(f"{seed} posture")  # noqa: S311
+    seconds = rng.uniform(*(WAITS_S if held.begin == held.own else STAYS_S)) if held.own else 0.4
+    return encode_all(layout, _fitted(held, max(seconds, gestures_s(said)), frames))
+
+
+def on_posture(
+    features: Float32, layout: FeatureLayout, held: RowPosture, action: str, *, fixed: bool, whole: bool
+) -> Float32:
+    """Return features (T', D) of a gesture that is made in a posture, and of what leads to the next one.
+
+    Args:
+        features: (T, D) of the gesture of a body that stands.
+        layout: of the features, on the skeleton of HumanML3D.
+        held: postures of the movement.
+        action: id in the vocabulary.
+        fixed: the motion keeps its number of frames.
+        whole: nothing of the gesture is left out: a number of repetitions is asked for.
+    """
+    made = StandingBody(layout.decode(features).astype(np.float64))
+    acts = _acts(made)
+    begin, end = (0, len(features)) if fixed else _span(np.max(list(acts.values()), axis=0), whole=whole)
+    joints = _fitted(held, (end - begin) / FPS, len(features) if fixed else None)
+    frames = min(end - begin, len(joints))
+    index = np.minimum(begin + np.arange(len(joints)), begin + frames - 1)
+    made.joints = made.joints[index]
+    made = StandingBody(made.joints)
+    there = np.arange(len(joints)) / FPS
+    left = np.minimum(there, frames / FPS - there)
+    edge = np.clip(left / EDGE_S, 0.0, 1.0)
+    body = StandingBody(joints)
+    _bend(body, made, eased(np.clip(left / BENDS_S, 0.0, 1.0)))
+    for side, share in acts.items():
+        _carry(body, made, side, eased(edge) * share[index], in_trunk=action not in WAYS or held.own in (BACK, FRONT))
+    solved = body.solved()
+    solved[:, LEG_JOINTS] = joints[:, LEG_JOINTS]  # solved knees of who kneels go through the floor
+    return encode_all(layout, solved)
+
+
+def gestures_s(said: str) -> float:
+    """Return the seconds that gestures take at least that are drawn on a body, one after the other, and work."""
+    bearings = [each.bearing for each in stated_bearings(said)]
+    gestures = [
+        2.1 * each.raise_s + (each.keys.times[-1] if each.keys else each.hold_s[0]) + EDGE_S
+        for each in bearings
+        if each.gesture
+    ]
+    return max([sum(gestures), *(WORK_S for each in bearings if each.work)])
+
+
+def _fitted(held: RowPosture, seconds: float, frames: int | None) -> Array:
+    """Return joints (T, 22, 3) of a body that passes its postures and stays so long in its own, or fills `frames`."""
+    least = passing(held.begin, held.own, held.end, 0.0, str(held.seed)).times[-1]
+    if frames is not None:
+        seconds = max(frames / FPS - least, 0.1)
+    done = passing(held.begin, held.own, held.end, seconds, str(held.seed))
+    own = max(round(done.times[-1] * FPS) + 1, 2)
+    body = StandingBody(standing_still(own, random.Random(f"{held.seed} stands")))  # noqa: S311
+    pose(body, done.times, done.postures)
+    joints = body.solved()
+    if held.own == SLIDE and not held.begin:
+        left = 1.0 - np.clip(np.arange(own) / FPS / SLIDES_S, 0.0, 1.0)
+        joints += SLIDES_M * (1.0 - left**2)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return joints if frames is None or len(joints) == frames else retimed(joints, frames)
+
+
+def _acts(made: StandingBody) -> dict[str, Array]:
+    """Return how much each arm acts, 0 to 1 (T,): it rests where it is at the beginning."""
+    found = {}
+    for side, (_, shoulder, elbow, wrist) in ARMS.items():
+        bones = [_way(made, side, *pair) for pair in ((shoulder, elbow), (elbow, wrist))]
+        turned = [np.degrees(np.arccos(np.clip((bone * bone[:1]).sum(-1), -1.0, 1.0))) for bone in bones]
+        raised = np.degrees(np.arccos(np.clip(-bones[0][:, 1], -1.0, 1.0)))
+        off = np.maximum(np.maximum(*turned), raised if raised[0] > ACTS else 0.0)
+        acts = np.clip((off - RESTS) / (ACTS - RESTS), 0.0, 1.0)
+        found[side] = np.clip(smooth(acts, PASSES_S, FPS), 0.0, 1.0)
+    return found
+
+
+def _way(body: StandingBody, side: str, a: int, b: int) -> Array:
+    """Return the direction (T, 3) of a bone, outward, up and forward."""
+    return body.local(normalize(body.joints[:, b] - body.joints[:, a]), side)
+
+
+def _span(acts: Array, *, whole: bool) -> tuple[int, int]:
+    """Return the first frame of a gesture, and the one after the last, with a moment before and after."""
+    active = np.flatnonzero(acts > 0.1)
+    if not len(active):
+        return 0, len(acts) if whole else min(len(acts), round(LONGEST_S * FPS))
+    begin = max(int(active[0]) - round(EDGE_S * FPS), 0)
+    end = min(int(active[-1]) + round(EDGE_S * FPS), len(acts))
+    return begin, end if whole else min(end, begin + round(LONGEST_S * FPS))
+
+
+def _bend(body: StandingBody, made: StandingBody, edge: Array) -> None:
+    """Bend trunk and head by as much as those of a gesture are bent since its beginning."""
+    trunk, head = (_way(made, LEFT, *pair) for pair in ((0, NECK), (NECK, HEAD)))
+    for axis, along, sign in (("left", 2, 1.0), ("forward", 0, -1.0)):
+        bent, nods = (sign * np.degrees(np.arctan2(bone[:, along], bone[:, 1])) for bone in (trunk, head))
+        nods = nods - bent
+        body.lean(np.clip(bent - bent[0], -BENDS, BENDS) * edge, axis)
+        body.turn(NECK, axis, np.clip(nods - nods[0], -BENDS, BENDS) * edge)
+    across = made.local(made.joints[:, ARMS["left"][1]] - made.joints[:, ARMS["right"][1]], LEFT)
+    twist = -np.degrees(np.arctan2(across[:, 2], across[:, 0]))
+    body.lean(np.clip(twist - twist[0], -BENDS, BENDS) * edge, "up")
+
+
+def _carry(body: StandingBody, made: StandingBody, side: str, share: Array, *, in_trunk: bool) -> None:
+    """Bring an arm to where it is in a gesture, by `share` (T,)."""
+    _, shoulder, elbow, wrist = ARMS[side]
+    bones = [_way(made, side, *pair) for pair in ((shoulder, elbow), (elbow, wrist))]
+    if in_trunk:
+        turn = np.einsum("tki,tkj->tij", _trunk(made, side), _trunk(body, side))
+        bones = [np.einsum("ti,tij->tj", bone, turn) for bone in bones]
+    body.move_arm(side, share, *bones, lag=0.0, straight=True)
+
+
+def _trunk(body: StandingBody, side: str) -> Array:
+    """Return the axes (T, 3, 3) of a trunk in rows: outward, up and forward, in the frame of the body."""
+    middle = body.joints[:, [arm[1] for arm in ARMS.values()]].mean(1)
+    up = normalize(body.local(middle - body.joints[:, 0], side))
+    out = body.local(body.joints[:, ARMS[side][1]] - middle, side)
+    out = normalize(out - up * (out * up).sum(-1, keepdims=True))
+    return np.stack([out, up, np.cross(out, up)], axis=1)

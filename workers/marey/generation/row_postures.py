@@ -1,0 +1,152 @@
+"""Sequences whose movements begin in the posture in which the one before has ended.
+
+Each movement is made alone, by a body that stands. Who sat down and waves would stand up for it, who knelt and "stands
+up" would fall in order to get up, and who lies and "sits up" would do sit-ups. Here the posture is handed from
+one movement to the next; `marey.generation.postured` draws what follows from it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, LYING, SEAT, SLIDE, UPRIGHT
+from marey.generation.posture import RowPosture
+from marey.generation.whole_body import ends_on_front, falls_on_front
+from marey.vocabulary.scope import STANDING
+
+Row = tuple[str, str]
+"""The id of the action of a row, empty if there is none that is known, and its words in lower case."""
+
+POSTURES: Mapping[str, str] = {
+    "sit-down": SEAT,
+    "sit": SEAT,
+    "sit-floor": FLOOR,
+    "kneel": KNEES,
+    "crouch": CROUCH,
+    "lie": BACK,
+    "lie-down": BACK,
+    "die": BACK,
+}
+"""Postures that actions come to, or stay in."""
+THERE = frozenset({"sit", "lie", ""})
+"""Actions that begin in their posture, in the first row."""
+RISING = frozenset({"get-up", "stand-up"})
+RISES_FROM: Mapping[str, frozenset[str]] = {"get-up": LYING, "stand-up": frozenset({SEAT})}
+"""Postures from which these rise by their definitions."""
+GESTURES = frozenset(
+    {
+        *("wave", "raise-arm", "clap", "cheer", "laugh", "nod", "signal", "guide", "shiver", "talk", "drink", "wash"),
+        *("reach-up", "reach-forward", "aim", "shoot", "draw-bow", "cast-spell", "throw", "slash", "stab", "block"),
+        *("bow", "twist", "arm-circles", "flinch", "punch"),
+    }
+)
+"""Actions of arms, head and trunk: they are done in the posture in which the body is."""
+LAIN = frozenset({STANDING, "wave", "clap", "laugh", "shiver", "talk"})
+"""Actions that are done on the back."""
+_UP = re.compile(
+    r"\b(?:gets?|stands?|rises?|scrambles?|jumps?|springs?|clambers?|struggles?|climbs?|leaps?|pushes|straightens?"
+    r"|picks? (?:him|her|them|it)sel\w+)\b.*\b(?:up|upright|feet)\b|\brises?\b|^\W*stands?\W*$"
+)
+_SITS_UP = re.compile(r"\bsit(?:s|ting)? (?:back |straight |bolt )?(?:up|upright)\b")
+_SLIDES = re.compile(
+    r"\bslid\w* (?:feet|foot|legs?)[ -]?first\b|\bslid\w* (?:in)?to (?:\w+ )?(?:home|base|plate)\b"
+    r"|\bbaseball slide\b|\bslide tackle\w*"
+)
+_LIES = re.compile(r"\b(?:lying|lies|laying|in bed|wakes? up)\b")
+_BEING = re.compile(r"\b(?:sitting|seated|kneeling|crouch(?:ing|ed)|squatting|lying)\b(?! down)")
+"""Words of who is in a posture, not of who comes to it."""
+_ONE_KNEE = re.compile(r"\bone knee\b|\ba knee\b|\bpropos\w+|\bknight\w*|\brifle|\bgun\b|\baim\w*|\bpistol|\bbow\b")
+_GOES = re.compile(
+    r"\b(?:walk|run|leave|exit|go|step|jump|march|dash|flee|rush|jog|climb|hop|danc|skip|move|turn|spin|kick|charg|escap"
+    r"|return|approach|enter|crawl|roll|swim|fall|lie|kneel|crouch|squat)\w*\b"
+)
+"""Words of what a body cannot do where it sits."""
+
+
+def row_postures(rows: Sequence[Row], seed: int) -> list[RowPosture]:
+    """Return the postures of the movements of a sequence, in their order.
+
+    Args:
+        rows: of the sequence.
+        seed: of the sequence.
+    """
+    found: list[RowPosture] = []
+    begin = ""
+    for number, row in enumerate(rows):
+        before = rows[number - 1] if number else None
+        after = rows[number + 1] if number + 1 < len(rows) else None
+        found.append(replace(_held(row, (before, after), begin), seed=seed))
+        begin = found[-1].own
+    last = RowPosture(begin=begin)
+    return [replace(held, end="" if after.apart else after.begin) for held, after in pairwise([*found, last])]
+
+
+def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPosture:
+    """Return the postures of a row whose body is in `begin`, but for the end; one that stands up is none.
+
+    Args:
+        row: action and words.
+        beside: the rows before and after it; None = there is none.
+        begin: name of the posture.
+    """
+    (action, said), (before, _) = row, beside
+    own = _posture(row, beside, begin)
+    if own:
+        crawled = before is not None and before[0] == "crawl"
+        there = crawled or (before is None and (action in THERE or _BEING.search(said) is not None))
+        return RowPosture(
+            own if there else begin, own, apart=crawled, falls=action == "die" and not begin and not crawled
+        )
+    if not begin or not stays(row, begin):
+        return RowPosture(begin if begin and _rises(row) else "")
+    if action == STANDING:
+        return RowPosture(begin, begin)
+    return RowPosture(begin, begin, gesture=True)
+
+
+def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str:
+    """Return the posture that a movement comes to; empty if it comes to none."""
+    (action, said), (before, after) = row, beside
+    if not begin and _SLIDES.search(said) and action in ("", "get-up", "idle", "run"):
+        return SLIDE
+    if action == "kneel":
+        return KNEE if _ONE_KNEE.search(said) else KNEES
+    if action == "die":
+        return FRONT if falls_on_front(said, "" if before is None else before[1]) else BACK
+    if action in ("lie", "lie-down"):
+        return FRONT if ends_on_front(said) or (before is not None and before[0] == "crawl") else BACK
+    if action == "squat" and after is not None and (_rises(after) or after[0] in GESTURES):
+        return CROUCH
+    if _SITS_UP.search(said) and (action == "sit-ups" or not action) and begin in LYING:
+        return UPRIGHT
+    if not action and _LIES.search(said) and after is not None and (_SITS_UP.search(after[1]) or _rises(after)):
+        return BACK
+    return POSTURES.get(action, "")
+
+
+def is_as_alone(held: RowPosture, action: str) -> bool:
+    """Return True if a row shows its action as a motion of that alone does, which the rules of actions describe."""
+    if held.carries:
+        return held.own not in LYING | {CROUCH}
+    if not held.is_drawn:
+        return True
+    if not held.own:
+        return held.begin in RISES_FROM.get(action, ())
+    return held.begin in ("", held.own) and held.end == held.own and action in POSTURES
+
+
+def _rises(row: Row) -> bool:
+    """Return True if a movement is that of standing up."""
+    action, said = row
+    return action in RISING or (action in ("", STANDING) and _UP.search(said) is not None)
+
+
+def stays(row: Row, begin: str) -> bool:
+    """Return True if a movement is done in the posture in which the body is."""
+    action, said = row
+    if _rises(row) or (begin in LYING and action not in (LAIN if begin == BACK else {STANDING})):
+        return False
+    return action == STANDING or action in GESTURES or (not action and not _GOES.search(said))
