@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from marey.drawing.forms import BRIEF_S, Asked, misfit
+from marey.drawing.forms import BRIEF_S, StatedForm, misfit
 from marey.drawing.gesture import BOTH, Gesture
 from marey.drawing.kinds import DRAWINGS
 from marey.generation.drawn_whole import drawn_whole
@@ -16,7 +16,7 @@ from marey.motion.features import HUMANML3D_263
 BESIDE = ("walks", "sits down")
 
 
-def best(action: str, asked: Asked) -> list[Gesture]:
+def best(action: str, asked: StatedForm) -> list[Gesture]:
     rng = random.Random(1)
     drawn = [DRAWINGS[action](rng) for _ in range(60)]
     return sorted(drawn, key=lambda each: misfit(each, action, asked))[:4]
@@ -24,14 +24,14 @@ def best(action: str, asked: Asked) -> list[Gesture]:
 
 def test_a_movement_beside_others_is_short_and_done_once() -> None:
     for action in ("bow", "cheer", "aim", "squat"):
-        found = best(action, Asked("", brief=True))
+        found = best(action, StatedForm("", brief=True))
         assert {each.times for each in found} == {1}
         assert max(each.seconds for each in found) <= BRIEF_S + 0.6
 
 
 def test_a_number_that_is_asked_for_is_kept() -> None:
     for brief in (False, True):
-        assert {each.times for each in best("bow", Asked("bows twice", 2, brief=brief))} <= {1, 2}
+        assert {each.times for each in best("bow", StatedForm("bows twice", 2, brief=brief))} <= {1, 2}
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_a_number_that_is_asked_for_is_kept() -> None:
     [("raises both hands", "", BOTH), ("raises his right arm", "right", "right"), ("raises one hand", "left", "left")],
 )
 def test_the_arms_that_are_named_act(text: str, side: str, acts: str) -> None:
-    found = [each for each in best("raise-arm", Asked(text, side=side)) if not side or each.side in (side, BOTH)]
+    found = [each for each in best("raise-arm", StatedForm(text, side=side)) if not side or each.side in (side, BOTH)]
     assert {each.side for each in found} == {acts}
 
 
@@ -55,12 +55,12 @@ def test_the_arms_that_are_named_act(text: str, side: str, acts: str) -> None:
     ],
 )
 def test_a_form_that_is_named_is_drawn(action: str, text: str, kind: str) -> None:
-    assert all(kind in each.kinds for each in best(action, Asked(text)))
+    assert all(kind in each.kinds for each in best(action, StatedForm(text)))
 
 
 @pytest.mark.parametrize(("action", "kind"), [("push-ups", "push-ups-knees"), ("balance", "balance-plane")])
 def test_a_form_that_has_to_be_named_is_not_drawn_otherwise(action: str, kind: str) -> None:
-    assert not any(kind in each.kinds for each in best(action, Asked("does that")))
+    assert not any(kind in each.kinds for each in best(action, StatedForm("does that")))
 
 
 def test_nods_and_falls_beside_others_are_shorter() -> None:

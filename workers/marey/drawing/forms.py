@@ -50,7 +50,7 @@ def load_forms() -> Mapping[str, Forms]:
 
 
 @dataclass(frozen=True)
-class Asked:
+class StatedForm:
     """Everything that a prompt says of the form of a movement.
 
     Attributes:
@@ -66,7 +66,7 @@ class Asked:
     brief: bool = False
 
 
-def misfit(gesture: Gesture, action: str, asked: Asked) -> float:
+def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
     """Return how far a movement is from what a prompt says of its form; 0 if it is as said.
 
     Args:

@@ -66,7 +66,7 @@ def _hanging(rng: random.Random, bar: Point, down: float, legs: str, kick: Point
 
 
 @dataclass(frozen=True)
-class Hold:
+class HangForm:
     """How a body hangs; what is left out is drawn at random.
 
     Attributes:
@@ -86,9 +86,9 @@ class Hold:
     seconds: float | None = None
 
 
-def hang(rng: random.Random, hold: Hold | None = None) -> Gesture:
+def hang(rng: random.Random, hold: HangForm | None = None) -> Gesture:
     """A body that hangs from the first frame to the last; both hands stay at their places unless it goes along."""
-    hold = hold or Hold()
+    hold = hold or HangForm()
     form = hold.form or rng.choices(list(_DRAWN), list(_DRAWN.values()))[0]
     ledge = hold.ledge
     if ledge is None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.forms import Asked, misfit
+from marey.drawing.forms import StatedForm, misfit
 from marey.drawing.gesture import Gesture
 from marey.drawing.kinds import COUNTED, DRAWINGS
 from marey.generation.ball_games import dribbles_on_spot
@@ -134,7 +134,7 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
     says first."""
     text = wish.prompt.lower()
-    asked = Asked(text, wish.count, wish.side, any(wish.beside) and not wish.fixed)
+    asked = StatedForm(text, wish.count, wish.side, any(wish.beside) and not wish.fixed)
     drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
     yield from (
         gesture

@@ -33,7 +33,6 @@ _HEAVY = re.compile(
     r"\b(?:hard|heav\w+|stagger\w*|stumbl\w*|reel\w*|powerful\w*|strong\w*|big|huge|violent\w*|brutal\w*"
     r"|knock\w* back\w*)\b"
 )
-_LIGHT = re.compile(r"\b(?:light\w*|slight\w*|soft\w*|graz\w+|small|weak\w*)\b")
 
 
 def hit_part(prompt: str) -> str:
@@ -49,5 +48,5 @@ def stated_hit(wish: FineWish, rng: random.Random, seconds: float | None) -> Ges
     if not part:
         return None
     named = _SIDE_NAMED.search(text)
-    heavy = True if _HEAVY.search(text) else False if _LIGHT.search(text) else None
+    heavy = bool(_HEAVY.search(text))  # otherwise the body comes back to where it stood
     return flinch(rng, part, side=wish.side or (named[1] if named else ""), heavy=heavy, times=min(wish.count or 1, 4))

@@ -10,7 +10,7 @@ import random
 import re
 
 from marey.drawing.gesture import Gesture
-from marey.drawing.hangs import Hold, hang
+from marey.drawing.hangs import HangForm, hang
 from marey.drawing.ladders import Ascent, climb_ladder
 from marey.drawing.wheels import Way, drive
 from marey.generation.fine_wish import FineWish
@@ -111,7 +111,7 @@ def hangs(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     count = stated_count(_PULLS.sub("pull up", text), "hang") if counted else None
     side = named[1] if named else ""
     lasts = seconds or rng.uniform(4.0, 6.5)
-    return hang(rng, Hold(form, bool(_LEDGES.search(text)), swing, count, side, lasts))
+    return hang(rng, HangForm(form, bool(_LEDGES.search(text)), swing, count, side, lasts))
 
 
 def _form_of_hang(text: str) -> str:
