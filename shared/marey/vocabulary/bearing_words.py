@@ -98,6 +98,10 @@ _ACTS = re.compile(
 _SIDE = re.compile(r"\b(left|right)\b")
 _HEALTHY = re.compile(r"\bfavou?ring\b|\bgood\b")
 """Words of the leg that does not hurt."""
+_WITH_HAND = re.compile(
+    r",? (?:with|using) (?:(?:his|her|their|its|the|one's) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
+)
+"""Words of the hand that does a gesture, behind its own."""
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
 _BRINGING = frozenset(
     [
@@ -327,7 +331,11 @@ def _matches(text: str) -> Iterator[_Words]:
                 if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
                     yield _Words(*match.span(), stated)
             elif kind == "how" or _is_subject(text[: match.start()]):
-                yield _Words(*match.span(), stated)
+                hand = _WITH_HAND.match(text, match.end()) if not stated.side and stated.bearing.gesture else None
+                if hand is None:
+                    yield _Words(*match.span(), stated)
+                else:
+                    yield _Words(match.start(), hand.end(), replace(stated, side=_side(hand[0])))
 
 
 def _is_beside(text: str, words: str) -> bool:

@@ -13,6 +13,7 @@ _HASTE = r"(?:(?:more|quick|fast|hard|strong|powerful|straight|lead|rear) )*"
 _BLOW = re.compile(
     rf"\b(?:{_NUMBER} {_HASTE})?(?:(?P<side>left|right)(?:[ -]hand(?:ed)?)? {_HASTE})?"
     rf"\b(?P<kind>{'|'.join(KINDS)})(?:e?s)?\b(?!-(?:legged|over|step|body))"
+    r"(?: (?P<after>left|right)(?: hand)?(?=$|[,.;]| and\b| then\b))?"
     r"(?:,? (?:x ?(?P<by>\d)|(?P<twice>twice)|(?P<times>\w+) times))?"
     r"|\b(?P<bare>left|right)(?: punch(?:es)?)?(?=,|[- ](?:left|right)\b| (?:and|then)\b| combo|$)"
 )
@@ -44,7 +45,7 @@ def stated_blows(prompt: str) -> list[StatedBlow]:
         often = _value(match["number"]) or 1
         if match is not kinds[-1] or len(matches) == 1:  # behind the last one they are times of the whole list
             often = _value(match["by"] or match["times"]) or (2 if match["twice"] else often)
-        found += [StatedBlow(match["kind"], match["side"] or "")] * often
+        found += [StatedBlow(match["kind"], match["side"] or match["after"] or "")] * often
     if kinds and len(found) > 1:
         last = kinds[-1]
         again = _value(last["by"] or last["times"]) or (2 if last["twice"] else 1)

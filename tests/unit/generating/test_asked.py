@@ -314,3 +314,12 @@ def test_steps_aside_are_drawn_at_the_pace_that_is_asked_for(monkeypatch: pytest
     fixed = make(walker(), replace(request, frames=80))
     assert len(fixed.features) == 80
     assert "speed" not in fixed.changes
+
+
+def test_a_number_of_what_is_only_drawn_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(OneMotion, "bundle", SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True)))
+    once, often = (
+        len(make(walker(), replace(ask(f"a knight slashes {number}"), open=True)).features)
+        for number in ("once", "five times")
+    )
+    assert often > 2 * once

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from marey.bundles import Bundle
-from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, with_bearing
+from marey.generation.bearing import BorneSpan, arms_of, borne, borne_spans, fitting, with_bearing
 from marey.generation.export import finish
 from marey.generation.gaits import (
     limping,
@@ -30,6 +30,7 @@ from marey.motion.courses import course_of
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import find_contacts
 from marey.motion.skeleton import HUMANML3D
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import DRAWN_AS, StatedBearing, load_bearings
 from tests.support.bodies import Body, walker
 from tests.unit.generating.test_timelines import load, text_of
@@ -451,3 +452,9 @@ def test_work_ends_with_its_movement(generator: Any) -> None:
     request = resolve_request(generator, Request(whole, 3))
     spans = borne_spans(request, FPS, round(20 * FPS))
     assert [[each.name for each in span.stated] for span in spans] == [["old", "hammering"], ["old"]]
+
+
+def test_gestures_are_in_the_order_of_the_prompt() -> None:
+    for prompt in ("yawns and scratches his head", "scratches his head and yawns"):
+        names = [each.name for each in fitting(stated_bearings(prompt), "idle")]
+        assert names == (["yawn", "head-scratch"] if prompt.startswith("yawns") else ["head-scratch", "yawn"])

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from zoneinfo import ZoneInfo
 
 import pytest
-from hypothesis import given
+from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
@@ -67,9 +67,18 @@ def test_in_the_hour_that_comes_again_the_next_time_is_not_in_the_past() -> None
     assert next_time("30 2 * * *", BERLIN, between) == datetime(2026, 10, 26, 1, 30, tzinfo=UTC)
 
 
+def first_time(cron: str, zone: str, after: datetime) -> datetime:
+    """Return the next time of a line that has one: 02:00 of the second Sunday in March is left out every year in some
+    zones."""
+    try:
+        return next_time(cron, zone, after)
+    except InvalidInput:
+        reject()
+
+
 @given(lines, zones, moments)
 def test_the_next_time_lies_after_now_and_next_times_only_grow(cron: str, zone: str, now: datetime) -> None:
-    first = next_time(cron, zone, now)
+    first = first_time(cron, zone, now)
     second = next_time(cron, zone, first)
     assert now < first < second
 
@@ -78,7 +87,7 @@ def test_the_next_time_lies_after_now_and_next_times_only_grow(cron: str, zone: 
 def test_what_stands_for_the_missed_times_is_none_of_the_future_and_none_before_the_first(
     cron: str, zone: str, start: datetime, minutes_away: int
 ) -> None:
-    since = next_time(cron, zone, start)
+    since = first_time(cron, zone, start)
     now = since + timedelta(minutes=minutes_away)
     due = last_time(cron, zone, now, since)
     assert since <= due <= now

@@ -329,3 +329,12 @@ def test_a_movement_of_the_whole_body_is_made_by_who_stands_alone() -> None:
 def test_who_sneaks_on_tiptoe_is_drawn_so_whole() -> None:
     assert StatedBearing("tiptoe").shown_in("sneak") == "body"
     assert not StatedBearing("sneaking").shown_in("sneak")
+
+
+@pytest.mark.parametrize(
+    ("prompt", "side"),
+    [("beckons with his left hand", "left"), ("blows a kiss with the right hand", "right"), ("beckons", "")],
+)
+def test_a_gesture_is_done_by_the_hand_that_stands_behind_it(prompt: str, side: str) -> None:
+    (stated,) = stated_bearings(prompt)
+    assert stated.side == side

@@ -23,6 +23,8 @@ from marey.vocabulary.counts import stated_count
         ("punches left, right, left", "left right left"),
         ("throws three jabs", "jab jab jab"),
         ("hooks", "hook"),
+        ("uppercut right", "right-uppercut"),
+        ("jab left, cross right", "left-jab right-cross"),
         ("throws a punch to the left", ""),
         ("sits cross-legged", ""),
     ],

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.drawing.kinds import COUNTED
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
@@ -124,7 +125,8 @@ class _Wish:
         prompt, gaze = text.said, stated_gaze(text.said)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
-        count = stated_count(prompt, action) if action in REPETITIONS or action in AGAIN else None
+        counted = action in REPETITIONS or action in AGAIN or action in COUNTED
+        count = stated_count(prompt, action) if counted else None
         if action == "spin":
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)

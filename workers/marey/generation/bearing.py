@@ -73,7 +73,7 @@ class BorneSpan:
 
     Attributes:
         begin, end: its first frame, and the one after its last.
-        stated: in the order of the vocabulary.
+        stated: as `fitting` orders them.
         action: id of the action, which leaves some parts of the body free for them.
         seed: decides sizes and times.
         said: the prompt.
@@ -173,12 +173,13 @@ def _replaces(new: StatedBearing, old: StatedBearing) -> bool:
 
 
 def fitting(stated: Sequence[StatedBearing], action: str) -> tuple[StatedBearing, ...]:
-    """Return the bearings that an action can have, each once, in the order of the vocabulary."""
+    """Return the bearings that an action can have, each once: in the order of the vocabulary, and behind them gestures
+    in that of the prompt."""
     order = list(load_bearings())
     shown = [each for each in stated if each.shown_in(action)]
     moves = [each for each in shown if each.bearing.moves]  # no pose is drawn on a movement of the whole body
     once = {each.name: each for each in moves or shown}
-    return tuple(sorted(once.values(), key=lambda each: order.index(each.name)))
+    return tuple(sorted(once.values(), key=lambda each: len(order) if each.bearing.gesture else order.index(each.name)))
 
 
 def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSpan]) -> Float32:
