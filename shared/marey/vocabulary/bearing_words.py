@@ -116,6 +116,8 @@ _BRINGING = frozenset(
         "clasp",
         "press",
         "answer",
+        "hang",
+        "end",
         "raise",
         "spread",
         "stretch",

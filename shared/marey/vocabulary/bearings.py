@@ -200,11 +200,13 @@ class StatedBearing:
 
 
 def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:
-    """Return each bearing once; one that is said of the person anywhere is said of the person."""
+    """Return each bearing once; one that is said of the person anywhere is said of the person, and one
+    whose end is told apart from it ("answers the phone, nods and hangs up") ends."""
     found: dict[str, StatedBearing] = {}
     for each in stated:
         known = found.get(each.name, each)
-        found[each.name] = replace(known, side=known.side or each.side, whole=known.whole or each.whole)
+        words = f"{known.words} {each.words}" if each.ends and not known.ends else known.words
+        found[each.name] = replace(known, side=known.side or each.side, whole=known.whole or each.whole, words=words)
     return tuple(found.values())
 
 

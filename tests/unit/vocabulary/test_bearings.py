@@ -37,6 +37,16 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
         ("a zombie shambles forward", "a person walks forward", ["zombie"]),
         ("walks like a zombie", "walks", ["zombie"]),
         ("do a zombie walk", "do a walk", ["zombie"]),
+        ("leans back against the old wall", "", ["wall-lean"]),
+        ("IDLE lean wall", "", ["wall-lean"]),
+        ("leans against the door to push it open", "leans against the door to push it open", []),
+        ("leans on the railing", "", ["rail-lean"]),
+        ("walks through deep snow", "walks", ["wading"]),
+        ("wades across the river", "walks", ["wading"]),
+        ("rubs his neck", "", ["neck-rubbed"]),
+        ("rubs his head", "", ["head-scratch"]),
+        ("hangs up", "", ["phone-call"]),
+        ("hangs up his coat", "hangs up his coat", []),
         ("a drunk man staggers down the street", "a man walks down the street", ["drunk"]),
         ("a swaggering cowboy walks into town", "a cowboy walks into town", ["proud"]),
         ("the king walks proudly, chest out", "the king walks", ["proud"]),
@@ -338,3 +348,10 @@ def test_who_sneaks_on_tiptoe_is_drawn_so_whole() -> None:
 def test_a_gesture_is_done_by_the_hand_that_stands_behind_it(prompt: str, side: str) -> None:
     (stated,) = stated_bearings(prompt)
     assert stated.side == side
+
+
+def test_a_call_that_is_ended_apart_from_its_beginning_ends() -> None:
+    (call,) = stated_bearings("answers the phone with the left hand, nods twice and hangs up")
+    assert call.ends
+    assert call.side == "left"
+    assert not stated_bearings("answers the phone and nods twice")[0].ends
