@@ -10,12 +10,19 @@ from typing import Literal, cast
 Glance = Literal["left", "right", "up", "down", "around", "shake"]
 """`around`: to one side and to the other; `shake`: quickly to and fro."""
 
+_AT = (
+    r"(?: (?:at|into|towards?) (?:(?:him|her|them|it|someone)"
+    r"|(?:a|an|the|his|her|their|its|some) (?:(?!(?:and|then|while)\b)\w+ ){0,2}?\w+)"
+    r"(?=$|[.,;!]| (?:and|then|while|with|before|as)\b))?"
+)
+"""Objects that a head faces which turns up or down: "up at the tower"."""
 _WHERE = {
     "left": r"left|leftwards?|over (?:his|her|their|the) left shoulder|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
     "right": r"(?:(?:in|at|into) )?(?:the|his|her) (?:right|rear-?view|rear view|driving) mirror"
     r"|right(?! (?:at|into|in|through|past)\b)|rightwards?|over (?:his|her|their|the) right shoulder",
-    "up": r"up(?! (?:the|to) )|upwards?|at the (?:sky|ceiling|stars)|to the (?:sky|heavens)",
-    "down": r"down(?! the )|downwards?|at (?:the|his|her|their) (?:floor|ground|feet|shoes|watch)",
+    "up": rf"up(?! (?:the|to) ){_AT}|upwards?|(?:at|to|into|towards?) (?:the )?(?:(?:night|blue|dark|starry) )?"
+    r"(?:sky|ceiling|stars|heavens|clouds|moon|sun)",
+    "down": rf"down(?! the ){_AT}|downwards?|at (?:(?:the|his|her|their) )?(?:floor|ground|feet|shoes|watch)",
     "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left"
     r"|behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
     r"|over (?:his|her|their|the|one) shoulder",

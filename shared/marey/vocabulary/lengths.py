@@ -6,7 +6,14 @@ Standard library only. A bundle's range of lengths is not known here (`marey.bun
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import third_person
+from marey.vocabulary.word_lists import load_word_lists
 
 TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
 seventeen eighteen nineteen twenty"""
@@ -38,6 +45,14 @@ _BEFORE = re.compile(r"\b(?:after|every|each|first|last|next|another|per|within|
 _AFTER = re.compile(r"^[ ]?(?:later|ago|in\b|apart|into|mark|hand|from now|at a time|between)")
 _NEXT = re.compile(r"\b(?:then|before|after|afterwards?|followed by|finally|next)\b|[;.!?](?:\s|$)")
 """Separators of actions in the order of time."""
+_LISTED = re.compile(r"(?:,|\band\b)(?:\s+and)?\s+(?:(?:he|she|they)\s+)?(?:\w+ly\s+)?(?=(?P<verb>[a-z]+)\b)")
+"""Separators of the clauses of a list, before the verb of the next one."""
+_NAMED_PARTS = frozenset({"back", "face", "head", "hand", "arms", "legs", "feet", "hands"})
+"""Parts of the body whose names are forms of verbs: "sits for eight seconds, back straight"."""
+_HERE = "\0"
+"""Stands in place of a length."""
+_CLAUSE_BEFORE = re.compile(r"[^\W\d_]{3}.*\bfor\s+(?:(?:about|around|exactly|roughly|only|just)\s+)?$")
+"""A clause, and the word before the length that is its own."""
 _DECADE = re.compile(r"[5-9]0s")
 _LABEL = re.compile(r"\b(?:length|duration|total|time|lasting|takes?|overall)\b")
 
@@ -63,17 +78,46 @@ def stated_length(prompt: str) -> StatedLength:
     """Return the length that a prompt states.
 
     Several lengths are summed where every action in order has one: "walks for two seconds, then waves for 3 s" has
-    five. "walks, then waves for three seconds" states that of a part.
+    five. "walks, then waves for three seconds" states that of a part, and so does "walks for two seconds, waves and
+    sits down": a length behind the first of several clauses is its own.
     """
     text = " ".join(prompt.lower().split())
     found = [match for match in _LENGTH.finditer(text) if not _is_moment(text, match)]
     if not found:
         return StatedLength()
-    rest = _LENGTH.sub(" ", text)
-    parts = [part for part in _NEXT.split(rest) if re.search(r"[^\W\d_]{3}", _LABEL.sub("", part))]
+    rest = _LENGTH.sub(f" {_HERE} ", text)
+    clauses = [clause for part in _NEXT.split(rest) for clause in _listed(part)]
+    parts = [part for part in clauses if re.search(r"[^\W\d_]{3}", _LABEL.sub("", part))]
     if len(found) < len(parts):
         return StatedLength(is_partial=True)
     return StatedLength(sum(map(_seconds, found)))
+
+
+def _listed(part: str) -> Iterator[str]:
+    """Yield the clauses behind a length that is said of the first one: "walks for two seconds", "waves" and "sits
+    down"; the part as it is where the length is at its beginning or its end."""
+    before, here, after = part.partition(_HERE)
+    if not here or not _CLAUSE_BEFORE.search(before):
+        yield part
+        return
+    begins = [found for found in _LISTED.finditer(after) if found["verb"] in _verbs()]
+    edges = [0, *(found.start() for found in begins), len(after)]
+    yield before + after[: edges[1]]
+    yield from (after[low:high] for low, high in pairwise(edges[1:]))
+
+
+@lru_cache(maxsize=1)
+def _verbs() -> frozenset[str]:
+    """Return the forms without an ending, and those with -s, of all verbs that are known."""
+    lists = load_word_lists()
+    phrases = [phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near)]
+    verbs = {phrase.split()[0] for phrase in (*phrases, *lists.other_verbs)}
+    return (
+        frozenset(verbs | {third_person(verb) for verb in verbs if verb.isalpha()})
+        - lists.body_parts
+        - lists.uncounted
+        - _NAMED_PARTS
+    )
 
 
 def _is_moment(text: str, match: re.Match[str]) -> bool:

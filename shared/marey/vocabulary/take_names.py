@@ -45,6 +45,15 @@ _STRUCK_PARTS = frozenset(
     "head face chest stomach belly gut torso shoulder arm leg knee back side".split()  # noqa: SIM905
 )
 """Parts of the body that are hit."""
+_DEATHS = frozenset({"death", "die", "dies", "dying", "dead"})
+"""First parts of takes of who dies."""
+_ORDERED = frozenset({"then", "and", "to"})
+"""Parts between those of one fall: "DEATH_knees_then_forward"."""
+_STRIKES = "punch(?:es)?|jabs?|hooks?|cross|uppercuts?|elbows?|knees?|kicks?|roundhouse|blocks?|slash(?:es)?|stabs?"
+_LETTERED = re.compile(rf"\b(?P<blow>{_STRIKES})[ ](?P<side>[lr])\b(?!['’])", re.IGNORECASE)
+"""A blow with the letter of its side: "punch L"."""
+_HITS_NUMBERED = re.compile(r"^(\d{1,2})(hits?|x|steps?|times)$")
+"""A number with what it counts: "3hit"."""
 _SLASHED = re.compile(r"(?<!\w)w/o?(?=\s|\w)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^(?:v|tk|take|sc|shot|var|seq)?\d+[a-z]?$")
 _ANGLE = re.compile(r"^(45|90|135|180|270|360)(?:deg)?$")
@@ -54,11 +63,12 @@ _COUNTED = frozenset({"take", "shot", "clip", "scene"})
 
 def as_words(text: str) -> str:
     """Return a prompt with names of takes in it as words: "idle injured" for "idle_injured", "walk limp left" for
-    "LOCO_walk_limp_L", "with" for "w/". Any other text is returned as it is.
+    "LOCO_walk_limp_L", "with" for "w/", "punch left" for "punch L". Any other text is returned as it is.
 
     Numbers of takes, and parts that say who it is or how it is kept (`NPC`, `loop`), are left out; angles stay.
     """
     said = _SLASHED.sub(lambda found: "without " if found[0][-1] in "oO" else "with ", text)
+    said = _LETTERED.sub(lambda found: f"{found['blow']} {_ABBREVIATED[found['side'].lower()]}", said)
     said = _NAME.sub(_words_of, said)
     return text if said == text else " ".join(said.split()).lstrip(" -,:;") or text
 
@@ -68,6 +78,8 @@ def _words_of(name: re.Match[str]) -> str:
     said = [word for part, after in itertools.pairwise([*parts, ""]) if (word := _word(part, after))]
     if len(said) > 1 and said[0] in _CATEGORIES:
         said = said[1:]
+    if said and said[0] in _DEATHS:
+        said = [word for word in said if word not in _ORDERED]  # one fall
     return " ".join(_of_hit(said)) or name[0].replace("_", " ")
 
 
@@ -88,6 +100,8 @@ def _of_hit(said: list[str]) -> list[str]:
 def _pieces(piece: str) -> list[str]:
     """Return the words of a part between underscores, in lower case: "walk" and "fwd" of "WalkFwd"."""
     lowered = piece.lower()
+    if counted := _HITS_NUMBERED.match(lowered):
+        return [f"{counted[1]} {counted[2]}"]
     return [lowered] if _NUMBERED.match(lowered) else [found.lower() for found in _PARTS.findall(piece)]
 
 

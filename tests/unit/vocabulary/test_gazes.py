@@ -21,6 +21,9 @@ from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
         ("looks behind the sofa", ()),
         ("looks to the left, then to the right", ("left", "right")),
         ("looks up at the sky and then down", ("up", "down")),
+        ("look up at sky", ("up",)),
+        ("looks up at the tall tower", ("up",)),
+        ("looks up at her and down", ("up", "down")),
         ("turns her head to the right", ("right",)),
         ("looks quickly to his left", ("left",)),
         ("No: he shakes his head", ("shake",)),
@@ -70,3 +73,8 @@ def test_a_prompt_without_its_gaze(prompt: str, left: str) -> None:
 )
 def test_a_prompt_of_a_gaze_alone(prompt: str, only: bool) -> None:
     assert only_gaze(prompt) == only
+
+
+@pytest.mark.parametrize("prompt", ["look up at sky", "looks up at the old tower", "looks down at feet"])
+def test_what_the_head_faces_is_part_of_the_gaze(prompt: str) -> None:
+    assert only_gaze(prompt)

@@ -24,6 +24,11 @@ LISTS = ActionLists(("walk", "wave"))
         ("waves for three whole seconds", 3.0),
         ("waves. Length: 4 seconds.", 4.0),
         ("walks for 2 seconds, then waves for 3 seconds", 5.0),
+        ("walks and waves for five seconds", 5.0),
+        ("sits for eight seconds, back straight", 8.0),
+        ("walks for 3 seconds and waves for 2 seconds", 5.0),
+        ("walks for 6 seconds, slowly, like a zombie", 6.0),
+        ("for six seconds, a person walks and waves", 6.0),
         ("a dance from the 1980s", None),
         ("80s disco", None),
         ("after two seconds he waves", None),
@@ -37,7 +42,15 @@ def test_the_stated_length_is_that_of_the_whole_motion(prompt: str, seconds: flo
     assert stated_length(prompt) == StatedLength(seconds)
 
 
-@pytest.mark.parametrize("prompt", ["walks, then waves for 3 seconds", "he waits for a second before he jumps"])
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "walks, then waves for 3 seconds",
+        "he waits for a second before he jumps",
+        "stand still for two seconds, answer the phone and hang up",
+        "walks for two seconds, waves and sits down",
+    ],
+)
 def test_the_length_of_a_part_is_not_that_of_the_motion(prompt: str) -> None:
     assert stated_length(prompt) == StatedLength(is_partial=True)
     assert "length" in match_scope(prompt, LISTS).flags

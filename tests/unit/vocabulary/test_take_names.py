@@ -13,6 +13,10 @@ from marey.vocabulary.take_names import as_words
     [
         ("idle_injured", "idle injured"),
         ("DEATH_BACKWARD_01", "death backward"),
+        ("DEATH_knees_then_forward", "death knees forward"),
+        ("ATK_sword_combo_3hit", "attack sword combo 3 hit"),
+        ("punch L, punch R, knee R", "punch left, punch right, knee right"),
+        ("plan L", "plan L"),
         ("LOCO_walk_limp_L", "walk limp left"),
         ("ENEMY_MELEE_01 - overhead swing w/ two hands", "melee - overhead swing with two hands"),
         ("WalkFwd_Loop_v02", "walk forward"),
