@@ -141,6 +141,47 @@ _SIDEWAYS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A crouched way to a side, of which models read one ahead."""
+_SHIFTS = re.compile(
+    r"""\b(?P<shifts>shift(?:s|ing|ed)?(?:[ ](?:his|her|their|its|the))?[ ](?:body[ ]?)?weight)(?:[ ](?:a[ ])?\w+)??
+    [ ](?:from[ ](?:(?:one|the|his|her|their)[ ])?(?:(?:left|right)[ ])?(?:leg|foot|side|hip)
+    [ ]to[ ](?:(?:the|his|her|their)[ ])?(?:other|leg|foot|side|hip|left|right)(?:[ ](?:leg|foot|one|side|hip))?
+    |between[ ](?:(?:the|his|her|their|both|two)[ ]){0,2}(?:legs|feet))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body at rest whose weight goes to and fro between its feet, of which models read a balance on one leg."""
+_HURDLE = re.compile(
+    r"""\b(?P<thing>hurdle|fence|obstacle|barrier|puddle|gap|ditch|box|log|wall)(?:[ ]|-)
+    (?P<jump>jump(?:s|ing)?|leap(?:s|ing)?)\b""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A jump that is named by what it clears: "hurdle jump"."""
+_ROLLS_OVER = re.compile(
+    r"""\b(?:(?P<s>rolls|turns)|(?P<ing>rolling|turning)|roll|turn)(?:[ ]\w+ly)?(?:[ ](?:over|back|around))?
+    (?:[ ]\w+ly)?[ ](?:(?:on|onto|on[ ]to|to)[ ](?P<where>(?:his|her|their|its|the|one)[ ](?:(?:left|right|other)[ ])?
+    (?:back|stomach|belly|side|front|face))|(?=in[ ](?:(?:his|her|their|the|a)[ ])?(?:bed|sleep)))\b
+    (?![ ]of\b)(?![ ](?:to|and)[ ](?:his|her|their|its|the)[ ](?:feet|knees))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that lies and turns over, of which models read a dive roll; "turns to the side" is said of others."""
+_LYING = re.compile(r"\b(?:l(?:ies|ie|ying|ay)|asleep|sleep\w*|bed|prone|supine|floor|ground|over)\b", re.IGNORECASE)
+_OVER_KNEES = re.compile(
+    r"""\b(?:falls?|drops?|sinks?|collapses?|goes|crumples?|slumps?)(?:[ ]\w+ly)?(?:[ ]down)?[ ](?:to|on|onto)
+    [ ](?:(?:his|her|their|its|the|both)[ ])?knees?(?:,?[ ]and[ ]then|,?[ ]then|,?[ ]and|,|[ ]before)
+    [ ](?:(?:he|she)[ ])?(?:\w+ly[ ])?
+    (?:falls?|falling|collaps(?:es?|ing)|toppl(?:es?|ing)|slump(?:s|ing)?|keel(?:s|ing)?|drops?|dropping|pitch(?:es|ing)?
+    |di(?:es?)|dying|fall)\b(?![ ]asleep|[ ](?:to|on|onto)[ ](?:his|her|their|its|the)[ ](?:hands|elbows))
+    (?P<how>(?:[ ](?:over|down|dead|face[ -]?(?:first|down)|lifeless|onto|on|to|the|his|her|floor|ground|face|side|front
+    |stomach|chest))*)(?P<way>[ ](?:forwards?|sideways|backwards?))?(?P<dead>[ ]dead)?""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A fall over the knees, which is one movement."""
+_KNEE = re.compile(
+    r"(?P<joint>^|[,;+&]\s*|\b(?:and|then)\s+)(?:(?P<before>left|right) knee|knee (?P<side>left|right))"
+    r"(?: strike)?(?=$|[.,;+&]| (?:and|then)\b)",
+    re.IGNORECASE,
+)
+_BLOWS = re.compile(r"\b(?:punch|jab|hook|cross|uppercut|elbow|kick|strike)(?:e?s)?\b", re.IGNORECASE)
+"""A blow with the knee in a list of blows, of which models read who kneels."""
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -163,6 +204,24 @@ OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
 """Words of other actions than that which prompts with them are read as: "rolls up his sleeves", "almost falls"."""
 
 
+_LUNGES = re.compile(
+    r"""\A(?!.*\b(?:swords?|blades?|rapiers?|sabres?|sabers?|foil|[ée]p[ée]e|spears?|lances?|kni(?:fe|ves)|daggers?|pikes?
+    |staff|stick|bayonets?|polearm|katana|weapons?|fenc\w*|duel\w*|stab\w*|thrust\w*|attack\w*|strik\w*|enem\w+
+    |opponent|foe|parr\w+|atk|punch\w*|knights?|swords\w+|samurai|warriors?
+    |gladiators?|spearm[ae]n|assassins?|musketeers?|soldiers?)\b)
+    (?!.*\blung\w+[ ](?:\w+ly[ ])?(?:forwards?|ahead|at|towards?|for|out|in)\b)
+    .*\blung(?:es?|ing|ed)\b""",
+    re.IGNORECASE | re.VERBOSE | re.DOTALL,
+)
+EXERCISE = "squat"
+"""Action of the knees that bend and stretch, as they do in a lunge."""
+
+
+def lunges_as_exercise(prompt: str) -> bool:
+    """Return True if a prompt has a body lunge, and names neither a weapon nor whom it attacks."""
+    return _LUNGES.match(prompt) is not None
+
+
 def has_other_sense(action: str | None, prompt: str) -> bool:
     """Return True if a prompt that is read as an action says one of its words in another sense."""
     words = None if action is None else OTHER_SENSE.get(action)
@@ -176,7 +235,8 @@ def without_misleading(prompt: str) -> str:
     a climb. Who "walks back to his car" or "turns around and walks back" walks ahead, who "paces back and forth" turns
     on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
-    A guard that does something else than to guard is a person.
+    A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
+    leg to leg stands, and who falls over the knees falls once.
     """
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
@@ -187,6 +247,8 @@ def without_misleading(prompt: str) -> str:
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
+    text = _OVER_KNEES.sub(_falls_over_knees, _ROLLS_OVER.sub(_lies, text))
+    text = _SHIFTS.sub(r"\g<shifts>", _HURDLE.sub(_jumps_over, _KNEE.sub(_knee_strike, text)))
     return _HIT_LEG.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
 
 
@@ -195,6 +257,8 @@ def _as_person(found: re.Match[str]) -> str:
     does, verb = found["does"], found["verb"].lower()
     named = named_actions(f"a person{does}")
     if not named or _JOINED.search(does) or (verb != STANDING and not named_actions(f"a person {verb}")):
+        return found[0]
+    if lunges_as_exercise(does) and not lunges_as_exercise(found[0]):
         return found[0]
     if named & named_actions(found["doer"]) or (named == {STANDING} and _PREPARED.search(does)):
         return found[0]
@@ -237,6 +301,33 @@ def _strikes_back(found: re.Match[str]) -> str:
         said = "" if found.string[found.end() :].startswith(" with ") else " with the sword"
         return f"slash{'es' if end == 's' else end}{said}"
     return f"throw{end} a punch"
+
+
+def _lies(found: re.Match[str]) -> str:
+    """Return a body that lies on another side."""
+    if found[0].lower().startswith("turn") and not _LYING.search(found.string):
+        return found[0]
+    lies = "lying" if found["ing"] else "lies" if found["s"] else "lie"
+    return f"{lies} on {found['where']}" if found["where"] else f"{lies} "
+
+
+def _falls_over_knees(found: re.Match[str]) -> str:
+    """Return a fall in which the knees come down first."""
+    side = "sideways" if "side" in found["how"] else ""
+    return f"falls dead over the knees {(found['way'] or '').strip() or side or 'forward'}"
+
+
+def _jumps_over(found: re.Match[str]) -> str:
+    """Return a jump over the thing that its name says."""
+    article = "an" if found["thing"][0].lower() in "aeiou" else "a"
+    return f"{found['jump']} forward over {article} {found['thing']}"
+
+
+def _knee_strike(found: re.Match[str]) -> str:
+    """Return a blow with the knee as a kick, if other blows are named beside it."""
+    if not _BLOWS.search(found.string):
+        return found[0]
+    return f"{found['joint']}kick with the {found['before'] or found['side']} knee"
 
 
 def _hit(found: re.Match[str]) -> str:

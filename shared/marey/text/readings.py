@@ -17,19 +17,22 @@ from marey.text.action_reader import (
     named_actions,
 )
 from marey.text.encoders import Encoding
-from marey.text.misleading_words import has_other_sense
+from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
 from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_a_stop, way_to_rest
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
+from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.scope import STANDING
 
 SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
 UNSPLIT = 0.35
 """Probability from which on a prompt that is no sequence asks for one action."""
+ATTACK = "stab"
+"""Action that "lunges" is read as."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel", "laugh"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
@@ -143,12 +146,14 @@ class TrainedReaders:
     def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
         """Return the movements of the parts of a prompt, some of which are gestures.
 
-        Those of a body that sits or stands are made in the same movement. Parts that ask for no action are left out.
+        Those of a body that sits or stands are made in the same movement, unless its part has a length
+        of its own. Parts that ask for no action are left out.
         """
         found: list[ReadMovement] = []
         for part in parts:
             bare = BarePrompt.of(part)
-            if found and found[-1].action in STAYING and not without_gaze(bare.text):
+            stays = found and found[-1].action in STAYING and stated_length(found[-1].text).seconds is None
+            if stays and not without_gaze(bare.text):
                 found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
                 continue
             if not without_gaze(bare.text):
@@ -165,7 +170,11 @@ class TrainedReaders:
         if text not in self._actions:
             acts = text if joins_clauses(text) else without_gaze(text) or text
             read = action_reader().read(acts, self._pooled([acts])[0])
-            self._actions[text] = ReadAction(OUTSIDE, 1.0, read.least) if has_other_sense(read.action, text) else read
+            if has_other_sense(read.action, text):
+                read = ReadAction(OUTSIDE, 1.0, read.least)
+            elif read.name in (ATTACK, OUTSIDE) and lunges_as_exercise(text):
+                read = ReadAction(EXERCISE, SURELY_AGREED, AGREED)
+            self._actions[text] = read
         return self._actions[text]
 
     def _read_bare(self, bare: BarePrompt) -> ReadAction:

@@ -30,6 +30,13 @@ def reading() -> TextPipeline:
         ("a man carries a heavy box to the door", "a person walks forward, a man walks to the door"),
         ("a person walks with a load", "a person walks with a load"),
         ("does three burpees", STANDS),
+        ("leans against the wall with folded arms", STANDS),
+        ("leans on a railing", STANDS),
+        ("wades through the river", "a person walks forward, a person walks"),
+        ("look up at sky", STANDS),
+        ("rubs the back of the neck", STANDS),
+        ("does five lunges", "a person does squats, a person does five lunges"),
+        ("the fencer lunges", "a person stabs, the fencer lunges"),
         ("guard waits", STANDS),
         ("EMOTE_facepalm", STANDS),
         ("CROUCH_walk_bwd", "a person walks backward, walk backward"),
@@ -52,6 +59,19 @@ def test_the_model_reads_what_is_not_drawn(reading: TextPipeline, prompt: str, r
                 ("an old man walks to a bench", "a person walks forward, a man walks"),
                 ("sits down", "a person sits down"),
             ],
+        ),
+        (
+            "stand still for two seconds, answer the phone with the right hand, nod twice, and hang up",
+            [
+                ("stand still for two seconds", None),
+                ("answer the phone with the right hand", STANDS),
+                ("nod twice", None),
+                ("hang up", STANDS),
+            ],
+        ),
+        (
+            "a person leans against a wall, then walks away",
+            [("a person leans against a wall", STANDS), ("walks away", None)],
         ),
         ("a person walks forward and salutes", [("a person walks forward", None), ("salutes", STANDS)]),
         ("a man sits down and yawns", []),  # on the chair, in the same movement

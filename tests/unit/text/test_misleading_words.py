@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from marey.text.misleading_words import has_other_sense, without_misleading
+from marey.text.misleading_words import has_other_sense, lunges_as_exercise, without_misleading
 
 
 @pytest.mark.parametrize(
@@ -230,3 +230,71 @@ def test_who_sits_cross_legged_sits_on_the_floor(prompt: str, read: str) -> None
 )
 def test_who_sneaks_to_a_side_goes_sideways(prompt: str, read: str) -> None:
     assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("shifts his weight from one leg to the other", "shifts his weight"),
+        ("shifting weight between both feet", "shifting weight"),
+        ("shifts the weight onto the left leg", "shifts the weight onto the left leg"),
+        ("hurdle jump", "jump forward over a hurdle"),
+        ("jumps over a hurdle", "jumps over a hurdle"),
+    ],
+)
+def test_shifted_weight_is_rest_and_a_thing_before_a_jump_is_jumped_over(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("a person rolls over onto his stomach", "a person lies on his stomach"),
+        ("lies in bed and turns onto her left side", "lies in bed and lies on her left side"),
+        ("turns to the side", "turns to the side"),
+        ("walks on and turns onto his left side", "walks on and turns onto his left side"),
+        ("rolls over his shoulder", "rolls over his shoulder"),
+    ],
+)
+def test_who_lies_and_rolls_over_lies(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("drops to the knees, then falls forward dead", "falls dead over the knees forward"),
+        ("sinks to his knees and then falls on his side", "falls dead over the knees sideways"),
+        ("falls to his knees and weeps", "falls to his knees and weeps"),
+        ("drops to his knees and falls asleep", "drops to his knees and falls asleep"),
+    ],
+)
+def test_a_fall_over_the_knees_is_one(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("punch left, punch right, knee right", "punch left, punch right, kick with the right knee"),
+        ("jab, cross, then left knee", "jab, cross, then kick with the left knee"),
+        ("hand up, knee right", "hand up, knee right"),
+    ],
+)
+def test_a_knee_in_a_list_of_blows_is_one_of_them(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "exercise"),
+    [
+        ("does five lunges", True),
+        ("a person lunges", True),
+        ("lunges with a sword", False),
+        ("lunges at him", False),
+        ("the knight lunges", False),
+        ("a person squats", False),
+    ],
+)
+def test_who_lunges_without_a_weapon_exercises(prompt: str, exercise: bool) -> None:
+    assert lunges_as_exercise(prompt) is exercise
