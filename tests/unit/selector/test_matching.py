@@ -11,6 +11,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.resample import frame_times, interpolate
 from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion, WantedAction, match, wanted_of
+from marey.selector.matching import side_of
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.bodies import FPS, Array, Body, bower, raiser, runner, steady, walker, waver
 
@@ -222,3 +223,15 @@ def test_the_turn_of_a_jump_is_part_of_it() -> None:
     two = wanted_of(["a person turns around", "he jumps and turns in the air"])
     assert two is not None
     assert len(two) == 2
+
+
+@pytest.mark.parametrize(
+    ("sentence", "side"),
+    [
+        ("hops on his right foot because the left one hurts", "right"),
+        ("hops on the left leg to spare the right", "left"),
+        ("hops on the left foot, then on the right", ""),
+    ],
+)
+def test_a_side_in_a_reason_is_not_the_side_of_the_movement(sentence: str, side: str) -> None:
+    assert side_of(sentence) == side

@@ -84,6 +84,8 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
     return motion.changes if isinstance(motion, AskedMotion) else {}
 
 
+COUNTABLE = frozenset({*REPETITIONS, *AGAIN, *(COUNTED.keys() - FINE.keys())})
+"""Actions that are done as often as a prompt asks: their number is found in a motion, or they are drawn so often."""
 ALIKE = frozenset({"idle", "nod", "flinch"})
 """Actions that networks make nearly alike from every seed: every other motion is the mirror image."""
 
@@ -125,8 +127,7 @@ class _Wish:
         prompt, gaze = text.said, stated_gaze(text.said)
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
-        counted = action in REPETITIONS or action in AGAIN or action in COUNTED
-        count = stated_count(prompt, action) if counted else None
+        count = stated_count(prompt, action) if action in COUNTABLE else None
         if action == "spin":
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)

@@ -31,6 +31,10 @@ SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
+_REASON = re.compile(
+    r"\b(?:because|since (?:the|his|her|its|their)|due to|so as|to (?:spare|protect|rest) )\b.*", re.DOTALL
+)
+"""Words of why something is done, which may name the other side."""
 _LETTER = re.compile(r"\b([lr])[ -](?:hand|arm|fist|palm|elbow|leg|foot|knee)\b")
 
 
@@ -139,8 +143,9 @@ def _degrees(sentence: str, action: str) -> float | None:
 
 
 def side_of(sentence: str) -> str:
-    """Return the side that a sentence names (`left`, `right`, `both`); empty if it names none, or several."""
-    text = sentence.lower()
+    """Return the side that a sentence names (`left`, `right`, `both`); empty if it names none, or several. A reason
+    says nothing of it: "hops on the right foot because the left one hurts"."""
+    text = _REASON.sub("", sentence.lower())
     sides = {_SIDES[word] for word in _WORDS.findall(text) if word in _SIDES}
     sides |= {{"l": "left", "r": "right"}[match[1]] for match in _LETTER.finditer(text)}
     return sides.pop() if len(sides) == 1 else ""
