@@ -116,6 +116,7 @@ class Bearing:
     tilt: float = 0.0
     shrug: float = 0.0
     sink: float = 0.0
+    back: float = 0.0
     swing: float = 1.0
     roll: float = 0.0
     roll_hz: float = 0.0

@@ -458,3 +458,15 @@ def test_gestures_are_in_the_order_of_the_prompt() -> None:
     for prompt in ("yawns and scratches his head", "scratches his head and yawns"):
         names = [each.name for each in fitting(stated_bearings(prompt), "idle")]
         assert names == (["yawn", "head-scratch"] if prompt.startswith("yawns") else ["head-scratch", "yawn"])
+
+
+def test_who_leans_on_a_wall_has_the_feet_ahead_of_hips_and_head() -> None:
+    joints = drawn(standing(), StatedBearing("wall-lean"))
+    ankles = joints[40, [7, 8], 2].mean()
+    assert ankles - joints[40, PELVIS, 2] > 0.12
+    assert ankles - joints[40, HEAD, 2] > 0.12
+    assert np.ptp(joints[:, TOES, 2]) < 0.02
+
+
+def test_a_phone_stays_at_the_ear_of_who_nods() -> None:
+    assert StatedBearing("phone-call").shown_in("nod") == "body"

@@ -293,8 +293,8 @@ class _Drawing:
         bearing, body = self._bearing, self._body
         way, legs = self._ways.trunk * self._size, self._ways.legs * self._size
         keys = bearing.keys or Keys(times=(0.0,))
-        if bearing.sink or keys.sink:
-            body.shift(-(bearing.sink + self._keyed(keys.sink)) * legs)
+        if bearing.sink or keys.sink or bearing.back:
+            body.shift(-(bearing.sink + self._keyed(keys.sink)) * legs, -bearing.back * legs)
         if bearing.trunk or keys.trunk:
             trunk = bearing.trunk + self._keyed(keys.trunk)
             body.bow(trunk * legs, arms_hang=0.85, head=0.0)
