@@ -156,7 +156,8 @@ _HURDLE = re.compile(
 )
 """A jump that is named by what it clears: "hurdle jump"."""
 _ROLLS_OVER = re.compile(
-    r"""\b(?:(?P<s>rolls|turns)|(?P<ing>rolling|turning)|roll|turn)(?:[ ]\w+ly)?(?:[ ](?:over|back|around))?
+    r"""(?<!barrel[ ])(?<!forward[ ])(?<!shoulder[ ])(?<!log[ ])
+    \b(?:(?P<s>rolls|turns)|(?P<ing>rolling|turning)|roll|turn)(?:[ ]\w+ly)?(?:[ ](?:over|back|around))?
     (?:[ ]\w+ly)?[ ](?:(?:on|onto|on[ ]to|to)[ ](?P<where>(?:his|her|their|its|the|one)[ ](?:(?:left|right|other)[ ])?
     (?:back|stomach|belly|side|front|face))|(?=in[ ](?:(?:his|her|their|the|a)[ ])?(?:bed|sleep)))\b
     (?![ ]of\b)(?![ ](?:to|and)[ ](?:his|her|their|its|the)[ ](?:feet|knees))""",

@@ -188,4 +188,10 @@ class TrainedReaders:
         if action is None and (way := way_to_a_stop(bare.prompt)) and (ends := self._read_action(way).action) in WAYS:
             action = ends  # "sprints forward then stops suddenly"
         encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
-        return sequence_reader().read(bare, encoding, self._pooled, action)
+        movements = sequence_reader().read(bare, encoding, self._pooled, action)
+        if not lunges_as_exercise(bare.prompt):
+            return movements
+        return tuple(
+            replace(each, action=EXERCISE) if each.action == ATTACK and lunges_as_exercise(each.text) else each
+            for each in movements
+        )

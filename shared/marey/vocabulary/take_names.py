@@ -54,6 +54,7 @@ _LETTERED = re.compile(rf"\b(?P<blow>{_STRIKES})[ ](?P<side>[lr])\b(?!['’])", 
 """A blow with the letter of its side: "punch L"."""
 _HITS_NUMBERED = re.compile(r"^(\d{1,2})(hits?|x|steps?|times)$")
 """A number with what it counts: "3hit"."""
+_TIMES = re.compile(r"^x\d{1,2}$")
 _SLASHED = re.compile(r"(?<!\w)w/o?(?=\s|\w)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^(?:v|tk|take|sc|shot|var|seq)?\d+[a-z]?$")
 _ANGLE = re.compile(r"^(45|90|135|180|270|360)(?:deg)?$")
@@ -100,6 +101,8 @@ def _of_hit(said: list[str]) -> list[str]:
 def _pieces(piece: str) -> list[str]:
     """Return the words of a part between underscores, in lower case: "walk" and "fwd" of "WalkFwd"."""
     lowered = piece.lower()
+    if _TIMES.match(lowered):
+        return [lowered]
     if counted := _HITS_NUMBERED.match(lowered):
         return [f"{counted[1]} {counted[2]}"]
     return [lowered] if _NUMBERED.match(lowered) else [found.lower() for found in _PARTS.findall(piece)]

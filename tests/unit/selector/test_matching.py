@@ -229,6 +229,7 @@ def test_the_turn_of_a_jump_is_part_of_it() -> None:
     ("sentence", "side"),
     [
         ("hops on his right foot because the left one hurts", "right"),
+        ("hops on the left foot as the right one is hurt", "left"),
         ("hops on the left leg to spare the right", "left"),
         ("hops on the left foot, then on the right", ""),
     ],

@@ -254,6 +254,7 @@ def test_shifted_weight_is_rest_and_a_thing_before_a_jump_is_jumped_over(prompt:
         ("turns to the side", "turns to the side"),
         ("walks on and turns onto his left side", "walks on and turns onto his left side"),
         ("rolls over his shoulder", "rolls over his shoulder"),
+        ("a barrel roll onto his back", "a barrel roll onto his back"),
     ],
 )
 def test_who_lies_and_rolls_over_lies(prompt: str, read: str) -> None:

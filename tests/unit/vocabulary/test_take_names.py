@@ -17,6 +17,7 @@ from marey.vocabulary.take_names import as_words
         ("ATK_sword_combo_3hit", "attack sword combo 3 hit"),
         ("punch L, punch R, knee R", "punch left, punch right, knee right"),
         ("plan L", "plan L"),
+        ("ATK_kick_x3", "attack kick x3"),
         ("LOCO_walk_limp_L", "walk limp left"),
         ("ENEMY_MELEE_01 - overhead swing w/ two hands", "melee - overhead swing with two hands"),
         ("WalkFwd_Loop_v02", "walk forward"),

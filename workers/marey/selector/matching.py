@@ -32,7 +32,9 @@ SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
 _REASON = re.compile(
-    r"\b(?:because|since (?:the|his|her|its|their)|due to|so as|to (?:spare|protect|rest) )\b.*", re.DOTALL
+    r"\b(?:because|since (?:the|his|her|its|their)|as (?:the|his|her|its|their) (?:left|right|other)"
+    r"|due to|so as|to (?:spare|protect|rest) )\b.*",
+    re.DOTALL,
 )
 """Words of why something is done, which may name the other side."""
 _LETTER = re.compile(r"\b([lr])[ -](?:hand|arm|fist|palm|elbow|leg|foot|knee)\b")
