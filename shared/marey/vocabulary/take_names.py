@@ -45,8 +45,9 @@ _STRUCK_PARTS = frozenset(
     "head face chest stomach belly gut torso shoulder arm leg knee back side".split()  # noqa: SIM905
 )
 """Parts of the body that are hit."""
-_DEATHS = frozenset({"death", "die", "dies", "dying", "dead"})
-"""First parts of takes of who dies."""
+_DEATHS = frozenset({"death", "deaths", "die", "dies", "dying", "dead"})
+"""First parts of takes of who dies; what such a body did before is no movement behind it: "DEATH_walk_forward"."""
+_WAYS = frozenset("walk walking run running sprint sprinting jog jogging".split())  # noqa: SIM905
 _ORDERED = frozenset({"then", "and", "to"})
 """Parts between those of one fall: "DEATH_knees_then_forward"."""
 _STRIKES = "punch(?:es)?|jabs?|hooks?|cross|uppercuts?|elbows?|knees?|kicks?|roundhouse|blocks?|slash(?:es)?|stabs?"
@@ -80,7 +81,7 @@ def _words_of(name: re.Match[str]) -> str:
     if len(said) > 1 and said[0] in _CATEGORIES:
         said = said[1:]
     if said and said[0] in _DEATHS:
-        said = [word for word in said if word not in _ORDERED]  # one fall
+        said = [word for word in said if word not in _ORDERED | _WAYS]  # one fall
     return " ".join(_of_hit(said)) or name[0].replace("_", " ")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, PRONE, SEAT, SLIDE, UPRIGHT
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.posture import NO_POSTURE, RowPosture
@@ -13,7 +13,8 @@ from marey.generation.postured import LONGEST_S, drawn_posture, gestures_s, on_p
 from marey.motion.features import HUMANML3D_263, encode_all
 
 LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
-LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, CROUCH: 0.52, BACK: 0.125, FRONT: 0.125}
+LIES = dict.fromkeys((BACK, FRONT, PRONE), 0.125)
+LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, CROUCH: 0.52, **LIES}
 STANDS_M, NEAR_M = 0.93, 0.15
 
 
@@ -72,7 +73,7 @@ def test_a_length_that_is_fixed_is_kept(frames: int) -> None:
         assert len(joints) == frames
 
 
-@pytest.mark.parametrize("own", [own for own in LOW if own != FRONT])
+@pytest.mark.parametrize("own", [own for own in LOW if own not in (FRONT, PRONE)])
 @pytest.mark.parametrize("action", ["clap", "aim", "raise-arm", "drink"])
 def test_a_gesture_is_done_in_the_posture(own: str, action: str) -> None:
     whole = drawn_whole(LAYOUT, action, FineWish(beside=("sits down", "")), 5, None)
@@ -118,3 +119,14 @@ def test_a_wave_that_goes_on_and_on_is_cut() -> None:
     assert raised.max() > 0.1
     assert raised[0] < -0.4
     assert raised[-1] < -0.4
+
+
+def test_a_gun_is_aimed_ahead_on_the_elbows_and_shots_drive_it_back() -> None:
+    aims, fires = (joints_of(RowPosture(FRONT, PRONE, PRONE, fires=fires, seed=1)) for fires in (False, True))
+    for joints in (aims, fires):
+        assert (joints[-1, [20, 21], 2] > joints[-1, 15, 2] - 0.05).all()
+        assert joints[-1, 15, 1] > 0.3, "the head is up"
+        assert joints[-1, [18, 19], 1].max() < 0.15
+    ahead = [float(np.diff(joints[-30:, 21, 2]).min()) for joints in (aims, fires)]
+    assert ahead[0] > -0.005
+    assert ahead[1] < -0.015

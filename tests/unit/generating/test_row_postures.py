@@ -107,3 +107,18 @@ def test_who_crawled_lies_there() -> None:
     assert crawl == RowPosture(seed=1)
     assert (lie.begin, lie.own, lie.end, lie.meets) == ("front", "front", "front", False)
     assert rises.meets
+
+
+@pytest.mark.parametrize(("action", "said", "fires"), [("aim", "takes aim", False), ("shoot", "shoots", True)])
+@pytest.mark.parametrize("lies", [("lie-down", "lies down on his belly"), ("lie", "lies prone")])
+def test_who_lies_on_the_front_aims_from_there(action: str, said: str, *, fires: bool, lies: tuple[str, str]) -> None:
+    _, aims, rises = row_postures([lies, (action, said), ("get-up", "gets up")], 1)
+    assert (aims.begin, aims.own, aims.end, aims.is_drawn, aims.fires) == ("front", "prone", "prone", True, fires)
+    assert (rises.begin, rises.own) == ("prone", "")
+
+
+def test_who_crawled_on_the_belly_aims_from_there() -> None:
+    _, aims = row_postures([("crawl", "crawls on his belly"), ("aim", "takes aim")], 1)
+    assert (aims.begin, aims.own, aims.apart) == ("prone", "prone", True)
+    assert postures(("crawl", "crawls on hands and knees"), ("aim", "takes aim"))[1] == ("", "", "")
+    assert postures(("lie-down", "lies down"), ("aim", "takes aim"))[1] == ("", "", "")

@@ -220,3 +220,28 @@ def test_who_stands_beside_other_movements_waits_for_no_longer_than_a_moment(gen
         request = resolve_request(generator, Request(sequence_of(generator, *said), seed))
         assert request.timeline is not None
         assert request.timeline[1].end - request.timeline[1].start <= WAITS_S + 0.01
+
+
+@pytest.mark.parametrize("said", ["stops", "he freezes", "halts suddenly", "stops at the top", "comes to a halt"])
+def test_who_only_stops_goes_on_after_a_second(drawing: Any, said: str) -> None:
+    text = sequence_of(drawing, ("walk", "he walks"), ("idle", said), ("walk", "walks on"))
+    request = resolve_request(drawing, Request(text, 3))
+    (made,) = generate_any(drawing, [request])
+    assert isinstance(made, TimelineMotion)
+    assert made.timeline[1].end - made.timeline[1].start <= 1.3
+
+
+@pytest.mark.parametrize(
+    ("rows", "left"),
+    [
+        ([("die", "falls down dead"), ("idle", "waits"), ("walk", "walks off")], 2),
+        ([("die", "falls down dead"), ("get-up", "gets up"), ("walk", "walks off")], 3),
+        ([("die", "dies"), ("walk", "walks off as a ghost")], 2),
+        ([("die", "falls down"), ("walk", "walks off")], 2),
+        ([("walk", "walks up"), ("die", "dies"), ("walk", "walks off")], 2),
+    ],
+)
+def test_the_dead_do_not_walk(generator: Any, rows: list[tuple[str, str]], left: int) -> None:
+    request = resolve_request(generator, Request(sequence_of(generator, *rows), 3))
+    assert request.timeline is not None
+    assert [row.text.said for row in request.timeline] == [said for _, said in rows[:left]]

@@ -19,6 +19,8 @@ from marey.vocabulary.take_names import as_words
         ("plan L", "plan L"),
         ("ATK_kick_x3", "attack kick x3"),
         ("LOCO_walk_limp_L", "walk limp left"),
+        ("DEATH_walk_forward", "death forward"),
+        ("DEATH_headshot_run_back", "death headshot back"),
         ("ENEMY_MELEE_01 - overhead swing w/ two hands", "melee - overhead swing with two hands"),
         ("WalkFwd_Loop_v02", "walk forward"),
         ("Turn180_R", "turn 180 degrees right"),

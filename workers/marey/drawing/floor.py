@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from marey.drawing.crawls import on_fours
 from marey.drawing.gesture import SIDES, Gesture
-from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
+from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture, mirrored
 from marey.drawing.sequels import FLOOR_PACES, Sequel, Step, both
 from marey.posing.standing import LEFT, RIGHT
 
@@ -170,6 +170,8 @@ _RESTS = {
 }
 _ASIDE = HandPlace((0.4, 0.16, 0.03), "trunk", (0.8, -0.2, -0.4))
 """Hands of a body on its front go past here on their way between the floor beside the chest and their rest."""
+_LEFT_HANDED = 0.15
+"""Probability of a gun at the left shoulder."""
 _PILLOW = HandPlace((0.05, 0.2, 0.03), "trunk", (1.0, 0.3, 0.1))
 
 
@@ -282,6 +284,27 @@ def lying_front(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[St
     pressed = replace(lying, hands=way[0][1].hands, neck=(-14, 0, 0))
     up = (0.45 * pace, aside), (0.4 * pace, pressed), (0.8 * pace, way[2][1]), way[1], (0.7 * pace, _HALF_KNEEL)
     return lying, down, (*up, (0.7 * pace, STAND))
+
+
+def aiming_prone(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the front with the chest raised on the elbows and both hands at a gun ahead, the steps to it
+    from one flat on the front whose hands are beside the chest, and those back; these go over that one."""
+    pace, look = rng.uniform(0.9, 1.1), rng.uniform(-36, -30)
+    trigger = HandPlace((-0.06, -0.03, 0.22), "shoulder", (0.7, -1.0, 0.1))
+    barrel = HandPlace((-0.2, -0.05, 0.42), "shoulder", (0.2, -1.0, 0.1))
+    lying = _lying(rng, 0.06, "lie-front")
+    feet = {side: FootPlace((rng.uniform(0.2, 0.26), 0.1, -0.78), (0.4, -0.45, -0.8)) for side in SIDES}
+    low = replace(
+        lying,
+        tilt=(_PRONE - 2.0, 0, 0),
+        spine=(-rng.uniform(26, 30), 0, 0),
+        neck=(look, 0, 0),
+        hands={RIGHT: trigger, LEFT: barrel},
+        feet=feet,
+    )
+    if rng.random() < _LEFT_HANDED:
+        low = mirrored(low)
+    return low, ((0.7 * pace, low),), ()
 
 
 def get_up(rng: random.Random, form: str = "") -> Gesture:

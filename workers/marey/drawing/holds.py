@@ -11,18 +11,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from marey.drawing.crouches import crouched
-from marey.drawing.floor import lying_back, lying_front, rising_from_seat, seated_on_floor, slid
+from marey.drawing.floor import aiming_prone, lying_back, lying_front, rising_from_seat, seated_on_floor, slid
 from marey.drawing.kneels import kneeling
 from marey.drawing.postures import STAND, Posture
 from marey.drawing.seats import seated_on_seat
 from marey.drawing.sequels import Sequel, Step
 
 SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
-CROUCH, BACK, FRONT, SLIDE = "crouch", "back", "front", "slide"
+CROUCH, BACK, FRONT, PRONE, SLIDE = "crouch", "back", "front", "prone", "slide"
 """Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
-on one; crouched; on the back, and on the front; on the seat behind the feet, after a slide."""
+on one; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on the seat behind the
+feet, after a slide."""
 SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE})
-LYING = frozenset({BACK, FRONT})
+LYING = frozenset({BACK, FRONT, PRONE})
 BEGINS_S, STANDS_S = 0.3, 0.5
 """Seconds in which a body waits before it moves, in a posture and standing."""
 SLIDES_M, SLIDES_S = 2.4, 1.2
@@ -62,8 +63,9 @@ def passing(begin: str, own: str, end: str, seconds: float, seed: str) -> Sequel
         seed: decides the postures.
     """
     holds = {name: hold_named(name, random.Random(f"{seed} {name}")) for name in (begin, own, end) if name}  # noqa: S311
-    if LYING & set(holds) and UPRIGHT not in holds:
-        holds[UPRIGHT] = hold_named(UPRIGHT, random.Random(f"{seed} {UPRIGHT}"))  # noqa: S311
+    between = [UPRIGHT] if LYING & set(holds) else []
+    for name in (*between, *([FRONT] if PRONE in holds else [])):
+        holds.setdefault(name, hold_named(name, random.Random(f"{seed} {name}")))  # noqa: S311
     waits = BEGINS_S if begin else STANDS_S
     done = Sequel([waits if begin != own != SLIDE else 0.0], [holds[begin].low if begin else STAND])
     for step in _way(holds, begin, own):
@@ -79,6 +81,11 @@ def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
     """Return the steps from a posture to another."""
     if begin == end:
         return ()
+    if end == PRONE:
+        return (*_way(holds, begin, FRONT), holds[FRONT].up[0], *holds[PRONE].down)
+    if begin == PRONE:
+        beside = holds[FRONT].up[0]
+        return (beside, *(_way(holds, FRONT, end)[1:] if end != FRONT else ((PASSES_S, holds[FRONT].low),)))
     if not begin:
         return holds[end].down
     if not end:
@@ -124,5 +131,6 @@ _HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], 
     CROUCH: _crouched,
     BACK: lying_back,
     FRONT: lying_front,
+    PRONE: aiming_prone,
     SLIDE: slid,
 }

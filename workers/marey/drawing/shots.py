@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,8 @@ from numpy.typing import NDArray
 from marey.drawing.aims import GUNS, TWISTS
 from marey.drawing.gesture import BOTH, SIDES, Gesture
 from marey.drawing.parts import GesturePace, respond
+from marey.drawing.postures import Posture
+from marey.drawing.sequels import Sequel
 from marey.drawing.stances import settle, step
 from marey.posing.limbs import FPS
 from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, stations
@@ -146,3 +150,39 @@ def _pumps(frames: int, times: list[float], fall: float) -> Array:
         keys = (0.0, at + 0.5 * fall, at + 0.5 * fall + 0.25, at + 0.5 * fall + 0.5)
         drawn = np.maximum(drawn, stations(frames, keys, ((0.0,), (0.0,), (1.0,), (0.0,))))
     return drawn
+
+
+_PRONE_KICK, _PRONE_RISE = 0.06, 0.03
+"""Metres by which a shot drives the hands of a body on its elbows back and up."""
+_AIMS_S, _FALLS_S = 0.6, 0.35
+"""Seconds before the first of its shots and after the last, and in which the hands come back."""
+
+
+def prone_shots(done: Sequel, seconds: float, rng: random.Random) -> Sequel:
+    """Return the postures of a body that aims on its front, with the recoil of shots while the longest of them is held.
+
+    Args:
+        done: with the posture that is held.
+        seconds: that it is held.
+        rng: decides when the shots go off.
+    """
+    held = next(k for k, pair in enumerate(pairwise(done.postures)) if pair[0] is pair[1])
+    posture, end = done.postures[held], done.times[held] + seconds
+    shots = Sequel(done.times[: held + 1], done.postures[: held + 1])
+    shots.then(_AIMS_S, posture)
+    while shots.times[-1] + _FALLS_S + 0.1 < end - _AIMS_S or len(shots.times) == held + 2:
+        shots.then(_KICK, _kicked(posture))
+        shots.then(_FALLS_S, posture, rng.uniform(0.1, 0.3))
+    late = shots.times[-1] - end if shots.times[-1] > end else 0.0
+    times = [*shots.times, *(time + late for time in done.times[held + 1 :])]
+    return Sequel(times, [*shots.postures, *done.postures[held + 1 :]])
+
+
+def _kicked(posture: Posture) -> Posture:
+    """Return a posture with the hands driven back."""
+    hands = {
+        side: replace(hand, at=(hand.at[0], hand.at[1] + _PRONE_RISE, hand.at[2] - _PRONE_KICK))
+        for side, hand in posture.hands.items()
+    }
+    pitch, roll, yaw = posture.spine
+    return replace(posture, hands=hands, spine=(pitch - 2.0, roll, yaw))

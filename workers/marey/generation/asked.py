@@ -50,6 +50,7 @@ from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
+from marey.vocabulary.scope import STANDING
 from marey.vocabulary.turns import Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
@@ -221,7 +222,8 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
     if drawn is None or held or not request.beside[0]:
         return drawn
-    return replace(drawn, features=np.concatenate([drawn.features[:1].repeat(CUT, axis=0), drawn.features]))
+    features = np.concatenate([drawn.features[:1].repeat(CUT, axis=0), drawn.features])
+    return replace(drawn, features=features[: request.frames] if wish.action == STANDING else features)
 
 
 def draws(generator: Generator[Any]) -> bool:

@@ -16,6 +16,7 @@ class RowPosture:
         gesture: the movement is one of arms, head and trunk, made by itself and put onto the posture.
         apart: the row before ends otherwise than this one begins.
         falls: the movement comes to its posture by itself.
+        fires: shots go off in the posture.
         seed: of all rows, so that they meet in the same posture.
     """
 
@@ -25,6 +26,7 @@ class RowPosture:
     gesture: bool = False
     apart: bool = False
     falls: bool = False
+    fires: bool = False
     seed: int = 0
 
     @property

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
-from marey.drawing.holds import BACK, FRONT, SLIDE, SLIDES_M, SLIDES_S, passing
+from marey.drawing.holds import BACK, FRONT, PRONE, SLIDE, SLIDES_M, SLIDES_S, passing
 from marey.drawing.passing import pose
+from marey.drawing.shots import prone_shots
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import retimed
 from marey.motion.features import FeatureLayout, encode_all
@@ -28,6 +29,8 @@ Array = NDArray[np.floating]
 
 STAYS_S, WAITS_S = (0.9, 1.4), (1.5, 2.0)
 """Seconds in a posture after it is reached, and of a movement that is nothing but a wait in it."""
+AIMS_S = (2.2, 3.2)
+"""Seconds for which a gun is aimed on the front."""
 LONGEST_S = 4.2
 """Seconds of a gesture that goes on and on, in a posture."""
 RESTS, ACTS = 12.0, 32.0
@@ -63,7 +66,8 @@ def drawn_posture(layout: FeatureLayout, held: RowPosture, said: str, seed: int,
         frames: that it keeps; None = as many as it takes.
     """
     rng = random.Random(f"{seed} posture")  # noqa: S311
-    seconds = rng.uniform(*(WAITS_S if held.begin == held.own else STAYS_S)) if held.own else 0.4
+    stays = AIMS_S if held.own == PRONE else WAITS_S if held.begin == held.own else STAYS_S
+    seconds = rng.uniform(*stays) if held.own else 0.4
     return encode_all(layout, _fitted(held, max(seconds, gestures_s(said)), frames))
 
 
@@ -117,6 +121,8 @@ def _fitted(held: RowPosture, seconds: float, frames: int | None) -> Array:
     if frames is not None:
         seconds = max(frames / FPS - least, 0.1)
     done = passing(held.begin, held.own, held.end, seconds, str(held.seed))
+    if held.fires:
+        done = prone_shots(done, seconds, random.Random(f"{held.seed} fires"))  # noqa: S311
     own = max(round(done.times[-1] * FPS) + 1, 2)
     body = StandingBody(standing_still(own, random.Random(f"{held.seed} stands")))  # noqa: S311
     pose(body, done.times, done.postures)

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, LYING, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, LYING, PRONE, SEAT, SLIDE, UPRIGHT
 from marey.generation.posture import RowPosture
-from marey.generation.whole_body import ends_on_front, falls_on_front
+from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
 from marey.vocabulary.scope import STANDING
 
 Row = tuple[str, str]
@@ -44,6 +44,8 @@ GESTURES = frozenset(
     }
 )
 """Actions of arms, head and trunk: they are done in the posture in which the body is."""
+AIMS = frozenset({"aim", "shoot"})
+"""Actions that are done on the front, on the elbows."""
 LAIN = frozenset({STANDING, "wave", "clap", "laugh", "shiver", "talk"})
 """Actions that are done on the back."""
 _UP = re.compile(
@@ -98,10 +100,14 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
         crawled = before is not None and before[0] == "crawl"
         there = crawled or (before is None and (action in THERE or _BEING.search(said) is not None))
         return RowPosture(
-            own if there else begin, own, apart=crawled, falls=action == "die" and not begin and not crawled
+            own if there else begin,
+            own,
+            apart=crawled,
+            falls=action == "die" and not begin and not crawled,
+            fires=action == "shoot",
         )
     if not begin or not stays(row, begin):
-        return RowPosture(begin if begin and _rises(row) else "")
+        return RowPosture(begin if begin and rises(row) else "")
     if action == STANDING:
         return RowPosture(begin, begin)
     return RowPosture(begin, begin, gesture=True)
@@ -116,15 +122,22 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
         return KNEE if _ONE_KNEE.search(said) else KNEES
     if action == "die":
         return FRONT if falls_on_front(said, "" if before is None else before[1]) else BACK
+    if action in AIMS and (begin in (FRONT, PRONE) or _crawls_low(before)):
+        return PRONE
     if action in ("lie", "lie-down"):
         return FRONT if ends_on_front(said) or (before is not None and before[0] == "crawl") else BACK
-    if action == "squat" and after is not None and (_rises(after) or after[0] in GESTURES):
+    if action == "squat" and after is not None and (rises(after) or after[0] in GESTURES):
         return CROUCH
     if _SITS_UP.search(said) and (action == "sit-ups" or not action) and begin in LYING:
         return UPRIGHT
-    if not action and _LIES.search(said) and after is not None and (_SITS_UP.search(after[1]) or _rises(after)):
+    if not action and _LIES.search(said) and after is not None and (_SITS_UP.search(after[1]) or rises(after)):
         return BACK
     return POSTURES.get(action, "")
+
+
+def _crawls_low(row: Row | None) -> bool:
+    """Return True if a movement is a crawl on the belly."""
+    return row is not None and row[0] == "crawl" and is_low_crawl(row[1])
 
 
 def is_as_alone(held: RowPosture, action: str) -> bool:
@@ -138,7 +151,7 @@ def is_as_alone(held: RowPosture, action: str) -> bool:
     return held.begin in ("", held.own) and held.end == held.own and action in POSTURES
 
 
-def _rises(row: Row) -> bool:
+def rises(row: Row) -> bool:
     """Return True if a movement is that of standing up."""
     action, said = row
     return action in RISING or (action in ("", STANDING) and _UP.search(said) is not None)
@@ -147,6 +160,6 @@ def _rises(row: Row) -> bool:
 def stays(row: Row, begin: str) -> bool:
     """Return True if a movement is done in the posture in which the body is."""
     action, said = row
-    if _rises(row) or (begin in LYING and action not in (LAIN if begin == BACK else {STANDING})):
+    if rises(row) or (begin in LYING and action not in (LAIN if begin == BACK else {STANDING})):
         return False
     return action == STANDING or action in GESTURES or (not action and not _GOES.search(said))

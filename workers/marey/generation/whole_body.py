@@ -129,11 +129,11 @@ def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     text = wish.prompt.lower()
     back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
-    form = low_crawl if _is_low(text) else crawl
+    form = low_crawl if is_low_crawl(text) else crawl
     return form(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
 
 
-def _is_low(text: str) -> bool:
+def is_low_crawl(text: str) -> bool:
     """Return True if a crawl is one on the belly."""
     return bool(_LOW.search(text)) and not _ON_KNEES.search(text)
 
@@ -150,7 +150,7 @@ def _lie(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 def _get_up(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     before, text = wish.beside[0].lower(), wish.prompt.lower()
-    crawls = _CRAWLS.search(before) and not _is_low(before)
+    crawls = _CRAWLS.search(before) and not is_low_crawl(before)
     if crawls or _ON_FOURS.search(text):
         return get_up(rng, "fours")
     return get_up(

@@ -7,6 +7,8 @@ Made one by one, each as long as it takes alone, four of five and two of three s
 
 from __future__ import annotations
 
+import random
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
@@ -17,10 +19,11 @@ from marey.generation.lengths import resolved_length
 from marey.generation.port import Generator, Limits, Request
 from marey.generation.posture import NO_POSTURE
 from marey.generation.postured import gestures_s
-from marey.generation.row_postures import row_postures
+from marey.generation.row_postures import Row, rises, row_postures
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
+from marey.vocabulary.gazes import stated_gaze
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.scope import STANDING
 
@@ -28,6 +31,23 @@ SEED = "movement"
 """Part of the seed by which the length of a movement is drawn."""
 WAITS_S = 2.0
 """Seconds of a body that stands and waits beside other movements."""
+LOOKS_S, STOPS_S = 3.0, (1.0, 1.25)
+"""The same of one that looks around, and of one that only stops."""
+_ONLY_STOPS = re.compile(
+    r"(?:(?:he|she|they|it) )?(?:then )?(?:\w+ly )?(?:(?:com\w+|slow\w*|skid\w*) to an? (?:\w+ )?"
+    r"(?:stop|halt|standstill)|(?:stop|halt|freez|paus)\w*)(?: (?:dead|short|there|still|\w+ly))*"
+    r"(?: (?:at|by|before|in front of|on|in) (?:the|a|an|his|her|their|its|place)(?: [\w-]+){0,3})?"
+    r"(?: for an? (?:\w+ )?(?:moment|second|beat|instant))?"
+)
+"""Words of a body that stops and does nothing else."""
+_DEAD = re.compile(r"\b(?:dead|dies|die|died|dying|death|killed|slain|lifeless(?:ly)?)\b")
+_LIVES = re.compile(
+    r"\b(?:reviv\w*|resurrect\w*|reanimat\w*|respawn\w*|(?:to|back to) life|alive|zombies?|undead|ghosts?|spirits?"
+    r"|pretend\w*|play\w* dead|fak\w+|almost|nearly|half|like)\b"
+)
+"""Words of a death that is none, or not the end."""
+_RESTS = frozenset({STANDING, "lie", "lie-down", "die"})
+"""Actions behind a death: the body lies."""
 
 
 def as_timeline(generator: Generator[Any], request: Request) -> Request:
@@ -44,7 +64,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    movements = _merged_falls(request.text)
+    movements = _until_death(_merged_falls(request.text), request.text.said.lower())
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not (movements and alone and generator.limits.keeps):
         return request
@@ -64,7 +84,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     ends = list(accumulate(lengths))
     postures = [NO_POSTURE] * len(movements)
     if draws(generator):
-        postures = row_postures([(action_of(text), text.said.lower()) for text in movements], request.seed)
+        postures = row_postures([_row(text) for text in movements], request.seed)
     rows = tuple(
         TimedText((end - length) / fps, end / fps, text, open=own is None and request.frames is None, held=held)
         for end, length, text, own, held in zip(ends, lengths, movements, stated, postures, strict=True)
@@ -89,7 +109,32 @@ def _drawn_frames(generator: Generator[Any], request: Request, movement: TextFea
     frames = resolved_length(generator, alone).frames or generator.limits.min_frames
     if action_of(movement) != STANDING:
         return frames
-    return min(frames, generator.limits.within(round(max(WAITS_S, gestures_s(movement.said)) * generator.limits.fps)))
+    said, rng = movement.said.lower(), random.Random(f"{request.seed} {number} stands")  # noqa: S311
+    stops = _ONLY_STOPS.fullmatch(said.strip(" .!")) is not None
+    seconds = rng.uniform(*STOPS_S) if stops else LOOKS_S if stated_gaze(said) else WAITS_S
+    return min(frames, generator.limits.within(round(max(seconds, gestures_s(movement.said)) * generator.limits.fps)))
+
+
+def _row(text: TextFeatures) -> Row:
+    """Return the action and the words of a movement."""
+    return action_of(text), text.said.lower()
+
+
+def _until_death(movements: Sequence[TextFeatures], said: str) -> tuple[TextFeatures, ...]:
+    """Return the movements of a prompt; behind a death only those of a body that lies, until one says that it rises.
+
+    Args:
+        movements: in their order.
+        said: words of the prompt.
+    """
+    found, dead = list[TextFeatures](), False
+    for row, movement in zip(map(_row, movements), movements, strict=True):
+        if rises(row):
+            dead = False
+        if not dead or row[0] in _RESTS:
+            found.append(movement)
+        dead = dead or (row[0] == "die" and bool(_DEAD.search(row[1])) and not _LIVES.search(said))
+    return tuple(found)
 
 
 def _merged_falls(text: TextFeatures) -> tuple[TextFeatures, ...]:
