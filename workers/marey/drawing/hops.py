@@ -13,7 +13,7 @@ from marey.drawing.flights import StandingFoot, fly, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.motion.rotations import from_rotvec, rotate
+from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.posing.limbs import LEVEL
 from marey.posing.standing import LEFT, RIGHT, StandingBody, eased
 
@@ -25,6 +25,8 @@ _LEAVES = 45.0
 """Degrees by which a foot points down when it leaves the floor; the ankle moves by less than a step does."""
 _FAR = 0.95
 """Metres of a jump that is called long."""
+_QUICK_DIP, _QUICK_CROUCH_S, _QUICK_RISE_S = 0.08, 0.2, 0.12
+"""Metres by which the hips go down before a quick jump, and seconds of that and of leaving the floor."""
 _FEET, _OFF = [7, 8, 10, 11], 0.02
 """Joints of the feet, and metres by which all are higher than at first in a flight."""
 _FREE = {
@@ -166,6 +168,43 @@ def _jump(rng: random.Random, ahead: float, times: int | None) -> Gesture:
     return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
 
 
+def jump_aside(rng: random.Random, flight: float, times: int, metres: float) -> Gesture:
+    """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right."""
+    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, quick=True)
+    return replace(_moving(gesture, metres, 0.0), side=LEFT if metres > 0 else RIGHT)
+
+
+def hop_away(rng: random.Random, times: int, left: float, ahead: float, side: str = "") -> Gesture:
+    """Hops on one foot, that of `side` unless it is empty, in a direction: metres of each."""
+    gesture = hop(rng, times=times)
+    while "hop-place" not in gesture.kinds or side not in ("", gesture.side):
+        gesture = hop(rng, times=times)
+    return _moving(gesture, left, ahead)
+
+
+def _moving(gesture: Gesture, left: float, ahead: float) -> Gesture:
+    """Return jumps on the spot with each by so many metres to the left and ahead."""
+
+    def change(body: StandingBody) -> None:
+        gesture.change(body)
+        _move_in_flights(body.joints, left, ahead)
+
+    return replace(gesture, change=change)
+
+
+def _move_in_flights(joints: Array, left: float, ahead: float) -> None:
+    """Move a body (T, 22, 3) by so many metres each time that both feet are off the floor."""
+    feet = joints[:, _FEET, 1]
+    flies = (feet - feet[0]).min(axis=1) > _OFF
+    begins = np.flatnonzero(flies[1:] & ~flies[:-1])
+    ends = np.flatnonzero(flies[:-1] & ~flies[1:]) + 1
+    outward = normalize((joints[0, 1] - joints[0, 2]) * LEVEL)
+    way = left * outward + ahead * np.cross(outward, [0.0, 1.0, 0.0])
+    for first, last in zip(begins, ends, strict=False):
+        share = np.clip((np.arange(len(joints)) - first) / (last - first), 0.0, 1.0)
+        joints += share[:, None, None] * way
+
+
 def jump_turned(rng: random.Random, degrees: float) -> Gesture:
     """A jump of both feet on the spot, in which the body turns by `degrees`, positive to the left."""
     flight = rng.uniform(0.46, 0.52) + 0.06 * min(abs(degrees) / 360, 1.0)
@@ -198,6 +237,7 @@ def jumps(
     *,
     ahead: float = 0.0,
     tuck: float = 0.0,
+    quick: bool = False,
 ) -> Gesture:
     """Jumps of both feet.
 
@@ -207,10 +247,13 @@ def jumps(
         starts: seconds of standing before.
         flight: seconds of each flight.
         times: number of jumps.
-        ahead: metres of each.
+        ahead: metres of each; less than 0 = back.
         tuck: metres by which the feet are drawn up.
+        quick: at once, without a swing of the arms.
     """
     drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
+    if quick:
+        drawn.hurry()
     return on_feet(drawn.sequel, kinds, drawn.after, times=times)
 
 
@@ -236,6 +279,11 @@ class _Jumps:
         self.absorb, self.after = rng.uniform(0.16, 0.24), rng.uniform(0.3, 0.9)
         self.back = rng.choice(("back", "bent")) if times == 1 or self.arms != "bent" else "bent"
         self.gaze, self.straighten = rng.uniform(-6, 4), rng.uniform(0.4, 0.7)
+
+    def hurry(self) -> None:
+        """Leave the floor at once, the hands before the body."""
+        self.dip, self.crouch, self.rise = _QUICK_DIP, _QUICK_CROUCH_S, _QUICK_RISE_S
+        self.back = self.arms = "bent"
 
     def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
         """The postures over the feet of an idle."""

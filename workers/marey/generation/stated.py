@@ -1,6 +1,7 @@
 """Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
 or in a direction, a number of claps, steps aside by number or at a pace, blows to a part of the body, kicks with a
-spin, waves of both arms over the head, seats on the floor with crossed legs, and movements that have a name alone.
+spin, waves of both arms over the head, seats on the floor with crossed legs, jumps back or to a side, and movements
+that have a name alone.
 
 A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
 nothing stays as the network makes it.
@@ -22,6 +23,7 @@ from marey.drawing.kicks import spin_kick
 from marey.drawing.sidesteps import sidestep
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
+from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.whole_body import drawn_in_place
@@ -92,6 +94,8 @@ STATED: Mapping[str, Statement] = {
     "kick": _spin_kick,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
+    "hop": hops_away,
+    **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }
 """Movements by action."""
 

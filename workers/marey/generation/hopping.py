@@ -1,0 +1,69 @@
+"""Hops and jumps back or to a side: the vocabulary has them as dodges, of which networks know the crouch alone."""
+
+from __future__ import annotations
+
+import random
+import re
+
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.hops import hop_away, jump_aside, jumps
+from marey.generation.fine_wish import FineWish
+from marey.posing.standing import SIGN
+from marey.vocabulary.counts import stated_count
+
+_WAY = re.compile(
+    r"\b(?P<verb>hop|jump|leap|spring|bound)\w*(?: (?:\w+ly|once|twice|\w+ times|straight|far|a (?:step|little|bit)))*"
+    r" (?:(?P<back>back(?:wards?)?)|(?:to (?:the|his|her|their) )?(?P<side>left|right|side(?:ways|wise)?|aside))\b"
+    r"(?! (?:and forth|and right|and left|to side|up|down|on(?! (?:one|the|his|her|their) (?:left |right )?(?:leg|foot))"
+    r"|onto|into|over|to (?:his|her|their) (?:feet|seat)))"
+)
+"""Words of a jump back or to a side."""
+_ONE_LEG = re.compile(r"\bone (?:leg|foot)\b|\b(?:left|right) (?:leg|foot)\b")
+_FAR = re.compile(r"\b(?:far|big|long|great)\b")
+_FLIGHT_S = {"hop": (0.3, 0.36)}
+_BACK_M, _ASIDE_M = {"hop": (0.35, 0.5)}, (0.25, 0.36)
+_JUMP_S, _JUMP_BACK_M, _JUMP_ASIDE_M = (0.36, 0.44), (0.5, 0.68), (0.45, 0.6)
+"""Seconds of a flight, and metres of one, of hops and of all others."""
+MOST = 8
+"""Jumps that are drawn at most."""
+_FARTHER = 1.35
+
+
+def jumps_away(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    """Return the jump of both feet that a prompt asks for, back or to a side, once if no number is stated; None if it
+    asks for none."""
+    del seconds  # the body stands before and after
+    text = wish.prompt.lower()
+    found = _WAY.search(text)
+    if found is None or _ONE_LEG.search(text):
+        return None
+    verb, times = found["verb"], _times(wish)
+    flight = rng.uniform(*_FLIGHT_S.get(verb, _JUMP_S))
+    farther = _FARTHER if _FAR.search(text) else 1.0
+    if found["back"]:
+        metres = farther * rng.uniform(*_BACK_M.get(verb, _JUMP_BACK_M))
+        return jumps(rng, ["jump-back"], rng.uniform(0.55, 0.8), flight, times, ahead=-metres, quick=True)
+    return jump_aside(rng, flight, times, _sign(found["side"], rng) * farther * rng.uniform(*_JUMP_ASIDE_M))
+
+
+def hops_away(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    """Return the hop on one foot that a prompt asks for, back or to a side, once if no number is stated; None if it
+    asks for none."""
+    del seconds
+    found = _WAY.search(wish.prompt.lower())
+    if found is None:
+        return None
+    metres = rng.uniform(*_ASIDE_M)
+    if found["back"]:
+        return hop_away(rng, _times(wish), 0.0, -metres, wish.side)
+    return hop_away(rng, _times(wish), _sign(found["side"], rng) * metres, 0.0, wish.side)
+
+
+def _sign(side: str, rng: random.Random) -> float:
+    """Return 1 for the left and -1 for the right, either by chance where the words leave it open."""
+    return SIGN[side if side in SIDES else rng.choice(SIDES)]
+
+
+def _times(wish: FineWish) -> int:
+    """Return how many jumps are asked for."""
+    return min(wish.count or stated_count(wish.prompt, "jump") or stated_count(wish.prompt, "hop") or 1, MOST)
