@@ -14,8 +14,8 @@ from marey.vocabulary.counts import stated_count
 _WAY = re.compile(
     r"\b(?P<verb>hop|jump|leap|spring|bound)\w*(?: (?:\w+ly|once|twice|\w+ times|straight|far|a (?:step|little|bit)))*"
     r" (?:(?P<back>back(?:wards?)?)|(?:to (?:the|his|her|their) )?(?P<side>left|right|side(?:ways|wise)?|aside))\b"
-    r"(?! (?:and forth|and right|and left|to side|up|down|on(?! (?:one|the|his|her|their) (?:left |right )?(?:leg|foot))"
-    r"|onto|into|over|to (?:his|her|their) (?:feet|seat)))"
+    r"(?! (?:and forth|and right|and left|to side|up|down|on(?! (?:one|the|his|her|their) (?:left |right )?"
+    r"(?:leg|foot))|onto|into|over|to (?:his|her|their) (?:feet|seat)))"
 )
 """Words of a jump back or to a side."""
 _ONE_LEG = re.compile(r"\bone (?:leg|foot)\b|\b(?:left|right) (?:leg|foot)\b")

@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import changes_of, generate_as_asked
+from marey.generation.asked import action_of, changes_of, generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.shots.going_on import is_way, without_halt
+from marey.generation.shots.levels import lifted, raised_rows
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
@@ -130,7 +131,9 @@ def generate_timelines(
     for timeline in timelines:
         if timeline.open and not timeline.dropped:
             timeline.settle(generator.layout)
-    windows.make([strand for timeline in timelines for strand in timeline.open_transitions()])
+        if timeline.is_sequence and not timeline.dropped:
+            timeline.lift(generator.layout)
+    windows.make([strand for timeline in timelines for strand in timeline.open_transitions(generator.layout)])
     return [timeline.motion() for timeline in timelines]
 
 
@@ -186,6 +189,7 @@ class _Row(_Strand):
         self.held = timed.held
         self.beside: tuple[str, str] = ("", "")
         self.features: Float32 | None = None
+        self.base = 0.0
         self.changes: Mapping[str, Any] = {}
 
     def request(self) -> Request:
@@ -211,14 +215,19 @@ class _Row(_Strand):
 class _Transition(_Strand):
     """A transition: windows without a prompt; the last one has the frames of the next row behind it."""
 
-    def __init__(self, timeline: _Timeline, number: int, limits: Limits) -> None:
+    def __init__(self, timeline: _Timeline, number: int, limits: Limits, layout: FeatureLayout) -> None:
         part = timeline.plan.transitions[number]
         before, after = timeline.rows[number : number + 2]
         super().__init__(timeline, part, after.text, (most_frames(limits, 2), limits.max_frames - CONTEXT))
         assert before.features is not None
         assert after.features is not None
-        self._before = before.features[: part.start - before.part.start]
-        self._after = after.features[part.end - after.part.start :]
+        self._layout, self._base = layout, after.base
+        self._before = self._lifted(before.features[: part.start - before.part.start], -self._base)
+        self._after = self._lifted(after.features[part.end - after.part.start :], -self._base)
+
+    def _lifted(self, features: Float32, metres: float) -> Float32:
+        """Return features (T, D) at another height: networks know bodies on a floor."""
+        return lifted(features, metres, self._layout) if metres else features
 
     def gap(self) -> FrameGap:
         """Return the gap of the next window."""
@@ -235,7 +244,8 @@ class _Transition(_Strand):
         """Return the frames of the timeline with this transition in them."""
         start = self.part.start
         for window, length in zip(self.windows, self.lengths, strict=True):
-            frames = crossfaded(frames, window, start - window.first)
+            raised = replace(window, features=self._lifted(window.features, self._base))
+            frames = crossfaded(frames, raised, start - window.first)
             start += length
         return frames
 
@@ -251,6 +261,7 @@ class _Timeline:
         assert request.timeline is not None
         self.limits = limits
         self.dropped = False
+        self.is_sequence = request.is_sequence
         self.open = request.is_sequence and request.frames is None
         self.timeline = request.timeline
         self.seed = request.seed
@@ -304,11 +315,18 @@ class _Timeline:
         grid = self.limits.keeps
         return math.ceil(seconds * self.limits.fps / grid) * grid / self.limits.fps
 
-    def open_transitions(self) -> list[_Transition]:
+    def lift(self, layout: FeatureLayout) -> None:
+        """Set the heights of rows that are made: what follows a climb is done where that has ended."""
+        rows = [(action_of(row.text), row.text.said.lower(), row.features) for row in self.rows]
+        made = [(action, said, features) for action, said, features in rows if features is not None]
+        for row, raised in zip(self.rows, raised_rows(made, layout), strict=True):
+            row.features, row.base = raised.features, raised.base
+
+    def open_transitions(self, layout: FeatureLayout) -> list[_Transition]:
         """Return the transitions, once the rows are made; none of a dropped timeline."""
         if not self.dropped:
             self.transitions = [
-                _Transition(self, number, self.limits)
+                _Transition(self, number, self.limits, layout)
                 for number, (_, after) in enumerate(pairwise(self.rows))
                 if not after.held.meets
             ]
