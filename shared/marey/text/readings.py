@@ -20,7 +20,15 @@ from marey.text.encoders import Encoding
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import WAYS, ReadMovement, sequence_reader, way_to_a_stop, way_to_rest
+from marey.text.sequence_reader import (
+    CARRYING,
+    WAYS,
+    ReadMovement,
+    sequence_reader,
+    turned_to_carry,
+    way_to_a_stop,
+    way_to_rest,
+)
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
@@ -86,7 +94,18 @@ class TrainedReaders:
         bare = [BarePrompt.of(text) for text in texts]
         self._pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
         self._encode_together([each if each.text else as_written(each.prompt) for each in bare])
-        return [self._borne(each) or self._reading(as_written(each.prompt)) for each in bare]
+        return [self._carried(self._borne(each) or self._reading(as_written(each.prompt)), each) for each in bare]
+
+    def _carried(self, reading: ReadPrompt, bare: BarePrompt) -> ReadPrompt:
+        """Return a reading in which who carries something back turns round for it."""
+        movements = reading.movements
+        if not movements:
+            way = next(
+                (way for way in sorted(CARRYING) if reading.plain == load_vocabulary().need(way).plain_words), None
+            )
+            movements = (ReadMovement(bare.prompt, way),)
+        turned = tuple(turned_to_carry(movements)) if self._movements else movements
+        return reading if turned == movements else ReadPrompt(bare.prompt, turned, drawn=reading.drawn)
 
     def _encode_together(self, bare: Sequence[BarePrompt]) -> None:
         """Encode prompts that may ask for several movements, and all that may be one of these."""

@@ -124,7 +124,7 @@ _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
     (?:sudden(?:ly)?\s|abrupt(?:ly)?\s|complete\s|full\s|dead\s)?
-    (?:stops?|halts?|standstill|stands?\sstill)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
+    (?:stops?|halts?|standstill|stands?\sstill|idle)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
     re.IGNORECASE | re.VERBOSE,
 )
 _TO_A_SEAT = re.compile(
@@ -132,6 +132,17 @@ _TO_A_SEAT = re.compile(
     r"(?:throne|chair|armchair|seat|sofa|couch|bench|stool|bed)s?\b",
     re.IGNORECASE,
 )
+_CARRIED_BACK = re.compile(
+    r"(\b(?:carr|bring|tak|lug|haul|tot)\w* "
+    r"(?:it|them|him|her|(?:the|a|an|his|her|their|this|that) (?!step)(?:\w+ ){0,2}?\w+))"
+    r" back\b(?! (?:and forth|up|down|wards?))",
+    re.IGNORECASE,
+)
+"""Words of who carries something back to where it was."""
+TURN_AROUND, CARRYING = "turn-around", WAYS | {"carry"}
+"""How a body turns round, and ways on which it may carry something."""
+BACKWARD: Mapping[str, str] = {"walk-backward": "walk"}
+"""Ways ahead, by those backward."""
 _ACROSS = re.compile(r"\b(?:over|across)\b", re.IGNORECASE)
 _STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
 _STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
@@ -437,6 +448,20 @@ def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
             down = action
         elif action in ON_FEET:
             down = None
+
+
+def turned_to_carry(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
+    """Yield movements; who carries something back turns round first, unless that is said, and walks ahead."""
+    before = None
+    for movement in movements:
+        carried = _CARRIED_BACK.sub(r"\1", movement.text) if movement.action in CARRYING else movement.text
+        if carried == movement.text:
+            yield movement
+        else:
+            if before not in (TURN_AROUND, TURNING):
+                yield ReadMovement("turns around", TURN_AROUND)
+            yield replace(movement, text=carried, action=BACKWARD.get(movement.action or "", movement.action))
+        before = movement.action
 
 
 def _movement(group: Sequence[ReadClause]) -> ReadMovement:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marey.generation.shots.going_on import LEAST_S, MOST_S, is_way, without_halt
+from marey.generation.shots.going_on import LEAST_S, MOST_S, WAITS_S, is_way, without_halt, without_wait
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
 from tests.support.bodies import Body, steady
@@ -52,3 +52,10 @@ def test_no_more_is_left_out_than_may_be() -> None:
 )
 def test_a_way_is_a_walk_a_run_or_a_leap_alone(words: str, is_one: bool) -> None:
     assert is_way(replace(no_text(4), prompt=words, rewritten=words)) is is_one
+
+
+def test_a_way_begins_at_once() -> None:
+    late = without_wait(way(1.5, 9.0), LAYOUT)
+    assert len(late) / LAYOUT.fps == pytest.approx(5.0 - 1.5 + WAITS_S, abs=0.3)
+    at_once = way(-1.0, 9.0)
+    assert len(without_wait(at_once, LAYOUT)) == len(at_once)

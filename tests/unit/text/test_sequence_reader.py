@@ -28,6 +28,7 @@ from marey.text.sequence_reader import (
     SequenceReader,
     in_order,
     sequence_reader,
+    turned_to_carry,
     way_to_a_stop,
     without_joints,
 )
@@ -289,3 +290,27 @@ def test_a_way_to_a_seat_is_read_without_the_seat() -> None:
     )
     assert "chair" in ReadMovement("sits down on the chair", "sit-down").worded
     assert "door" in ReadMovement("walks to the door", "walk").worded
+
+
+@pytest.mark.parametrize(
+    ("before", "movement", "found"),
+    [
+        (("walks", "walk"), ("carries it back", "carry"), ["walks", "turns around", "carries it"]),
+        (("walks", "walk"), ("takes the box back", "walk-backward"), ["walks", "turns around", "takes the box"]),
+        (("turns around", "turn-around"), ("brings it back", "walk"), ["turns around", "brings it"]),
+        (("walks", "walk"), ("takes a step back", "walk-backward"), ["walks", "takes a step back"]),
+        (("walks", "walk"), ("takes it back", "reach-forward"), ["walks", "takes it back"]),
+    ],
+)
+def test_who_carries_something_back_turns_round_first(
+    before: tuple[str, str], movement: tuple[str, str], found: list[str]
+) -> None:
+    turned = list(turned_to_carry(ReadMovement(*each) for each in (before, movement)))
+    assert [each.text for each in turned] == found
+    assert found[-1] == movement[0] or turned[-1].action != "walk-backward"
+
+
+def test_a_way_to_idle_ends_with_a_stop() -> None:
+    assert way_to_a_stop("run to idle") == "run"
+    assert way_to_a_stop("walk forward to idle") == "walk forward"
+    assert not way_to_a_stop("stands idle")

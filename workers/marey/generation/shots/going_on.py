@@ -23,6 +23,8 @@ GOING = 0.7
 """Share of its median speed under which a way begins or ends."""
 MOST_S, LEAST_S = 1.5, 1.0
 """Seconds that are left out at most, and left at least."""
+WAITS_S = 0.4
+"""Seconds before the first way at most."""
 
 
 def is_way(text: TextFeatures) -> bool:
@@ -35,6 +37,13 @@ def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tupl
     """Return features (T, D) of two ways without the slow end of the first and the slow beginning of the second."""
     ends, begins = (course_of(features, layout).speeds(layout.fps) for features in (before, after))
     return before[: len(before) - _slow(ends[::-1], layout.fps)], after[_slow(begins, layout.fps) :]
+
+
+def without_wait(features: Float32, layout: FeatureLayout) -> Float32:
+    """Return features (T, D) of a way with which a sequence begins, without a wait in the middle of a stride: it keeps
+    the last moment before it goes."""
+    slow = _slow(course_of(features, layout).speeds(layout.fps), layout.fps)
+    return features[max(slow - round(WAITS_S * layout.fps), 0) :]
 
 
 def _slow(speeds: Array, fps: float) -> int:

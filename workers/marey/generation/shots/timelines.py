@@ -21,7 +21,7 @@ from marey.core.errors import InvalidInput
 from marey.generation.asked import action_of, changes_of, generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
-from marey.generation.shots.going_on import is_way, without_halt
+from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.levels import lifted, raised_rows
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
@@ -286,6 +286,9 @@ class _Timeline:
         """Set the times of rows that are made: each is as long as its motion, without a halt between two ways, and
         begins later where that begins much higher or lower than the one before ends; not where people stand on
         something, since all movements begin on one floor."""
+        first = self.rows[0]
+        if first.open and first.features is not None and is_way(first.text):
+            first.features = without_wait(first.features, layout)
         for before, after in pairwise(self.rows):
             if (
                 before.features is not None
