@@ -303,3 +303,11 @@ def test_signs_take_three_seconds_and_three_places() -> None:
     assert shows("signal", body(signs))
     assert not shows("signal", body(signs[:60]))
     assert not shows("signal", body(_showing()))
+
+
+def test_what_follows_a_climb_is_judged_where_the_feet_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    bows, step = _bowing(), round(0.25 * FPS)
+    both = body(np.concatenate([bows[: len(bows) // step * step], _waving() + np.array([0.0, 0.8, 0.0])]))
+    monkeypatch.setitem(RULES, "climb-stairs", RULES["bow"])
+    assert shows_in_order(["climb-stairs", "wave"], both)
+    assert not shows_in_order(["bow", "wave"], both)

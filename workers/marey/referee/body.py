@@ -75,6 +75,12 @@ class Body:
         part._positions = self._positions[begin:end]
         return part
 
+    def on_own_floor(self) -> Body:
+        """Return the body with its lowest foot on the floor, as one is judged that stands on something."""
+        moved = self.part(0, len(self))
+        moved._positions = self._positions - [0.0, float(self.lowest_foot.min()), 0.0]
+        return moved
+
     # -- positions and velocities -------------------------------------------------------------------------------------
 
     def at(self, joint: str) -> Floats:

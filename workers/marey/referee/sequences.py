@@ -13,6 +13,8 @@ STEP_S = 0.25
 """Grid of the moments at which one action may end and the next begin."""
 SHORTEST_S = 0.4
 """Shortest part of a clip that is judged by itself."""
+CLIMBS = frozenset({"climb-stairs", "climb-ladder", "climb-onto"})
+"""Actions behind which a body may stand higher: the floor of what follows is where its feet are."""
 
 
 def shows(action: str, body: Body) -> bool:
@@ -41,7 +43,8 @@ def shows_in_order(actions: Sequence[str], body: Body) -> bool:
 
     @cache
     def part_shows(index: int, begin: int, end: int) -> bool:
-        return shows(actions[index], body.part(begin, end))
+        part = body.part(begin, end)
+        return shows(actions[index], part.on_own_floor() if CLIMBS & set(actions[:index]) else part)
 
     @cache
     def rest_shows(index: int, begin: int) -> bool:
