@@ -13,6 +13,7 @@ from marey.generation.fine_wish import FineWish
 from marey.generation.whole_body import CHOICES, QUICKER
 from marey.motion.features import HUMANML3D_263
 from marey.posing.still import standing_still
+from marey.quality.measure import range_degrees
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
 from tests.support.bodies import Body
@@ -40,9 +41,9 @@ def test_each_shows_its_action_on_the_floor_without_breaks(action: str, seed: in
     joints = drawn(action, seed=seed)
     assert RULES[action](Motion(joints, FPS), "") >= 0.5
     assert joints[..., 1].min() > -0.03
-    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < (0.75 if action == "flip" else 0.5), (
-        "no joint leaps"
-    )
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < (
+        0.75 if action in ("flip", "cartwheel") else 0.5
+    ), "no joint leaps"
     assert len(joints) > 2 * FPS
 
 
@@ -124,6 +125,35 @@ def test_a_roll_goes_to_the_side_that_is_named(prompt: str, way: int, seed: int)
 
 def test_a_roll_that_ends_low_stays_low() -> None:
     assert drawn("roll", "rolls into a crouch")[-1, PELVIS, 1] < 0.7
+
+
+@pytest.mark.parametrize(("prompt", "way"), [("a cartwheel to the left", 1), ("cartwheel, right hand first", -1)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_cartwheel_goes_to_the_side_that_is_named_over_one_straight_limb_after_another(
+    prompt: str, way: int, seed: int
+) -> None:
+    joints = drawn("cartwheel", prompt, seed=seed)
+    moved = joints[-1, PELVIS] - joints[0, PELVIS]
+    assert way * moved[0] > 1.5
+    assert abs(moved[2]) < 0.15
+    wrists, ankles = ((20, 21), (7, 8)) if way > 0 else ((21, 20), (8, 7))
+    down = [np.flatnonzero(joints[:, wrist, 1] < 0.1)[[0, -1]] for wrist in wrists]
+    assert down[0][0] < down[1][0] < down[0][1] < down[1][1]
+    top = [int(joints[:, ankle, 1].argmax()) for ankle in ankles]
+    assert top[1] < top[0]  # the other leg goes over first
+    over = joints[:, PELVIS, 1] > joints[:, HEAD, 1] + 0.3
+    legs = np.linalg.norm(joints[:, [7, 8]] - joints[:, [1, 2]], axis=-1)[over]
+    assert np.median(legs, axis=0).min() > 0.77
+    assert range_degrees(joints) < 15  # no knee bends backward
+    assert front_of(joints)[-1, 2] > 0.9
+    assert joints[-1, HEAD, 1] > 1.3
+
+
+def test_cartwheels_are_as_many_as_asked_for() -> None:
+    for count in (1, 2, 3):
+        joints = drawn("cartwheel", "does cartwheels", count=count)
+        over = joints[:, PELVIS, 1] > joints[:, HEAD, 1] + 0.2
+        assert (np.diff(over.astype(int)) == 1).sum() == count
 
 
 @pytest.mark.parametrize(("prompt", "forward"), [("a front flip", 1), ("a backflip", -1), ("flips backwards", -1)])

@@ -1,4 +1,4 @@
-"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, crawls, ways to the floor
+"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, cartwheels, crawls, ways to the floor
 and back, strokes of swimmers.
 
 Networks know how such a movement begins; then they roll on, fall twice, turn the other way over, or crawl in place. The
@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.drawing.cartwheels import cartwheel
 from marey.drawing.crawls import crawl, low_crawl
 from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
@@ -38,6 +39,8 @@ QUICKER = 0.7
 """Share of its length to which a movement is shortened at most."""
 IN_AIR = 95.0, 540.0
 """Degrees by which a body turns in one jump, at least and at most."""
+MOST_WHEELS = 6
+"""Cartwheels at most, one out of the other."""
 MOST = 4
 """Times that a movement is done at most, one after the other."""
 _BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
@@ -126,6 +129,12 @@ def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     return flip(rng, form, stands=not runs or (wish.count or 1) > 1)
 
 
+def _cartwheel(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    named = _SIDE_NAMED.search(wish.prompt.lower())
+    return cartwheel(rng, named[1] if named else wish.side, min(wish.count or 1, MOST_WHEELS))
+
+
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     text = wish.prompt.lower()
     back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
@@ -196,6 +205,7 @@ CHOICES: Mapping[str, Choice] = {
     "die": _fall,
     "roll": _roll,
     "flip": _flip,
+    "cartwheel": _cartwheel,
     "crawl": _crawl,
     "lie-down": _lie_down,
     "lie": _lie,
