@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,7 @@ def test_every_bearing_that_moves_is_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    "prompt", ["does burpees", "moonwalks", "dives to the left", "slides on the ground feet first"]
+    "prompt", ["does burpees", "does lunges", "moonwalks", "dives to the left", "slides on the ground feet first"]
 )
 @pytest.mark.parametrize("seed", SEEDS)
 def test_they_are_smooth_and_on_the_floor(prompt: str, seed: int) -> None:
@@ -52,6 +54,27 @@ def test_burpees_are_as_many_as_asked_for_each_with_a_plank_and_a_jump(prompt: s
     assert ((behind > 0.6) & down).any()
     assert joints[:, TOES, 1].min(axis=1).max() > 0.08
     assert joints[:, WRISTS, 1].min(axis=1).max() > 1.7
+
+
+@pytest.mark.parametrize(
+    ("prompt", "times", "way"),
+    [("does five lunges", 5, 0.0), ("three walking lunges", 3, 0.8), ("does a lunge with her right leg", 1, 0.0)],
+)
+def test_lunges_are_as_many_as_asked_for_with_a_level_thigh_and_a_low_knee(prompt: str, times: int, way: float) -> None:
+    joints = drawn(prompt)
+    down = joints[:, PELVIS, 1] < 0.65
+    starts = np.flatnonzero(np.diff(down.astype(int)) == 1) + 1
+    assert len(starts) == times
+    fronts = []
+    for start in starts:
+        low = start + int(joints[start : start + round(FPS), PELVIS, 1].argmin())
+        front = int(joints[low, ANKLES, 2].argmax())
+        assert abs(joints[low, 1 + front, 1] - joints[low, 4 + front, 1]) < 0.1
+        assert joints[low, 5 - front, 1] < 0.13
+        fronts.append(front)
+    assert all(a != b for a, b in itertools.pairwise(fronts))
+    assert "right" not in prompt or fronts == [1]
+    assert joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] == pytest.approx(times * way, abs=0.2)
 
 
 def test_a_moonwalk_glides_backward_on_a_flat_foot() -> None:

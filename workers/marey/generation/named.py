@@ -1,5 +1,5 @@
-"""Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, moonwalks, dives
-to a side, slides.
+"""Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, lunges,
+moonwalks, dives to a side, slides.
 
 Readers and networks know nothing of them. Their words are those of bearings that move (`moves` in `bearings.toml`), so
 that they are read as what is done by a body that stands, and the movement is drawn in its place.
@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
 from marey.drawing.gesture import Gesture
+from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
@@ -24,6 +25,10 @@ MOST = 8
 """Times that a movement is done at most."""
 BURPEE_S = 3.6
 """Seconds of one of several burpees."""
+LUNGE_S = 1.9
+"""Seconds of one of several lunges."""
+_WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
+_REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
 _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|rises?|jumps?|springs?|picks?|scrambles?)\b.*\bup\b|\brises?\b"
     r"|\bto (?:his|her) feet\b"
@@ -55,6 +60,15 @@ def _burpees(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds:
     return burpees(rng, _times(stated) or (1 if single else room))
 
 
+def _lunges(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish
+    words = stated.words
+    form = "walking" if _WALKING.search(words) else "back" if _REVERSE.search(words) else "ahead"
+    single = re.search(r"\ba (?:\w+ )*lunge\b", words)
+    room = None if seconds is None else min(max(int((seconds - 1.5) / LUNGE_S), 1), MOST)
+    return lunges(rng, form, _times(stated) or (1 if single else room), stated.side)
+
+
 def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del stated, wish
     return moonwalk(rng, seconds=seconds)
@@ -72,6 +86,7 @@ def _ground_slide(stated: StatedBearing, wish: FineWish, rng: random.Random, sec
 
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
+    "lunges": _lunges,
     "moonwalk": _moonwalk,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,

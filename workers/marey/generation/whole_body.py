@@ -1,5 +1,5 @@
-"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, cartwheels, crawls, ways to the floor
-and back, strokes of swimmers.
+"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, cartwheels, crawls, ways
+to the floor and back, strokes of swimmers.
 
 Networks know how such a movement begins; then they roll on, fall twice, turn the other way over, or crawl in place. The
 movements are those of the made clips of the training data, with the direction and the number that the prompt names.

@@ -1,0 +1,110 @@
+"""Lunges as an exercise: a long step ahead or back until the thigh of the front leg is level, legs by turns."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.postures import STAND, HandPlace, Point, Posture
+from marey.drawing.sequels import Sequel, both
+from marey.posing.standing import OTHER_SIDE
+
+_HANDS = {
+    "hips": HandPlace((0.06, -0.4, 0.05), "shoulder", (1.0, 0.1, -0.5)),
+    "clasped": HandPlace((-0.13, -0.16, 0.27), "shoulder", (0.8, -0.8, -0.2)),
+    "hang": None,
+}
+"""Where the hands are; None = they hang beside the body, as with weights."""
+_SHIN, _THIGH = 0.03, 0.37
+"""Metres of the knee of the front leg ahead of its ankle, and of the hips behind that knee, when the thigh is level."""
+_REAR: Point = (0.1, -0.55, 1.0)
+_FRONT: Point = (0.12, 0.4, 1.0)
+"""Where the knees of the rear and of the front leg point."""
+
+
+@dataclass(frozen=True)
+class _Lunge:
+    """Lunges of a body, in metres, degrees and seconds.
+
+    Attributes:
+        form: see `lunges`.
+        stride: from ankle to ankle.
+        low: of the hips over the floor when the thigh is level.
+        lean: of the trunk.
+        pace: factor of the seconds.
+        hands: key of `_HANDS`.
+    """
+
+    form: str
+    stride: float
+    low: float
+    lean: float
+    pace: float
+    hands: str
+
+    def posture(self, pelvis: Point, feet: dict[str, StandingFoot], places: dict[str, tuple[float, float]]) -> Posture:
+        """The posture with feet by side at metres forward and with degrees of a heel that is lifted."""
+        put = {
+            side: feet[side].tiptoe(heel, at) if heel else feet[side].flat(at) for side, (at, heel) in places.items()
+        }
+        rear = min(places, key=lambda side: places[side][0])
+        knees = {rear: _REAR, OTHER_SIDE[rear]: _FRONT} if pelvis[1] < 0.85 else {}
+        hand = _HANDS[self.hands]
+        lean = self.lean if pelvis[1] < 0.85 else 0.4 * self.lean
+        hands = both(hand) if hand else {}
+        return Posture(pelvis, (lean, 0, 0), (0.5 * lean, 0, 0), (-lean, 0, 0), 1.0, hands, put, knees)
+
+    def stands(self, feet: dict[str, StandingFoot], at: float) -> Posture:
+        """Upright with both feet `at` metres forward."""
+        return self.posture((0.0, 0.94, at), feet, dict.fromkeys(SIDES, (at, 0.0)))
+
+    def down(self, done: Sequel, feet: dict[str, StandingFoot], front: str, rear: float) -> None:
+        """Step with one foot, ahead or back, and go down; the rear foot is at `rear` metres forward."""
+        moves = OTHER_SIDE[front] if self.form == "back" else front
+        ahead = rear + self.stride
+        half = {front: (ahead, 0.0), OTHER_SIDE[front]: (rear, 34.0)}
+        deep = {front: (ahead, 0.0), OTHER_SIDE[front]: (rear, 62.0)}
+        share = 0.5 if moves == front else 0.66
+        done.then(0.5 * self.pace, self.posture((0.0, 0.8, rear + share * self.stride), feet, half))
+        done.then(0.42 * self.pace, self.posture((0.0, self.low, ahead - _THIGH + _SHIN), feet, deep), 0.12 * self.pace)
+
+    def up(self, done: Sequel, feet: dict[str, StandingFoot], front: str, rear: float) -> None:
+        """Push up on both feet."""
+        places = {front: (rear + self.stride, 0.0), OTHER_SIDE[front]: (rear, 38.0)}
+        share = {"ahead": 0.45, "back": 0.7, "walking": 0.75}[self.form]
+        done.then(0.38 * self.pace, self.posture((0.0, 0.8, rear + share * self.stride), feet, places))
+
+
+def lunges(rng: random.Random, form: str = "ahead", times: int | None = None, side: str = "") -> Gesture:
+    """A body that stands and does lunges.
+
+    Args:
+        rng: decides everything that is not given.
+        form: `ahead` or `back` from where it stands, or `walking`.
+        times: how many; None = four.
+        side: of the front leg; empty = legs by turns.
+    """
+    times, first, starts = times or 4, side or rng.choice(SIDES), rng.uniform(0.2, 0.5)
+    hands, stride, low = rng.choice(list(_HANDS)), rng.uniform(0.76, 0.84), rng.uniform(0.53, 0.56)
+    way = _Lunge(form, stride, low, rng.uniform(4, 10), rng.uniform(0.95, 1.2), hands)
+    fronts = [first if side or k % 2 == 0 else OTHER_SIDE[first] for k in range(times)]
+    after = rng.uniform(0.3, 0.7)
+    return on_feet(lambda feet: _sequel(way, fronts, starts, feet), ["lunges"], after, side=side, times=times)
+
+
+def _sequel(way: _Lunge, fronts: list[str], starts: float, feet: dict[str, StandingFoot]) -> Sequel:
+    """The postures over the feet of an idle, with the front legs one after another."""
+    done, at = Sequel([starts]), 0.0
+    if _HANDS[way.hands]:
+        done.then(0.45, way.stands(feet, 0.0), 0.05)
+    for front in fronts:
+        rear = at - way.stride if way.form == "back" else at
+        way.down(done, feet, front, rear)
+        way.up(done, feet, front, rear)
+        at += way.stride if way.form == "walking" else 0.0
+        done.then(0.42 * way.pace, way.stands(feet, at), 0.1 * way.pace)
+    still = {side: foot.flat(at) for side, foot in feet.items()}
+    done.then(0.45, Posture((0.0, 0.94, at), feet=still) if at else STAND)
+    return done
