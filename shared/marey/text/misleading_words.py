@@ -183,6 +183,17 @@ _KNEE = re.compile(
 )
 _BLOWS = re.compile(r"\b(?:punch|jab|hook|cross|uppercut|elbow|kick|strike)(?:e?s)?\b", re.IGNORECASE)
 """A blow with the knee in a list of blows, of which models read who kneels."""
+_ROPE = r"""(?:(?:a|an|the|his|her|their)\ )?(?:(?!to\b|stairs|steps)[\w-]+\ ){0,2}?
+    (?:ropes?|vines?|chains?|poles?|drain\W?pipes?|pipes?|masts?|lianas?|bed\W?sheets)\b"""
+_UP_ROPE = re.compile(
+    rf"""\b(?:(?:pull|haul|heav|hoist|drag|lower)(?P<end>e?s|e|ed|ing)?\ (?:him|her|them|it)sel\w+
+    |(?:shimm|shinn|inch|work|mak|go|swarm|scrambl|scurr)(?P<ends>ies|y|ied|ying|e?s|e|ed|ing)?
+    (?:\ (?:his|her|their|its)\ way)?)
+    (?P<how>(?:\ (?:\w+ly|hand\ over\ hand))*)(?=\ (?:(?:all\ the\ way|right|back)\ )?(?:up|down)\ {_ROPE})""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A climb of a rope, of which models read pull-ups and other ways: "hauls himself up the rope"."""
+_HAND_OVER_HAND = re.compile(rf"^(?=\W*hand\ over\ hand,?\ (?:up|down)\ {_ROPE})", re.IGNORECASE | re.VERBOSE)
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -238,10 +249,12 @@ def without_misleading(prompt: str) -> str:
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
     leg to leg stands, and who falls over the knees falls once.
+    Who hauls himself up a rope climbs it.
     """
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
     prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
+    prompt = _HAND_OVER_HAND.sub("climbing ", _UP_ROPE.sub(_climbs, prompt))
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
@@ -270,6 +283,12 @@ def _against(found: re.Match[str]) -> str:
     """Return a body that stands with its back to something."""
     stands = "standing" if found["ing"] else "stands" if found["s"] else "stand"
     return f"{stands} with the back {found['where']}"
+
+
+def _climbs(found: re.Match[str]) -> str:
+    """Return a climb in the form of the verb that is found."""
+    end = (found["end"] or found["ends"] or "").lower()
+    return f"climb{'ing' if end.endswith('ing') else 's' if end.endswith('s') else ''}{found['how']}"
 
 
 def _on_floor(found: re.Match[str]) -> str:

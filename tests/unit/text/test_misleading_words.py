@@ -25,6 +25,22 @@ def test_who_walks_up_to_somebody_does_not_rise(prompt: str, read: str) -> None:
 @pytest.mark.parametrize(
     ("prompt", "read"),
     [
+        ("pulls himself up a rope hand over hand", "climbs up a rope hand over hand"),
+        ("a soldier going down the old rope", "a soldier climbing down the old rope"),
+        ("she shimmies slowly up the drainpipe", "she climbs slowly up the drainpipe"),
+        ("hand over hand up a rope", "climbing hand over hand up a rope"),
+        ("pulls up a rope", "pulls up a rope"),
+        ("pulls himself up onto the ledge", "pulls himself up onto the ledge"),
+        ("goes down the stairs to the pole", "goes down the stairs to the pole"),
+    ],
+)
+def test_who_hauls_himself_up_a_rope_climbs_it(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
         ("he jogs back to his car", "he jogs to his car"),
         ("a man walks back home", "a man walks home"),
         ("she turns around and walks back", "she turns around and walks forward"),
