@@ -10,7 +10,7 @@ import pytest
 
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.fine_wish import FineWish
-from marey.generation.whole_body import CHOICES, QUICKER
+from marey.generation.whole_body import CHOICES, QUICKER, is_drawn
 from marey.motion.features import HUMANML3D_263
 from marey.posing.still import standing_still
 from marey.quality.measure import range_degrees
@@ -42,7 +42,7 @@ def test_each_shows_its_action_on_the_floor_without_breaks(action: str, seed: in
     assert RULES[action](Motion(joints, FPS), "") >= 0.5
     assert joints[..., 1].min() > -0.03
     assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < (
-        0.75 if action in ("flip", "cartwheel") else 0.5
+        0.75 if action in ("flip", "cartwheel", "leap") else 0.5
     ), "no joint leaps"
     assert len(joints) > 2 * FPS
 
@@ -154,6 +154,31 @@ def test_cartwheels_are_as_many_as_asked_for() -> None:
         joints = drawn("cartwheel", "does cartwheels", count=count)
         over = joints[:, PELVIS, 1] > joints[:, HEAD, 1] + 0.2
         assert (np.diff(over.astype(int)) == 1).sum() == count
+
+
+@pytest.mark.parametrize("prompt", ["leaps over a puddle", "a ballerina does a grand jete", "leaps far"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_leap_goes_off_one_foot_in_a_split_and_onto_the_other_one(prompt: str, seed: int) -> None:
+    joints = drawn("leap", prompt, seed=seed)
+    high = int(joints[:, PELVIS, 1].argmax())
+    low = joints[:, [10, 11], 1] < 0.04
+    before, after = (np.flatnonzero(low[:high].any(1))[-1], high + int(low[high:].any(1).argmax()))
+    assert low[before].sum() == 1 == low[after].sum()
+    off, onto = 10 + int(low[before].argmax()), 10 + int(low[after].argmax())
+    assert off != onto
+    assert 1.3 < np.linalg.norm((joints[after, onto] - joints[before, off])[[0, 2]]) < 2.5
+    apart = np.linalg.norm(joints[high, 7] - joints[high, 8])
+    assert apart > (1.3 if "jete" in prompt else 1.0)
+    level = np.abs(joints[high, [20, 21], 1] - joints[high, [16, 17], 1]).max()
+    assert (level < 0.16) == ("ballerina" in prompt)
+    assert joints[-1, PELVIS, 1] > 0.9
+
+
+def test_a_leap_out_of_a_run_is_left_to_networks() -> None:
+    draws = is_drawn("leap")
+    assert draws(FineWish(prompt="leaps over a puddle"))
+    assert not draws(FineWish(prompt="runs and leaps over a puddle"))
+    assert not draws(FineWish(prompt="leaps over a puddle", beside=("runs", "")))
 
 
 @pytest.mark.parametrize(("prompt", "forward"), [("a front flip", 1), ("a backflip", -1), ("flips backwards", -1)])

@@ -1,5 +1,5 @@
-"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, cartwheels, crawls, ways
-to the floor and back, strokes of swimmers.
+"""Movements of the whole body, drawn in place of what a network makes: falls, rolls, flips, cartwheels, leaps, crawls,
+ways to the floor and back, strokes of swimmers.
 
 Networks know how such a movement begins; then they roll on, fall twice, turn the other way over, or crawl in place. The
 movements are those of the made clips of the training data, with the direction and the number that the prompt names.
@@ -20,6 +20,7 @@ from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
 from marey.drawing.gesture import Gesture
 from marey.drawing.hops import jump_turned
+from marey.drawing.leaps import leap
 from marey.drawing.rolls import flip, roll
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
@@ -47,6 +48,13 @@ _BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
 _FRONT = re.compile(r"\b(?:forwards?|face|face[ -]?(?:first|down)|front|prone|stomach|belly|chest|trip\w*|stumbl\w*)\b")
 _SIDE = re.compile(r"\b(?:side|sides|sideways|left|right|over to (?:one|his|her|the) side)\b")
 _BACKWARD = re.compile(r"\bbackwards?\b|\bback(?:s|ing) (?:up|away|off)\b")
+_DANCES = re.compile(
+    r"\b(?:ballet\w*|ballerinas?|danc\w+|grand jet[eé]s?|jet[eé]s?|arms? (?:\w+ )?(?:out|wide|spread))\b"
+)
+_SPLIT = re.compile(r"\b(?:split\w*|legs? (?:\w+ ){0,3}(?:apart|wide|open|stretched|extended|straight))\b")
+_FAR = re.compile(r"\b(?:far|long|big|huge|great|wide|large|gap|chasm|river|stream|ditch|rooftops?)\b")
+_RUNS_FIRST = re.compile(r"\b(?:runs?|sprints?|jogs?|races?)\b[^.;]*\b(?:and|then|before)\b")
+"""Words of a run that is as much of a motion as the leap behind it."""
 _KNEES = re.compile(r"\bknees?\b")
 _SPINS = re.compile(r"\b(?:spins?|spinning|whirls?|twists?)\b")
 _HIT = re.compile(
@@ -135,6 +143,13 @@ def _cartwheel(wish: FineWish, rng: random.Random, seconds: float | None) -> Ges
     return cartwheel(rng, named[1] if named else wish.side, min(wish.count or 1, MOST_WHEELS))
 
 
+def _leap(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    form = "dance" if _DANCES.search(text) else "split" if _SPLIT.search(text) else "far" if _FAR.search(text) else ""
+    return leap(rng, form, wish.side)
+
+
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     text = wish.prompt.lower()
     back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
@@ -206,6 +221,7 @@ CHOICES: Mapping[str, Choice] = {
     "roll": _roll,
     "flip": _flip,
     "cartwheel": _cartwheel,
+    "leap": _leap,
     "crawl": _crawl,
     "lie-down": _lie_down,
     "lie": _lie,
@@ -219,7 +235,14 @@ CHOICES: Mapping[str, Choice] = {
 """Movements by action."""
 AGAIN = frozenset({"roll", "flip", "jump-turn"})
 """Actions that begin and end standing, and are done again."""
-LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {"roll": _IN_BED, "lie-down": _ON_SIDE, "lie": _ON_SIDE}
+OUT_OF_A_RUN = frozenset({"leap"})
+"""Actions that are drawn where they stand alone: out of the run before it, the network's goes on at its speed."""
+LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {
+    "roll": _IN_BED,
+    "leap": _RUNS_FIRST,
+    "lie-down": _ON_SIDE,
+    "lie": _ON_SIDE,
+}
 """Words of movements that are not drawn."""
 
 
@@ -243,8 +266,12 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
 
 def is_drawn(action: str) -> Callable[[FineWish], bool]:
     """Return a function that tells if a movement of an action is drawn as its prompt asks for it."""
-    others = LEFT_TO_NETWORKS.get(action)
-    return lambda wish: others is None or not others.search(wish.prompt.lower())
+    others, alone = LEFT_TO_NETWORKS.get(action), action in OUT_OF_A_RUN
+
+    def draws(wish: FineWish) -> bool:
+        return not (alone and any(wish.beside)) and (others is None or not others.search(wish.prompt.lower()))
+
+    return draws
 
 
 def drawn_in_place(
