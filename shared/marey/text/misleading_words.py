@@ -194,6 +194,13 @@ _UP_ROPE = re.compile(
 )
 """A climb of a rope, of which models read pull-ups and other ways: "hauls himself up the rope"."""
 _HAND_OVER_HAND = re.compile(rf"^(?=\W*hand\ over\ hand,?\ (?:up|down)\ {_ROPE})", re.IGNORECASE | re.VERBOSE)
+_DANCER_LEAPS = re.compile(
+    r"""\b(?P<who>(?:ballerina|ballerino|dancer|gymnast)s?(?:\ is)?)\ leap(?P<end>s|ing)?\b
+    (?:,?\ with\ (?:(?:his|her|their)\ )?arms\ (?:out\w*|spread|wide|open|extended)(?:\ to\ the\ sides?)?)?
+    (?!\ (?:up|out|aside|back\w*|off|on|onto|into|to|down|for|with\ joy)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A leap of a dancer from one foot to the other, of which models read a jump or a dance."""
 _THING = r"(?:a|an|the|his|her|their|its|some|my|your)"
 OTHER_SENSE: Mapping[str, re.Pattern[str]] = {
     "roll": re.compile(
@@ -249,8 +256,9 @@ def without_misleading(prompt: str) -> str:
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
     leg to leg stands, and who falls over the knees falls once.
-    Who hauls himself up a rope climbs it.
+    Who hauls himself up a rope climbs it. A dancer who leaps does so from one foot to the other.
     """
+    prompt = _DANCER_LEAPS.sub(_performs_a_leap, prompt)
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
     prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
@@ -283,6 +291,12 @@ def _against(found: re.Match[str]) -> str:
     """Return a body that stands with its back to something."""
     stands = "standing" if found["ing"] else "stands" if found["s"] else "stand"
     return f"{stands} with the back {found['where']}"
+
+
+def _performs_a_leap(found: re.Match[str]) -> str:
+    """Return who leaps with words that no jump has."""
+    end = found["end"] or ""
+    return f"{found['who']} perform{end} a leap"
 
 
 def _climbs(found: re.Match[str]) -> str:

@@ -34,7 +34,15 @@ def test_every_bearing_that_moves_is_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    "prompt", ["does burpees", "does lunges", "moonwalks", "dives to the left", "slides on the ground feet first"]
+    "prompt",
+    [
+        "does burpees",
+        "does lunges",
+        "a knee strike",
+        "moonwalks",
+        "dives to the left",
+        "slides on the ground feet first",
+    ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
 def test_they_are_smooth_and_on_the_floor(prompt: str, seed: int) -> None:
@@ -75,6 +83,21 @@ def test_lunges_are_as_many_as_asked_for_with_a_level_thigh_and_a_low_knee(promp
     assert all(a != b for a, b in itertools.pairwise(fronts))
     assert "right" not in prompt or fronts == [1]
     assert joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] == pytest.approx(times * way, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "knee", "times"),
+    [("knee R", 5, 1), ("knees him in the stomach with his left knee", 4, 1), ("two right knee strikes", 5, 2)],
+)
+def test_a_knee_strike_drives_the_knee_up_as_the_hands_come_down(prompt: str, knee: int, times: int) -> None:
+    joints = drawn(prompt)
+    up = joints[:, knee, 1] > 0.8
+    assert (np.diff(up.astype(int)) == 1).sum() == times
+    assert joints[:, 9 - knee, 1].max() < 0.6
+    top = int(joints[:, knee, 1].argmax())
+    assert joints[top, knee, 2] > joints[top, PELVIS, 2] + 0.25
+    assert joints[top - round(0.3 * FPS), WRISTS, 1].min() > joints[top, WRISTS, 1].max() + 0.1
+    assert joints[-1, PELVIS, 1] > 0.9
 
 
 def test_a_moonwalk_glides_backward_on_a_flat_foot() -> None:

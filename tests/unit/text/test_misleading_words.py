@@ -315,3 +315,15 @@ def test_a_knee_in_a_list_of_blows_is_one_of_them(prompt: str, read: str) -> Non
 )
 def test_who_lunges_without_a_weapon_exercises(prompt: str, exercise: bool) -> None:
     assert lunges_as_exercise(prompt) is exercise
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("the dancer leaps with her arms out", "the dancer performs a leap"),
+        ("a dancer leaps up", "a person leaps up"),
+        ("a man leaps", "a man leaps"),
+    ],
+)
+def test_a_dancer_leaps_from_one_foot_to_the_other(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read

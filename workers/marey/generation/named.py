@@ -1,5 +1,5 @@
 """Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, lunges,
-moonwalks, dives to a side, slides.
+knee strikes, moonwalks, dives to a side, slides.
 
 Readers and networks know nothing of them. Their words are those of bearings that move (`moves` in `bearings.toml`), so
 that they are read as what is done by a body that stands, and the movement is drawn in its place.
@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
 from marey.drawing.gesture import Gesture
+from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
 from marey.generation.fine_wish import FineWish
@@ -29,6 +30,8 @@ LUNGE_S = 1.9
 """Seconds of one of several lunges."""
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
 _REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
+_SIDES = {"l": "left", "r": "right"}
+_SIDE_LETTER = re.compile(r"\bknee(?: \w+)? ([lr])$")
 _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|rises?|jumps?|springs?|picks?|scrambles?)\b.*\bup\b|\brises?\b"
     r"|\bto (?:his|her) feet\b"
@@ -69,6 +72,12 @@ def _lunges(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: 
     return lunges(rng, form, _times(stated) or (1 if single else room), stated.side)
 
 
+def _knee_strike(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    letter = _SIDE_LETTER.search(stated.words)
+    return knee_strike(rng, _SIDES[letter[1]] if letter else stated.side, _times(stated))
+
+
 def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del stated, wish
     return moonwalk(rng, seconds=seconds)
@@ -87,6 +96,7 @@ def _ground_slide(stated: StatedBearing, wish: FineWish, rng: random.Random, sec
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
+    "knee-strike": _knee_strike,
     "moonwalk": _moonwalk,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,
