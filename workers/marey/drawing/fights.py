@@ -99,10 +99,10 @@ def block(rng: random.Random, *, times: int | None = None) -> Gesture:
     ready, start, stance = (0.1, -2.0, None) if stands else begun(rng, lead)
     goes, pole = _BLOCKS[form]
     places = {(side if who == "acts" else OTHER_SIDE[side]): near(rng, place) for who, place in goes.items()}
-    times, seconds = [], ready + rng.uniform(0.1, 0.7)
+    phases, seconds = [], ready + rng.uniform(0.1, 0.7)
     for _ in range(number):
         rise, hold, fall = rng.uniform(0.28, 0.42), rng.uniform(0.35, 1.5) / number**0.5, rng.uniform(0.35, 0.7)
-        times.append((seconds, rise, hold, fall))
+        phases.append((seconds, rise, hold, fall))
         seconds += rise + hold + fall + rng.uniform(0.15, 0.6)
     seconds += rng.uniform(0.3, 0.7)
     guard = near(rng, (0.12, -0.26, 0.24), 0.05)
@@ -113,13 +113,13 @@ def block(rng: random.Random, *, times: int | None = None) -> Gesture:
 
     def change(body: StandingBody) -> None:
         frames = len(body.joints)
-        ways = [envelope(frames, *time) for time in times]
+        ways = [envelope(frames, *time) for time in phases]
         up = np.sum(ways, axis=0)
         if stance:
             stance(body, envelope(frames, start, 0.6, 60.0, 1.0))
         if steps:
-            step(body, foot, (0.02, -stride), times[0][0] - 0.1, 0.35)
-            body.shift(np.zeros(frames), -0.4 * stride * envelope(frames, times[0][0] - 0.1, 0.35, 60.0, 1.0))
+            step(body, foot, (0.02, -stride), phases[0][0] - 0.1, 0.35)
+            body.shift(np.zeros(frames), -0.4 * stride * envelope(frames, phases[0][0] - 0.1, 0.35, 60.0, 1.0))
         body.shift(-sink * up, -back * up)
         body.lean(bent * up, "left")
         settle(body)
