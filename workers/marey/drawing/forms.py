@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from marey.drawing.gesture import BOTH, SIDES, Gesture
@@ -75,14 +75,19 @@ def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
         asked: what the prompt says.
     """
     forms = load_forms().get(action, Forms())
-    kinds, text = set(gesture.kinds), asked.text
-    named = {kind for kind, words in forms.named.items() if words.search(text)}
+    kinds, text, named = set(gesture.kinds), asked.text, _named(action, asked.text)
     lacks, unasked = len(named - kinds), len((forms.only & kinds) - named)
     unasked += gesture.side in SIDES and bool(_BOTH.search(text))
     unasked += gesture.side == BOTH and bool(_ONE.search(text) or asked.side)
     unasked += gesture.times not in (1, asked.count) and (asked.count is not None or asked.brief)
     unusual = bool(forms.usual - kinds)
-    if asked.brief:
-        return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + max(gesture.seconds - BRIEF_S, 0.0))
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
-    return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + too_long)
+    excess = max(gesture.seconds - BRIEF_S, 0.0) if asked.brief else too_long
+    return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + excess)
+
+
+@lru_cache(maxsize=64)  # the same for each of the movements that one prompt chooses from
+def _named(action: str, text: str) -> frozenset[str]:
+    """Return the kinds of an action that a text names."""
+    named = load_forms().get(action, Forms()).named
+    return frozenset(kind for kind, words in named.items() if words.search(text))

@@ -90,7 +90,7 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
         body = standing_still(frames or _frames(action, wish, rng), random.Random(f"{seed} stands"))  # noqa: S311
         joints = FINE[action].draw(body, FPS, wish, rng)
         return None if joints is None else DrawnWhole(encode_all(layout, joints))
-    if action not in DRAWINGS or action not in RULES or (frames is not None and frames < SHORTEST):
+    if action not in DRAWINGS or (frames is not None and frames < SHORTEST):
         return None
     joints = _shown(action, wish, random.Random(f"{seed} {action}"), frames)  # noqa: S311
     if joints is not None and action in FINE and wish.count is not None:
