@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import AskedMotion, generate_as_asked
+from marey.generation.asked import AskedMotion, changes_of, generate_as_asked
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.port import Limits, NoControl, Request
@@ -93,3 +93,11 @@ def test_the_number_of_frames_is_kept_where_it_is_fixed() -> None:
         drawn = drawn_whole(LAYOUT, action, FineWish(fixed=True), 1, 120)
         assert drawn is not None
         assert len(drawn.features) == 120
+
+
+def test_nothing_is_drawn_where_the_network_is_to_make_all() -> None:
+    network = Network()
+    prompts = ["a man kneels", "a man claps twice", "a man walks and looks around", "a man nods"]
+    made = generate_as_asked(network, [ask(each, drawing=False) for each in prompts])  # type: ignore[arg-type]
+    assert network.asked == prompts
+    assert not any({"drawn", "gaze"} & changes_of(each).keys() for each in made if each)

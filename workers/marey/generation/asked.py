@@ -209,7 +209,7 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    if not draws(generator) or not (wish.action or request.held.is_drawn):
+    if not draws(generator, request) or not (wish.action or request.held.is_drawn):
         return None
     generator.limits.check(request)
     if request.held.is_drawn:
@@ -226,9 +226,20 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     return replace(drawn, features=features[: request.frames] if wish.action == STANDING else features)
 
 
-def draws(generator: Generator[Any]) -> bool:
-    """Return True if motions of a generator may be drawn, as those that it learned from."""
-    return generator.bundle.manifest.draws_bearings and generator.layout.skeleton.name == HUMANML3D.name
+DRAWING = "drawing"
+"""Setting of models whose bundles may draw: 0 = the network makes everything."""
+
+
+def drawing_of(generator: Generator[S], settings: S) -> bool:
+    """Return True if these settings let rules draw movements, `Request.drawing`; also where the model has no such
+    setting."""
+    return bool(generator.describe_settings(settings).get(DRAWING, True))
+
+
+def draws(generator: Generator[Any], request: Request) -> bool:
+    """Return True if the motion of a request may be drawn, as those that its generator learned from."""
+    known = generator.bundle.manifest.draws_bearings and generator.layout.skeleton.name == HUMANML3D.name
+    return known and request.drawing
 
 
 def _as_asked(
@@ -248,7 +259,7 @@ def _as_asked(
     if source is None:
         return None
     layout, features = generator.layout, source.features
-    changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze else {}
+    changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze and request.drawing else {}
     if not request.held.is_drawn and _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
@@ -274,7 +285,7 @@ def _in_posture(
     """Return the motion of a gesture in the posture of its row, and one that would go on and on as a short one; any
     other motion as it is."""
     held, fixed = request.held, request.frames is not None and not request.open
-    if motion is None or not draws(generator) or len(motion.features) < SHORTEST:
+    if motion is None or not draws(generator, request) or len(motion.features) < SHORTEST:
         return motion
     whole = fixed or wish.count is not None
     goes_on = wish.action in GOING_ON and any(request.beside) and not whole
@@ -294,7 +305,7 @@ def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: in
 
 def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
     """Return the motion of a network with what is drawn of its action; None if it stays."""
-    if wish.action not in FINE or _shows(features, layout, wish, request):
+    if wish.action not in FINE or not request.drawing or _shows(features, layout, wish, request):
         return None
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
 

@@ -78,7 +78,7 @@ def finish(
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
     layout, features = generator.layout, generated.features
-    drawn = generator.bundle.manifest.draws_bearings
+    drawn = generator.bundle.manifest.draws_bearings and request.drawing
     spans = borne_spans(request, layout.fps, len(features)) if drawn else []
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
     manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)

@@ -23,7 +23,8 @@ def resolved_length(generator: Generator[Any], request: Request) -> Request:
         InvalidInput: as `Limits.check`.
     """
     resolved = generator.resolve_length(request)
-    if request.frames is not None or resolved.frames is None or not generator.bundle.manifest.draws_bearings:
+    drawn = generator.bundle.manifest.draws_bearings and request.drawing
+    if request.frames is not None or resolved.frames is None or not drawn:
         return resolved
     limits = generator.limits
     return replace(resolved, frames=limits.within(max(resolved.frames, round(_least(request.text) * limits.fps))))

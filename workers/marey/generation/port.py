@@ -57,6 +57,7 @@ class Request:
     open: bool = False  # `frames` were not asked for: what the prompt asks for may need more or fewer
     beside: tuple[str, str] = ("", "")  # prompts of the rows of a timeline before and after it; empty = none
     held: RowPosture = NO_POSTURE  # postures of the row of a sequence
+    drawing: bool = True  # rules may draw movements; else the network makes all of it
 
     @property
     def is_sequence(self) -> bool:

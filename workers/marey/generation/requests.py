@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
+from marey.generation.asked import drawing_of
 from marey.generation.candidates import split_settings
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.port import Generator, Request
@@ -65,12 +67,13 @@ def request_of(
         InvalidInput: a length or seed out of range, features of another encoder, or constraints that no clip can meet;
             with the field in `where`.
     """
+    own, plan = split_settings(item.settings)
     if item.timeline is not None:
         request = timeline_request(timeline_rows(item.timeline), texts, item.seed, scope)
     else:
         frames = generator.limits.frames_of(item.seconds, texts[0])
         request = Request(texts[0], item.seed, frames, recording, scope)
+    request = replace(request, drawing=drawing_of(generator, generator.settings(own)))
     if item.constraints:
-        fps = split_settings(item.settings)[1].fps
-        request = constrained_request(generator, request, item.constraints, item.seconds, fps)
+        request = constrained_request(generator, request, item.constraints, item.seconds, plan.fps)
     return resolve_request(generator, request)

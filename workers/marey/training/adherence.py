@@ -25,6 +25,7 @@ from marey.checks.quality import Quality, quality
 from marey.checks.rates import Rate, expectations, mean_quality, name_of
 from marey.core.errors import InvalidBundle
 from marey.data.prepared import PreparedData
+from marey.generation.asked import drawing_of
 from marey.generation.export import finish
 from marey.generation.port import Generator, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
@@ -141,8 +142,11 @@ def measure(
         frames: length of every motion; None = the length estimator's.
         progress: called with motions done and wanted.
     """
+    drawing = drawing_of(generator, settings)
     jobs = [
-        (prompt, Request(text, seed, frames)) for seed in seeds for prompt, text in zip(prompts, texts, strict=True)
+        (prompt, Request(text, seed, frames, drawing=drawing))
+        for seed in seeds
+        for prompt, text in zip(prompts, texts, strict=True)
     ]
     trials: list[Trial] = []
     for start in range(0, len(jobs), generator.batch):

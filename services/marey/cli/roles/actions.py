@@ -284,6 +284,7 @@ class _Run:
     def motions(self, prompts: Sequence[P]) -> Iterator[tuple[P, int, MotionClip]]:
         """Generate each prompt with each seed."""
         from marey.bundles.limits import length_of
+        from marey.generation.asked import drawing_of
         from marey.generation.candidates import draw_clips
         from marey.generation.port import Request
         from marey.generation.shots.dispatch import resolve_request
@@ -296,8 +297,9 @@ class _Run:
         lengths = (length_of(generator.bundle, Item(prompt.text)) for prompt in prompts)
         frames = [generator.limits.frames_of(seconds, text) for seconds, text in zip(lengths, texts, strict=True)]
         scopes = self._scopes(pipeline, prompts)
+        drawing = drawing_of(generator, self._settings)
         jobs = [
-            (prompt, resolve_request(generator, Request(text, seed, wanted, scope=scope)))
+            (prompt, resolve_request(generator, Request(text, seed, wanted, scope=scope, drawing=drawing)))
             for seed in range(self._options.seeds)
             for prompt, text, wanted, scope in zip(prompts, texts, frames, scopes, strict=True)
         ]

@@ -83,7 +83,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         return request
     ends = list(accumulate(lengths))
     postures = [NO_POSTURE] * len(movements)
-    if draws(generator):
+    if draws(generator, request):
         postures = row_postures([_row(text) for text in movements], request.seed)
     rows = tuple(
         TimedText((end - length) / fps, end / fps, text, open=own is None and request.frames is None, held=held)
@@ -105,7 +105,7 @@ def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> 
 def _drawn_frames(generator: Generator[Any], request: Request, movement: TextFeatures, number: int) -> int:
     """Return the frames that the model gives a movement alone; who stands and waits beside others does so for as long
     as what is drawn on it takes."""
-    alone = Request(movement, part_seed(request.seed, SEED, number))
+    alone = Request(movement, part_seed(request.seed, SEED, number), drawing=request.drawing)
     frames = resolved_length(generator, alone).frames or generator.limits.min_frames
     if action_of(movement) != STANDING:
         return frames

@@ -195,7 +195,15 @@ class _Row(_Strand):
     def request(self) -> Request:
         """Return the request of the first window."""
         own_length = self.open and len(self.lengths) == 1
-        return Request(self.text, self.seed, self.lengths[0], open=own_length, beside=self.beside, held=self.held)
+        return Request(
+            self.text,
+            self.seed,
+            self.lengths[0],
+            open=own_length,
+            beside=self.beside,
+            held=self.held,
+            drawing=self.timeline.drawing,
+        )
 
     def gap(self) -> FrameGap:
         """Return the gap of a window after the first."""
@@ -265,6 +273,7 @@ class _Timeline:
         self.open = request.is_sequence and request.frames is None
         self.timeline = request.timeline
         self.seed = request.seed
+        self.drawing = request.drawing
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
         prompts = ["", *(row.text.said for row in request.timeline), ""]

@@ -19,6 +19,7 @@ Steps = Annotated[int, SPEC.range_of("steps")]
 Guidance = Annotated[float, SPEC.range_of("guidance")]
 Temperature = Annotated[float, SPEC.range_of("temperature")]
 TopK = Annotated[float, SPEC.range_of("top_k")]
+Drawing = Annotated[int, SPEC.range_of("drawing")]
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ class InferenceConfig:
     residual_guidance: Guidance = 5.0  # the same three for the residual levels
     residual_temperature: Temperature = 1.0
     residual_top_k: TopK = 0.1
+    drawing: Drawing = 1  # 1 = bundles that draw have rules draw movements; 0 = the network makes all
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ class SamplingSettings(Sampling[InferenceConfig]):
     residual_guidance: float | None = None
     residual_temperature: float | None = None
     residual_top_k: float | None = None
+    drawing: int | None = None
     min_progress: bool = False
     skip_idle: bool = True
     trim_slots: bool = True
