@@ -16,6 +16,7 @@ from marey.text.action_reader import (
     joins_clauses,
     named_actions,
 )
+from marey.text.clause_parts import parts_in_time
 from marey.text.encoders import Encoding
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
 from marey.text.plain_action import with_plain_action
@@ -92,7 +93,8 @@ class TrainedReaders:
     def read(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for."""
         bare = [BarePrompt.of(text) for text in texts]
-        self._pooled([*texts, *(each.text for each in bare if each.text)])  # together, in half the time
+        parts = [said for each in bare for said, _ in parts_in_time(each.text)] if self._movements else []
+        self._pooled([*texts, *(each.text for each in bare if each.text), *parts])  # together, in half the time
         self._encode_together([each if each.text else as_written(each.prompt) for each in bare])
         return [self._carried(self._borne(each) or self._reading(as_written(each.prompt)), each) for each in bare]
 
@@ -142,7 +144,15 @@ class TrainedReaders:
         """Return True if a prompt is not looked at for several movements."""
         if read.action is None or read.probability < SURE_OF_SEVERAL or way_to_rest(bare.prompt, read.action):
             return False
+        if self._is_in_parts(bare.text):
+            return False
         return read.action not in RISING or not named_actions(bare.text) & WAYS  # "stands up and walks away"
+
+    def _is_in_parts(self, text: str) -> bool:
+        """Return True if words and network agree that the parts of a text are several actions: "aim, fire"."""
+        parts = parts_in_time(text)
+        moving = {action for _, action in parts} - {STANDING, *RISING}
+        return len(parts) == len(moving) > 1 and all(self._read_action(said).action == action for said, action in parts)
 
     def _borne(self, bare: BarePrompt) -> ReadPrompt | None:
         """Return the reading of a prompt without the words that ask for a bearing; None if it asks for none, or for one

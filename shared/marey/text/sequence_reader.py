@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.hashing import sha256_of
-from marey.text.action_reader import OUTSIDE, RISING, word_marks
+from marey.text.action_reader import OUTSIDE, RISING, named_actions, word_marks
+from marey.text.clause_parts import only_named, parts_in_time
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
 from marey.text.reader_file import Float32, Reader
@@ -28,12 +29,12 @@ from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.gazes import only_gaze
+from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 6
+VERSION = 7
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -93,6 +94,8 @@ _MANNER = re.compile(
     r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
 )
 """Words that say how something is done, though one of them names an action."""
+_UNTIL = re.compile(r"\W*until (?:he|she|they|it)(?:'s|'re| (?:is|are|can\W?t|cannot|has|have))\b", re.IGNORECASE)
+"""Words of the state in which a movement ends: "until he is worn out"."""
 _END = re.compile(
     r"""(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?(?:
     lands?(?:\s(?:softly|safely|on\s(?:both|his|her|their|the)\s(?:\w+\s)?feet))?
@@ -145,7 +148,17 @@ BACKWARD: Mapping[str, str] = {"walk-backward": "walk"}
 """Ways ahead, by those backward."""
 _ACROSS = re.compile(r"\b(?:over|across)\b", re.IGNORECASE)
 _STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
-_STOPS = re.compile(r"(?:he |she |they )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
+_WITHOUT = re.compile(r"\bwithout (?:\w+ly )?\w+ing\b[^,;.]*", re.IGNORECASE)
+"""Words of what does not come with a movement, which is done all the same."""
+_IN_TIME = re.compile(r"^\W*(?:and )?(?:then|finally|afterwards?|after that)\b|^\W*(?:and )?stops?\b", re.IGNORECASE)
+"""Beginning of a clause that comes behind all before it."""
+_OTHERS = re.compile(
+    r"^\W*while (?:the|his|her|their|its|others|everyone|everybody|an?|some|two|three|nobody|no one)\b"
+    r"(?!.*\b(?:he|she|they)\b)",
+    re.IGNORECASE,
+)
+"""Beginning of a clause that tells what others do."""
+_STOPS = re.compile(r"(?:(?:he|she|they|an? \w+|the \w+) )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
 """Beginning of a clause that ends the way before it."""
 
 
@@ -237,18 +250,19 @@ class SequenceReader(Reader):
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
         if way := way_to_rest(bare.prompt, action):
-            return ReadMovement(way, action), _rest()
+            several = [ReadMovement(text, one) for text, one in parts_in_time(way)]  # "jogs, slows to a walk and stops"
+            return (*(several or [ReadMovement(way, action)]), _rest())
         written = self._clauses(bare, encoding, pooled)
-        whole = _with_belongings(written)
+        whole = list(_parted(_with_belongings(written)))
         if len(whole) == 1 < len(written) and whole[0].name in _GOES_ON:
             return (ReadMovement(bare.prompt, whole[0].name),)
         groups = in_order(whole)
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
             return ()
-        if _is_one_action({clause.name for clause in clauses}, action) and not _stops_on_a_way(clauses):
-            return ()
-        if any("negation" in match_scope(clause.text, every_action()).flags for clause in clauses):
+        if _is_one_action([clause.name for clause in clauses], action) and not _stops_on_a_way(clauses):
+            return _turn_and_rest(clauses)
+        if any("negation" in match_scope(_WITHOUT.sub("", each.text), every_action()).flags for each in clauses):
             return ()
         found = list(_from_there(map(_movement, groups)))
         if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(bare.prompt):
@@ -397,11 +411,26 @@ def _rest() -> ReadMovement:
     return ReadMovement(phrase_in_third_person(load_vocabulary().need(STANDING).plain), STANDING, REST_S)
 
 
-def _is_one_action(names: set[str], action: str | None) -> bool:
+def _is_one_action(names: Sequence[str], action: str | None) -> bool:
     """Return True if clauses with these names are one action: "stands and waves" of a prompt that is taken for one, and
-    "walks ahead, then veers off", since who turns walks."""
-    moving = names - {STANDING}
-    return (TURNING in moving and moving <= TURNS) or (action is not None and len(moving) < 2)
+    "walks ahead, then veers off", since who turns walks. "Stands idle, walks" is two if it is taken for standing."""
+    moving = set(names) - {STANDING}
+    if action == STANDING == names[0] and moving:
+        return False
+    turns = TURNING in moving and moving <= TURNS and not moving >= TURNS
+    if turns and len(moving) > 1 and names.index(TURNING) == 0:  # "turns left, then walks up"
+        return False
+    return turns or (action is not None and len(moving) < 2)
+
+
+def _turn_and_rest(clauses: Sequence[ReadClause]) -> tuple[ReadMovement, ...]:
+    """Return the movements of a way with a turn behind which the body is said to stand: "walks up to us, turns left and
+    then waits"; none if it is not."""
+    *way, last = clauses
+    if last.name != STANDING or TURNING not in {clause.name for clause in way} or not _IN_TIME.match(last.text):
+        return ()
+    said = without_joints(" ".join(clause.text for clause in way))
+    return ReadMovement(said, TURNING), ReadMovement(without_joints(last.text), STANDING)
 
 
 def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
@@ -420,7 +449,8 @@ def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
     for clause in clauses:
         text = without_joints(clause.text)
         goes_on = _GOES_ON.get(found[-1].name) if found else None
-        belongs = _MANNER.match(clause.text) or _END.fullmatch(text) or (goes_on and goes_on.match(text))
+        how = _MANNER.match(clause.text) or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
+        belongs = how or _END.fullmatch(text) or (goes_on and goes_on.match(text))
         if found and (belongs or found[-1].text.lower().endswith(" from")):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:
@@ -464,12 +494,31 @@ def turned_to_carry(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]
         before = movement.action
 
 
+def _parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
+    """Yield clauses; one whose words name several actions in the order of time as these: "gets up and draws an arrow"
+    may be cut late, and "rolls forward, gets up" is two. What others do meanwhile asks for nothing."""
+    for number, clause in enumerate(clauses):
+        if number == 0 and _OTHERS.match(clause.text):
+            yield replace(clause, name=CONTEXT)
+            continue
+        parts = parts_in_time(clause.text, listed=number > 0)
+        if len(parts) < 2:
+            named = only_named(without_gaze(clause.text)) if clause.probability < SURE else None
+            yield clause if named is None else replace(clause, name=named, probability=PLAIN)
+            continue
+        for place, (text, action) in enumerate(parts):
+            yield ReadClause(action, clause.probability, text, clause.at_once and place == 0)
+
+
 def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     text = without_joints(" ".join(clause.text for clause in group))
     if only_gaze(text):
         return ReadMovement(text, STANDING)
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
-    action = group[0].name if single else None
+    outside = len(group) == 1 and group[0].name == OUTSIDE and group[0].probability >= PLAIN
+    action = group[0].name if single else None if outside else only_named(without_gaze(text))
+    if action is None and _STOPS.match(text) and not named_actions(text) - {STANDING}:
+        action = STANDING
     return ReadMovement(text, action, DRAWN_S if action in DRAWN_AS else None)
 
 

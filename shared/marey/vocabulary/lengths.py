@@ -43,7 +43,7 @@ _LENGTH = re.compile(
 _BEFORE = re.compile(r"\b(?:after|every|each|first|last|next|another|per|within|at|than|the)(?: \w+)?[ ]$")
 """Words before a time that is a moment or a part, not a length: "after two seconds", "the first three seconds"."""
 _AFTER = re.compile(r"^[ ]?(?:later|ago|in\b|apart|into|mark|hand|from now|at a time|between)")
-_NEXT = re.compile(r"\b(?:then|before|after|afterwards?|followed by|finally|next)\b|[;.!?](?:\s|$)")
+_NEXT = re.compile(r"\b(?:then|before|after|afterwards?|followed by|finally|next)\b|[;.!?](?:\s|$)|->|→|\s[-–—]\s")
 """Separators of actions in the order of time."""
 _LISTED = re.compile(r"(?:,|\band\b)(?:\s+and)?\s+(?:(?:he|she|they)\s+)?(?:\w+ly\s+)?(?=(?P<verb>[a-z]+)\b)")
 """Separators of the clauses of a list, before the verb of the next one."""
@@ -53,6 +53,8 @@ _HERE = "\0"
 """Stands in place of a length."""
 _CLAUSE_BEFORE = re.compile(r"[^\W\d_]{3}.*\bfor\s+(?:(?:about|around|exactly|roughly|only|just)\s+)?$")
 """A clause, and the word before the length that is its own."""
+_OWN_BEFORE = re.compile(r"(?<!\bfor)(?<!\bin)(?<!\babout)(?<!\bof)(?<=[^\W\d_]{2})\s*$")
+"""A clause whose length stands behind it: "balances 2 s, jumps"."""
 _DECADE = re.compile(r"[5-9]0s")
 _LABEL = re.compile(r"\b(?:length|duration|total|time|lasting|takes?|overall)\b")
 
@@ -97,17 +99,18 @@ def _listed(part: str) -> Iterator[str]:
     """Yield the clauses behind a length that is said of the first one: "walks for two seconds", "waves" and "sits
     down"; the part as it is where the length is at its beginning or its end."""
     before, here, after = part.partition(_HERE)
-    if not here or not _CLAUSE_BEFORE.search(before):
+    own = _CLAUSE_BEFORE.search(before) or (_OWN_BEFORE.search(before) and after.lstrip().startswith(","))
+    if not here or not own:
         yield part
         return
-    begins = [found for found in _LISTED.finditer(after) if found["verb"] in _verbs()]
+    begins = [found for found in _LISTED.finditer(after) if found["verb"] in verb_forms()]
     edges = [0, *(found.start() for found in begins), len(after)]
     yield before + after[: edges[1]]
     yield from (after[low:high] for low, high in pairwise(edges[1:]))
 
 
 @lru_cache(maxsize=1)
-def _verbs() -> frozenset[str]:
+def verb_forms() -> frozenset[str]:
     """Return the forms without an ending, and those with -s, of all verbs that are known."""
     lists = load_word_lists()
     phrases = [phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near)]

@@ -65,6 +65,14 @@ def test_it_knows_every_action_and_the_shipped_encoder() -> None:
         ("The knight kneels, then stands up and bows.", ["kneel", "get-up", "bow"]),
         ("she is sitting on a chair, then gets up and leaves", ["sit", "stand-up", "walk"]),
         ("A kid dances. Then he lies down on the floor.", ["dance", "lie-down"]),
+        ("The tumbler rolls forward along the mat, gets up and draws a bow.", ["roll", STANDING, "draw-bow"]),
+        ("While his friends are away the old man dances.", []),
+        ("While the others wait, the guard kneels, then bows.", ["kneel", "bow"]),
+        ("A boy dances until he is tired and then sits down on the floor.", ["dance", "sit-floor"]),
+        ("She walks up the path, makes a wide turn to her right and then waits.", ["turn", STANDING]),
+        ("turn left, then walk four steps, then wave", ["turn", "walk", "wave"]),
+        ("crawls to the tent, kneels and finally lies down without looking back", ["crawl", "kneel", "lie-down"]),
+        ("kneels, then does not stand up", []),
     ],
 )
 def test_movements_come_in_the_order_of_time(prompt: str, actions: list[str]) -> None:

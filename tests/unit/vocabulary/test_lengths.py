@@ -28,6 +28,8 @@ LISTS = ActionLists(("walk", "wave"))
         ("sits for eight seconds, back straight", 8.0),
         ("walks for 3 seconds and waves for 2 seconds", 5.0),
         ("walks for 6 seconds, slowly, like a zombie", 6.0),
+        ("walks 6 seconds, slowly", 6.0),
+        ("wave 2 s, bow 3 s", 5.0),
         ("for six seconds, a person walks and waves", 6.0),
         ("a dance from the 1980s", None),
         ("80s disco", None),
@@ -49,6 +51,10 @@ def test_the_stated_length_is_that_of_the_whole_motion(prompt: str, seconds: flo
         "he waits for a second before he jumps",
         "stand still for two seconds, answer the phone and hang up",
         "walks for two seconds, waves and sits down",
+        "hops on the left foot, stands on it 3 s, jumps",
+        "dribble 2 secs, full spin, jump shot",
+        "crouch - wait 2 seconds - sprint",
+        "idle -> wave 2 s -> bow",
     ],
 )
 def test_the_length_of_a_part_is_not_that_of_the_motion(prompt: str) -> None:
