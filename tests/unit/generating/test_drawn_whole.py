@@ -16,8 +16,11 @@ from marey.generation.fine_wish import FineWish
 from marey.generation.port import Limits, NoControl, Request
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
+from marey.posing.limbs import FPS
+from marey.quality.record import SHOWN
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
+from marey.selector.rules import RULES
 
 LAYOUT = HUMANML3D_263
 
@@ -101,3 +104,22 @@ def test_nothing_is_drawn_where_the_network_is_to_make_all() -> None:
     made = generate_as_asked(network, [ask(each, drawing=False) for each in prompts])  # type: ignore[arg-type]
     assert network.asked == prompts
     assert not any({"drawn", "gaze"} & changes_of(each).keys() for each in made if each)
+
+
+@pytest.mark.parametrize(
+    ("action", "seconds"), [("jump-forward", 2.0), ("wave", 2.0), ("cartwheel", 3.0), ("idle", 1.5)]
+)
+def test_movements_with_little_time_are_hurried(action: str, seconds: float) -> None:
+    for seed in range(3):
+        drawn = drawn_whole(LAYOUT, action, FineWish(fixed=True), seed, round(seconds * FPS))
+        assert drawn is not None
+        assert len(drawn.features) == round(seconds * FPS)
+        joints = LAYOUT.decode(drawn.features)
+        assert RULES[action](Motion(joints, LAYOUT.fps), "") >= SHOWN
+    assert drawn_whole(LAYOUT, "laugh", FineWish(fixed=True), 1, 20) is None
+
+
+def test_an_open_length_leaves_the_time_that_a_movement_takes() -> None:
+    drawn = drawn_whole(LAYOUT, "jump-forward", FineWish(), 1, 30)
+    assert drawn is not None
+    assert len(drawn.features) > 45

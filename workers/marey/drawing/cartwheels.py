@@ -99,16 +99,25 @@ def foot(side: str, at: float) -> Limb:
     return Limb((SIGN[side] * (at - SIGN[side] * 0.1), 0.0, 0.0), OWN)
 
 
-def cartwheel(rng: random.Random, side: str = "", times: int | None = None) -> Gesture:
+_PACE, _QUICK = (1.1, 1.4), (0.85, 1.0)
+"""Factors of the seconds above, also where there is little time."""
+_LEISURE_S = (3.2, 1.8)
+"""Seconds that a leisurely cartwheel takes, and those of each further one."""
+
+
+def cartwheel(rng: random.Random, side: str = "", times: int | None = None, seconds: float | None = None) -> Gesture:
     """Cartwheels of a body that stands with its side to where it goes.
 
     Args:
         rng: decides everything that is not given.
         side: left or right, to which it goes.
         times: how many, one out of the other; None = one.
+        seconds: that there are; None = as many as it takes.
     """
     times = times or 1
-    pace, side = rng.uniform(1.1, 1.4), side or rng.choice(SIDES)
+    first, more = _LEISURE_S
+    hurried = seconds is not None and seconds < first + more * times
+    pace, side = rng.uniform(*(_QUICK if hurried else _PACE)), side or rng.choice(SIDES)
     wheel = _Wheel(-0.1, rng.uniform(0.46, 0.58), rng.uniform(0.44, 0.5), rng.uniform(0.38, 0.44), rng.random(), 0.0)
     done = Tumble(times=[rng.uniform(0.2, 0.7)])
     done.then(0.45 * pace, Whole(tilt=(0, 0, 0), hands=_RAISED), rng.uniform(0.05, 0.2))

@@ -58,12 +58,14 @@ class StatedForm:
         count: repetitions; None = any number.
         side: `left` or `right` of the limb that acts; empty = either.
         brief: it is one of several movements, whose length is open: short, and done once where no number is stated.
+        seconds: that it has; None = as many as it takes.
     """
 
     text: str
     count: int | None = None
     side: str = ""
     brief: bool = False
+    seconds: float | None = None
 
 
 def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
@@ -82,7 +84,8 @@ def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
     unasked += gesture.times not in (1, asked.count) and (asked.count is not None or asked.brief)
     unusual = bool(forms.usual - kinds)
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
-    excess = max(gesture.seconds - BRIEF_S, 0.0) if asked.brief else too_long
+    room = BRIEF_S if asked.brief else asked.seconds
+    excess = too_long if room is None else max(gesture.seconds - room, 0.0)
     return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + excess)
 
 

@@ -31,6 +31,7 @@ class Gesture:
             it, `seconds` of an idle.
         content: the action of the captured clips that it may be put onto, or empty for all clips of its kind.
         untrue: see `marey.data.spoken.spoken`.
+        fills: the change fills a body of any length.
     """
 
     seconds: float
@@ -41,3 +42,4 @@ class Gesture:
     base: Callable[[Any], Array | None] | None = None
     content: str = ""
     untrue: str = ""
+    fills: bool = False

@@ -43,4 +43,4 @@ def idle(rng: random.Random) -> Gesture:
         body.lean(_ROLL * aside, "forward")
         body.turn(NECK, "up", look)
 
-    return Gesture(seconds, ("idle",), change)
+    return Gesture(seconds, ("idle",), change, fills=True)

@@ -25,7 +25,7 @@ from marey.generation.fine import FINE
 from marey.generation.fine_wish import FineWish
 from marey.generation.stated import stated_features
 from marey.generation.striking import stands
-from marey.generation.whole_body import CHOICES, is_drawn
+from marey.generation.whole_body import CHOICES, QUICKER, is_drawn, retimed
 from marey.motion.features import FeatureLayout, encode_all
 from marey.posing.limbs import FPS
 from marey.posing.standing import LEFT, RIGHT, StandingBody
@@ -80,7 +80,7 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
         action: id in the vocabulary.
         wish: what the prompt asks for.
         seed: of the motion.
-        frames: that it keeps; None = as many as it takes.
+        frames: that it keeps if its length is fixed, and has at least otherwise; None = as many as it takes.
     """
     stated = stated_features(layout, action, wish, frames, seed)
     if stated is not None:
@@ -95,6 +95,8 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
     joints = _shown(action, wish, random.Random(f"{seed} {action}"), frames)  # noqa: S311
     if joints is not None and action in FINE and wish.count is not None:
         joints = FINE[action].draw(joints, FPS, wish, rng)
+    if joints is not None and wish.fixed and frames is not None and len(joints) > frames:
+        joints = retimed(joints, frames)
     return None if joints is None else DrawnWhole(encode_all(layout, joints))
 
 
@@ -123,7 +125,7 @@ def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) 
     for number, gesture in enumerate(_asked_for(action, wish, rng, frames)):
         if number == DRAWN:
             break
-        joints = _drawn(gesture, frames, rng)
+        joints = _drawn(gesture, wish.fixed, frames, rng)
         side = wish.side if gesture.side in (LEFT, RIGHT) else ""
         if RULES[action](Motion(joints, FPS), side) >= SHOWN:
             return joints
@@ -134,12 +136,13 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
     says first."""
     text = wish.prompt.lower()
-    asked = StatedForm(text, wish.count, wish.side, any(wish.beside) and not wish.fixed)
+    seconds = frames / FPS if wish.fixed and frames is not None else None
+    asked = StatedForm(text, wish.count, wish.side, any(wish.beside) and not wish.fixed, seconds)
     drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
     yield from (
         gesture
         for gesture in sorted(drawn, key=lambda each: misfit(each, action, asked))
-        if _may_be(gesture, text, wish.side, frames)
+        if _may_be(gesture, text, wish.side, frames if wish.fixed else None)
     )
 
 
@@ -152,12 +155,17 @@ def _draw(action: str, rng: random.Random, count: int | None) -> Gesture:
 
 def _may_be(gesture: Gesture, text: str, side: str, frames: int | None) -> bool:
     other_side = side and gesture.side in (LEFT, RIGHT) and gesture.side != side
-    too_long = frames is not None and SHORTER * gesture.seconds * FPS > frames
+    too_long = frames is not None and not gesture.fills and QUICKER * SHORTER * gesture.seconds * FPS > frames
     untrue = gesture.untrue and re.search(gesture.untrue, text)
     return not (gesture.base or other_side or too_long or untrue)
 
 
-def _drawn(gesture: Gesture, frames: int | None, rng: random.Random) -> Array:
-    body = StandingBody(standing_still(frames or max(round(gesture.seconds * FPS), SHORTEST), rng))
+def _drawn(gesture: Gesture, fixed: bool, frames: int | None, rng: random.Random) -> Array:
+    own = max(round(gesture.seconds * FPS), SHORTEST)
+    if frames is not None and (gesture.fills or SHORTER * own <= frames):
+        own = frames
+    elif frames is not None and fixed:
+        own = min(own, round(frames / QUICKER))  # `drawn_whole` hurries it
+    body = StandingBody(standing_still(own, rng))
     gesture.change(body)
     return body.solved()

@@ -36,7 +36,7 @@ Choice = Callable[[FineWish, random.Random, float | None], Gesture]
 
 TRIES = 12
 """Movements of random length, of which the longest is taken that is not too long."""
-QUICKER = 0.7
+QUICKER = 0.65
 """Share of its length to which a movement is shortened at most."""
 IN_AIR = 95.0, 540.0
 """Degrees by which a body turns in one jump, at least and at most."""
@@ -138,9 +138,8 @@ def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 
 
 def _cartwheel(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    del seconds
     named = _SIDE_NAMED.search(wish.prompt.lower())
-    return cartwheel(rng, named[1] if named else wish.side, min(wish.count or 1, MOST_WHEELS))
+    return cartwheel(rng, named[1] if named else wish.side, min(wish.count or 1, MOST_WHEELS), seconds)
 
 
 def _leap(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
