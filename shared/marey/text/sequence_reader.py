@@ -21,6 +21,16 @@ from numpy.typing import NDArray
 
 from marey.core.hashing import sha256_of
 from marey.text.action_reader import OUTSIDE, RISING, named_actions, word_marks
+from marey.text.clause_order import (
+    BOUND_TO_HANDS,
+    PLAIN,
+    SURE,
+    ReadClause,
+    in_order,
+    parted,
+    with_belongings,
+    without_joints,
+)
 from marey.text.clause_parts import only_named, parts_in_time
 from marey.text.encoders import Encoding
 from marey.text.plain_action import TURNING, with_plain_action
@@ -40,16 +50,12 @@ STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
 KERNEL = 5
 """Tokens that a convolution sees."""
-CONTEXT = "no movement"
-"""Class of a clause that asks for nothing: "while the others eat"."""
 MOST_CUTS = 5
 """Cuts that are considered, those most likely; a prompt has one movement more at most."""
 LEAST_CUT = 0.03
 """Probability from which on a cut is considered."""
 ACTION_WEIGHT = 4.0
 """Weight of the actions of clauses beside that of the cuts."""
-SURE = 0.15
-"""Probability that each movement of a sequence has at least; one under `PLAIN` keeps its own words alone."""
 FLOOR = frozenset({"lie", "lie-down", "sit-floor", "kneel", "die", "sit-ups", "push-ups", "crawl"})
 SEAT = frozenset({"sit", "sit-down", "drive"})
 """Actions that end on the floor, and on a seat: "gets up" and "stands up" behind them are from there."""
@@ -59,28 +65,8 @@ HELD = {"sit-down": "sit", "lie-down": "lie", "die": "lie"} | {
 """Actions in whose last pose who "waits" behind them stays, by those that show it."""
 TURNS = frozenset({TURNING, "walk", "run"})
 """Actions that a prompt for a turn while walking or running names."""
-PLAIN = 0.5
-"""Probability from which on the action of a clause is said in plain words."""
-
-_PAUSE = (
-    r"(?:(?:an?|one|two|three|some|\d+) )?(?:short |brief |little |few |couple of )?"
-    r"(?:moment|while|pause|beat|bit|second|time)s?"
-)
-_AFTER = re.compile(
-    r"^\W*(?:and )?(?:(?:right |just |shortly )?(?:after|once(?= (?:he|she|they|it|the|his|her|a)\b))|but first"
-    r"|before that|having)\b",
-    re.IGNORECASE,
-)
-_AFTER_THAT = re.compile(rf"^\W*(?:and )?(?:after (?:that|this|which|{_PAUSE})|afterwards?)\b", re.IGNORECASE)
-_BEFORE = re.compile(r"^\W*(?:right |just |shortly )?before\b", re.IGNORECASE)
-_JOINING = re.compile(
-    r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|before"
-    rf"|after(?: (?:that|this|{_PAUSE}))?|until|once|while|as|followed by|but|having|ending with)\b\s*)+",
-    re.IGNORECASE,
-)
-"""Words and signs at the beginning of a clause that join it to others."""
-
-
+LIKELY = 0.3
+"""Probability from which on a clause whose words name no action has the likeliest."""
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
 RUNS, JUMPS = frozenset({"run", "sprint"}), frozenset({"jump", "jump-forward"})
@@ -90,39 +76,6 @@ DRAWN_S = 1.8
 """Seconds of an action that is drawn as a gesture, beside other actions."""
 REST_S = 2.0
 """Seconds of standing that a stop is read as."""
-_MANNER = re.compile(
-    r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
-)
-"""Words that say how something is done, though one of them names an action."""
-_UNTIL = re.compile(r"\W*until (?:he|she|they|it)(?:'s|'re| (?:is|are|can\W?t|cannot|has|have))\b", re.IGNORECASE)
-"""Words of the state in which a movement ends: "until he is worn out"."""
-_END = re.compile(
-    r"""(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?(?:
-    lands?(?:\s(?:softly|safely|on\s(?:both|his|her|their|the)\s(?:\w+\s)?feet))?
-    |straightens?(?:\s(?:back|again|up|out))*
-    |(?:recovers?|relaxes|relax)
-    |(?:returns?|comes?|goes|go|gets?)\s(?:back\s)?(?:up\s)?to\s(?:a\s|the\s)?(?:neutral|rest|upright|standing)(?:\s\w+)?
-    |lowers?\s(?:it|them|the\sarms?|(?:his|her|their)\s(?:arms?|hands?))(?:\s(?:back|again|down))*
-    )""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""Clauses of the end of a movement, which comes by itself."""
-_PERSON = r"(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?"
-_GOES_ON: Mapping[str, re.Pattern[str]] = {
-    "drive": re.compile(
-        rf"""{_PERSON}(?:(?:look|glanc|check|peer)\w*\b|(?:swerv|steer|honk|brak|accelerat)\w*\b
-        |(?:takes?|makes?)\s(?:an?\s)?(?:sharp|hard|left|right)\b|turns?\s(?:sharply\s|hard\s)?(?:left|right|the\swheel)\b
-        |(?:shift|chang)\w*\s(?:up|down|gears?))""",
-        re.IGNORECASE | re.VERBOSE,
-    ),
-    "hang": re.compile(
-        rf"""{_PERSON}(?:shimm\w*\b|(?:does|do)\s(?:\w+\s)?(?:pull|chin)[ -]?ups?\b
-        |(?:kick|rais|lift|swing)\w*\s(?:(?:his|her|their|both|the)\s)+(?:legs|feet|knees)\b
-        |(?:swing|sway)\w*(?:$|\s(?:gently|slowly|back|to|from|a\slittle)\b))""",
-        re.IGNORECASE | re.VERBOSE,
-    ),
-}
-"""Words of what is done at the wheel, or by the hands that hold, and is part of the movement before it."""
 _STOP = re.compile(
     r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
     (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
@@ -152,12 +105,6 @@ _WITHOUT = re.compile(r"\bwithout (?:\w+ly )?\w+ing\b[^,;.]*", re.IGNORECASE)
 """Words of what does not come with a movement, which is done all the same."""
 _IN_TIME = re.compile(r"^\W*(?:and )?(?:then|finally|afterwards?|after that)\b|^\W*(?:and )?stops?\b", re.IGNORECASE)
 """Beginning of a clause that comes behind all before it."""
-_OTHERS = re.compile(
-    r"^\W*while (?:the|his|her|their|its|others|everyone|everybody|an?|some|two|three|nobody|no one)\b"
-    r"(?!.*\b(?:he|she|they)\b)",
-    re.IGNORECASE,
-)
-"""Beginning of a clause that tells what others do."""
 _STOPS = re.compile(r"(?:(?:he|she|they|an? \w+|the \w+) )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
 """Beginning of a clause that ends the way before it."""
 
@@ -182,23 +129,6 @@ class ReadMovement:
         on which models would sit at once."""
         text = _TO_A_SEAT.sub("", self.text) if self.action in WAYS else self.text
         return with_plain_action(text, self.action)
-
-
-@dataclass(frozen=True)
-class ReadClause:
-    """A part of a prompt with what it asks for.
-
-    Attributes:
-        name: id of an action, `OUTSIDE` or `CONTEXT`.
-        probability: 0 to 1.
-        text: as written.
-        at_once: it comes at the same time as the clause before it.
-    """
-
-    name: str
-    probability: float
-    text: str
-    at_once: bool = False
 
 
 @dataclass(frozen=True)
@@ -253,8 +183,8 @@ class SequenceReader(Reader):
             several = [ReadMovement(text, one) for text, one in parts_in_time(way)]  # "jogs, slows to a walk and stops"
             return (*(several or [ReadMovement(way, action)]), _rest())
         written = self._clauses(bare, encoding, pooled)
-        whole = list(_parted(_with_belongings(written)))
-        if len(whole) == 1 < len(written) and whole[0].name in _GOES_ON:
+        whole = list(parted(with_belongings(written)))
+        if len(whole) == 1 < len(written) and whole[0].name in BOUND_TO_HANDS:
             return (ReadMovement(bare.prompt, whole[0].name),)
         groups = in_order(whole)
         clauses = [clause for group in groups for clause in group]
@@ -341,50 +271,6 @@ def clause_inputs(
     return np.concatenate(parts).astype(np.float32)
 
 
-def without_joints(text: str) -> str:
-    """Return a clause without the words that join it to others: "and then he bows," is "he bows"."""
-    bare = _JOINING.sub("", text).strip(" ,.;:→>-(")
-    return bare or text.strip()
-
-
-def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
-    """Return clauses in groups, in the order of time; those of a group come at once.
-
-    Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
-    down" and "before leaving, he bows" are told in the other order.
-    """
-    groups: list[list[ReadClause]] = []
-    at = 0
-    for before, clause in zip([None, *clauses], clauses, strict=False):
-        if clause.name == CONTEXT:
-            continue
-        if not groups:
-            groups.append([clause])
-        elif before is not None and before is clauses[0] and _BEFORE.match(before.text):
-            groups.insert(at, [clause])
-        elif _AFTER.match(clause.text) and not _AFTER_THAT.match(clause.text):
-            groups.insert(at, [clause])
-            at += 1
-        elif clause.at_once:
-            groups[at].append(clause)
-        else:
-            at += 1
-            groups.insert(at, [clause])
-    return _merged(groups)
-
-
-def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
-    merged: list[list[ReadClause]] = []
-    for group in groups:
-        last = merged[-1] if merged else []
-        if len(group) == len(last) == 1 and group[0].name == last[0].name:
-            surer = max(group[0].probability, last[0].probability)
-            merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
-        else:
-            merged.append(group)
-    return merged
-
-
 def way_to_a_stop(text: str) -> str:
     """Return the words before the stop that a text ends with: "walks up to the door" of "walks up to the door and
     stops"; empty if it ends with none."""
@@ -441,23 +327,6 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
     )
 
 
-def _with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
-    """Return clauses; what comes behind "from", says how, or is the end of a movement belongs to the one before: "gets
-    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"; and so does what is done
-    at a wheel or by hands that hold: "drives | and swerves left", "hangs from a ledge | and shimmies along"."""
-    found: list[ReadClause] = []
-    for clause in clauses:
-        text = without_joints(clause.text)
-        goes_on = _GOES_ON.get(found[-1].name) if found else None
-        how = _MANNER.match(clause.text) or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
-        belongs = how or _END.fullmatch(text) or (goes_on and goes_on.match(text))
-        if found and (belongs or found[-1].text.lower().endswith(" from")):
-            found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
-        else:
-            found.append(clause)
-    return found
-
-
 def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     """Yield movements that begin as the one before has ended: who sat down and waits sits, who stands up does so from
     there, and who runs and jumps over something leaps."""
@@ -494,22 +363,6 @@ def turned_to_carry(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]
         before = movement.action
 
 
-def _parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
-    """Yield clauses; one whose words name several actions in the order of time as these: "gets up and draws an arrow"
-    may be cut late, and "rolls forward, gets up" is two. What others do meanwhile asks for nothing."""
-    for number, clause in enumerate(clauses):
-        if number == 0 and _OTHERS.match(clause.text):
-            yield replace(clause, name=CONTEXT)
-            continue
-        parts = parts_in_time(clause.text, listed=number > 0)
-        if len(parts) < 2:
-            named = only_named(without_gaze(clause.text)) if clause.probability < SURE else None
-            yield clause if named is None else replace(clause, name=named, probability=PLAIN)
-            continue
-        for place, (text, action) in enumerate(parts):
-            yield ReadClause(action, clause.probability, text, clause.at_once and place == 0)
-
-
 def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     text = without_joints(" ".join(clause.text for clause in group))
     if only_gaze(text):
@@ -517,8 +370,11 @@ def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
     outside = len(group) == 1 and group[0].name == OUTSIDE and group[0].probability >= PLAIN
     action = group[0].name if single else None if outside else only_named(without_gaze(text))
-    if action is None and _STOPS.match(text) and not named_actions(text) - {STANDING}:
-        action = STANDING
+    if action is None and (outside or _STOPS.match(text)) and not named_actions(text) - {STANDING}:
+        action = STANDING  # of words that they do not know, models make falls and hops
+    likely = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= LIKELY
+    if action is None and likely and not named_actions(text):
+        action = group[0].name
     return ReadMovement(text, action, DRAWN_S if action in DRAWN_AS else None)
 
 

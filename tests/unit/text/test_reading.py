@@ -16,12 +16,13 @@ from marey.reading.texts import LabelledText, labelled_texts
 from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
 from marey.referee.prompts import sequence_prompts as referee_sequences
 from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
+from marey.text.clause_order import CONTEXT
 from marey.text.encoders import find_encoder
 from marey.text.minilm import MiniLM
 from marey.text.minilm_bundle import load_weights
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import CONTEXT, SequenceReader
+from marey.text.sequence_reader import SequenceReader
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder

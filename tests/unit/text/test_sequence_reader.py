@@ -15,22 +15,19 @@ from marey.core.errors import InvalidFile
 from marey.generation.asked import action_of
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE, action_reader
+from marey.text.clause_order import CONTEXT, ReadClause, in_order, without_joints
 from marey.text.keys import feature_key
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
 from marey.text.sequence_reader import (
-    CONTEXT,
     DRAWN_S,
     MOST_CUTS,
     REST_S,
-    ReadClause,
     ReadMovement,
     SequenceReader,
-    in_order,
     sequence_reader,
     turned_to_carry,
     way_to_a_stop,
-    without_joints,
 )
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
@@ -73,6 +70,7 @@ def test_it_knows_every_action_and_the_shipped_encoder() -> None:
         ("turn left, then walk four steps, then wave", ["turn", "walk", "wave"]),
         ("crawls to the tent, kneels and finally lies down without looking back", ["crawl", "kneel", "lie-down"]),
         ("kneels, then does not stand up", []),
+        ("he kneels, then plays chess, then walks off", ["kneel", "kneel", "walk"]),
     ],
 )
 def test_movements_come_in_the_order_of_time(prompt: str, actions: list[str]) -> None:

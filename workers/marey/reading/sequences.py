@@ -15,7 +15,7 @@ from marey.data.captions import lower_first, seeded
 from marey.data.spoken import SUBJECTS
 from marey.reading.texts import LONGEST, LabelledText, held_out, labelled_texts, several_texts, words_alone
 from marey.text.action_reader import OUTSIDE, SEVERAL
-from marey.text.sequence_reader import CONTEXT
+from marey.text.clause_order import CONTEXT
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import gerund, phrase_in_third_person
 

@@ -27,11 +27,11 @@ from marey.reading.networks import as_arrays
 from marey.reading.sequences import PartedText, TextPart, parted_texts
 from marey.reading.train_sequences import LabelledTokens, batches, cut_loss, labelled, shown
 from marey.text.action_reader import OUTSIDE, SEVERAL, word_marks
+from marey.text.clause_order import CONTEXT, without_joints
 from marey.text.encoders import Encoding, find_encoder
 from marey.text.minilm import EPS, HEADS, MiniLM
 from marey.text.minilm_bundle import LAYERS, WIDTH, load_weights
 from marey.text.reading_encoder import FILE
-from marey.text.sequence_reader import CONTEXT, without_joints
 from marey.vocabulary.entries import load_vocabulary
 
 UPDATED, RANK = 2, 16

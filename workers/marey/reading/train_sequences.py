@@ -22,19 +22,12 @@ from marey.reading.networks import NetworkRecipe, Trained, as_arrays, fit, side_
 from marey.reading.sequences import PartedText, parted_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
+from marey.text.clause_order import CONTEXT, without_joints
 from marey.text.encoders import Encoding
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.parsed import without_punctuation
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import (
-    CONTEXT,
-    FILE,
-    KERNEL,
-    STATE_SCALE,
-    SequenceReader,
-    clause_inputs,
-    without_joints,
-)
+from marey.text.sequence_reader import FILE, KERNEL, STATE_SCALE, SequenceReader, clause_inputs
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 

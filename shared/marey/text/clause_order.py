@@ -1,0 +1,169 @@
+"""Clauses of a prompt, in the order in which their movements come (ours)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from marey.text.action_reader import OUTSIDE
+from marey.text.clause_parts import only_named, parts_in_time
+from marey.vocabulary.gazes import without_gaze
+from marey.vocabulary.scope import STANDING
+
+CONTEXT = "no movement"
+"""Class of a clause that asks for nothing: "while the others eat"."""
+SURE = 0.15
+"""Probability that each movement of a sequence has at least; one under `PLAIN` keeps its own words alone."""
+PLAIN = 0.5
+"""Probability from which on the action of a clause is said in plain words."""
+_PAUSE = (
+    r"(?:(?:an?|one|two|three|some|\d+) )?(?:short |brief |little |few |couple of )?"
+    r"(?:moment|while|pause|beat|bit|second|time)s?"
+)
+_AFTER = re.compile(
+    r"^\W*(?:and )?(?:(?:right |just |shortly )?(?:after|once(?= (?:he|she|they|it|the|his|her|a)\b))|but first"
+    r"|before that|having)\b",
+    re.IGNORECASE,
+)
+_AFTER_THAT = re.compile(rf"^\W*(?:and )?(?:after (?:that|this|which|{_PAUSE})|afterwards?)\b", re.IGNORECASE)
+_BEFORE = re.compile(r"^\W*(?:right |just |shortly )?before\b", re.IGNORECASE)
+_JOINING = re.compile(
+    r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|before"
+    rf"|after(?: (?:that|this|{_PAUSE}))?|until|once|while|as|followed by|but|having|ending with)\b\s*)+",
+    re.IGNORECASE,
+)
+"""Words and signs at the beginning of a clause that join it to others."""
+_MANNER = re.compile(
+    r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
+)
+"""Words that say how something is done, though one of them names an action."""
+_UNTIL = re.compile(r"\W*until (?:he|she|they|it)(?:'s|'re| (?:is|are|can\W?t|cannot|has|have))\b", re.IGNORECASE)
+"""Words of the state in which a movement ends: "until he is worn out"."""
+_END = re.compile(
+    r"""(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?(?:
+    lands?(?:\s(?:softly|safely|on\s(?:both|his|her|their|the)\s(?:\w+\s)?feet))?
+    |straightens?(?:\s(?:back|again|up|out))*
+    |(?:recovers?|relaxes|relax)
+    |(?:returns?|comes?|goes|go|gets?)\s(?:back\s)?(?:up\s)?to\s(?:a\s|the\s)?(?:neutral|rest|upright|standing)(?:\s\w+)?
+    |lowers?\s(?:it|them|the\sarms?|(?:his|her|their)\s(?:arms?|hands?))(?:\s(?:back|again|down))*
+    )""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Clauses of the end of a movement, which comes by itself."""
+_PERSON = r"(?:(?:he|she|they|it)\s)?(?:\w+ly\s)?"
+BOUND_TO_HANDS: Mapping[str, re.Pattern[str]] = {
+    "drive": re.compile(
+        rf"""{_PERSON}(?:(?:look|glanc|check|peer)\w*\b|(?:swerv|steer|honk|brak|accelerat)\w*\b
+        |(?:takes?|makes?)\s(?:an?\s)?(?:sharp|hard|left|right)\b|turns?\s(?:sharply\s|hard\s)?(?:left|right|the\swheel)\b
+        |(?:shift|chang)\w*\s(?:up|down|gears?))""",
+        re.IGNORECASE | re.VERBOSE,
+    ),
+    "hang": re.compile(
+        rf"""{_PERSON}(?:shimm\w*\b|(?:does|do)\s(?:\w+\s)?(?:pull|chin)[ -]?ups?\b
+        |(?:kick|rais|lift|swing)\w*\s(?:(?:his|her|their|both|the)\s)+(?:legs|feet|knees)\b
+        |(?:swing|sway)\w*(?:$|\s(?:gently|slowly|back|to|from|a\slittle)\b))""",
+        re.IGNORECASE | re.VERBOSE,
+    ),
+}
+"""Words of what is done at the wheel, or by the hands that hold, and is part of the movement before it."""
+_OTHERS = re.compile(
+    r"^\W*while (?:the|his|her|their|its|others|everyone|everybody|an?|some|two|three|nobody|no one)\b"
+    r"(?!.*\b(?:he|she|they)\b)",
+    re.IGNORECASE,
+)
+"""Beginning of a clause that tells what others do."""
+
+
+@dataclass(frozen=True)
+class ReadClause:
+    """A part of a prompt with what it asks for.
+
+    Attributes:
+        name: id of an action, `OUTSIDE` or `CONTEXT`.
+        probability: 0 to 1.
+        text: as written.
+        at_once: it comes at the same time as the clause before it.
+    """
+
+    name: str
+    probability: float
+    text: str
+    at_once: bool = False
+
+
+def without_joints(text: str) -> str:
+    """Return a clause without the words that join it to others: "and then he bows," is "he bows"."""
+    bare = _JOINING.sub("", text).strip(" ,.;:→>-(")
+    return bare or text.strip()
+
+
+def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
+    """Return clauses in groups, in the order of time; those of a group come at once.
+
+    Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
+    down" and "before leaving, he bows" are told in the other order.
+    """
+    groups: list[list[ReadClause]] = []
+    at = 0
+    for before, clause in zip([None, *clauses], clauses, strict=False):
+        if clause.name == CONTEXT:
+            continue
+        if not groups:
+            groups.append([clause])
+        elif before is not None and before is clauses[0] and _BEFORE.match(before.text):
+            groups.insert(at, [clause])
+        elif _AFTER.match(clause.text) and not _AFTER_THAT.match(clause.text):
+            groups.insert(at, [clause])
+            at += 1
+        elif clause.at_once:
+            groups[at].append(clause)
+        else:
+            at += 1
+            groups.insert(at, [clause])
+    return _merged(groups)
+
+
+def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
+    merged: list[list[ReadClause]] = []
+    for group in groups:
+        last = merged[-1] if merged else []
+        if len(group) == len(last) == 1 and group[0].name == last[0].name:
+            surer = max(group[0].probability, last[0].probability)
+            merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
+        else:
+            merged.append(group)
+    return merged
+
+
+def with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
+    """Return clauses; what comes behind "from", says how, or is the end of a movement belongs to the one before: "gets
+    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"; and so does what is done
+    at a wheel or by hands that hold: "drives | and swerves left", "hangs from a ledge | and shimmies along"."""
+    found: list[ReadClause] = []
+    for clause in clauses:
+        text = without_joints(clause.text)
+        goes_on = BOUND_TO_HANDS.get(found[-1].name) if found else None
+        how = _MANNER.match(clause.text) or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
+        belongs = how or _END.fullmatch(text) or (goes_on and goes_on.match(text))
+        if found and (belongs or found[-1].text.lower().endswith(" from")):
+            found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
+        else:
+            found.append(clause)
+    return found
+
+
+def parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
+    """Yield clauses; one whose words name several actions in the order of time as these: "gets up and draws an arrow"
+    may be cut late, and "rolls forward, gets up" is two. What others do meanwhile asks for nothing."""
+    for number, clause in enumerate(clauses):
+        if number == 0 and _OTHERS.match(clause.text):
+            yield replace(clause, name=CONTEXT)
+            continue
+        parts = parts_in_time(clause.text, listed=number > 0)
+        if len(parts) < 2:
+            named = only_named(without_gaze(clause.text)) if clause.probability < SURE else None
+            yield clause if named is None else replace(clause, name=named, probability=PLAIN)
+            continue
+        for place, (text, action) in enumerate(parts):
+            yield ReadClause(action, clause.probability, text, clause.at_once and place == 0)
