@@ -34,6 +34,23 @@ _TURNED_BACK = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A way behind a turn: "turns around and walks back"."""
+_STEPS = r"(?:stairs|steps|staircase|stairway|stairwell|flight(?:\ of\ (?:stairs|steps))?)"
+_DOWN_AGAIN = re.compile(
+    rf"""(?P<up>\b(?:(?:climb|ascend|mount)(?:s|ed|ing)?|[a-z]+\ (?:\w+ly\ )?up)\ (?!down\b|and\b)
+    [^.;]{{0,40}}?\b{_STEPS}\b|\b[a-z]+\ upstairs\b)
+    (?P<more>[^.;]{{0,60}}?)(?P<joint>,?\ (?:and\ then|and|then|before)\ |,\ )
+    (?:(?:he|she|they)\ )?(?:\w+ly\ )?
+    (?P<way>(?:{_GAITS}|go|head|com|step|climb)(?:e?s|ies|ing|e|y)?\ )?(?P<back>back\ )?down(?:\ again)?
+    (?:\ (?:(?:the|those|these)\ )?(?:{_STEPS}|them))?(?:\ again)?(?=\W*$|[,.;]|\ (?:and|then)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Stairs that are gone down again: "walks up the stairs and then back down"."""
+_UP_AND_DOWN = re.compile(
+    rf"""\b(?P<way>[a-z]+)(?P<how>\ \w+ly)?\ up\ and\ (?:back\ |then\ )?down
+    \ (?P<steps>(?:the|a|some|his|her)\ {_STEPS})\b""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The same in one breath: "runs up and down the stairs"."""
 _TO_AND_FRO = re.compile(
     r"""\b(?:pace?|walk|strid?e?|march|wander|stroll)(?P<end>e?s|ing)?[ ]
     (?:(?:nervous|anxious|impatient|restless|angr|slow|quick)\w*\ )?
@@ -256,8 +273,10 @@ def without_misleading(prompt: str) -> str:
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
     leg to leg stands, and who falls over the knees falls once.
-    Who hauls himself up a rope climbs it. A dancer who leaps does so from one foot to the other.
+    Who goes up the stairs and "back down" turns around at their end, and who hauls himself up a rope climbs it. A
+    dancer who leaps does so from one foot to the other.
     """
+    prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, prompt)
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
@@ -303,6 +322,29 @@ def _climbs(found: re.Match[str]) -> str:
     """Return a climb in the form of the verb that is found."""
     end = (found["end"] or found["ends"] or "").lower()
     return f"climb{'ing' if end.endswith('ing') else 's' if end.endswith('s') else ''}{found['how']}"
+
+
+def _up_and_down(found: re.Match[str]) -> str:
+    """Return a way up stairs and down, told one after the other."""
+    way, how, steps = found["way"], found["how"] or "", found["steps"]
+    return f"{way}{how} up {steps}, {_as_verb(way, 'turn')} around and {way}{how} down {steps}"
+
+
+def _down_again(found: re.Match[str]) -> str:
+    """Return a way up stairs, the turn at their end, and the way down."""
+    if not (found["way"] or found["back"]):
+        return found[0]
+    verb = found["up"].split()[0]
+    way = (found["way"] or _as_verb(verb, "walk")).strip()
+    turned = re.search(r"\b(?:turn|spin|pivot)\w*", found["more"], re.IGNORECASE)
+    joint = found["joint"] if turned else f", {_as_verb(verb, 'turn')} around and "
+    return f"{found['up']}{found['more']}{joint}{way} down the stairs"
+
+
+def _as_verb(said: str, verb: str) -> str:
+    """Return a verb in the form of another one."""
+    end = next((end for end in ("ing", "s") if said.lower().endswith(end)), "")
+    return f"{verb}{end}"
 
 
 def _on_floor(found: re.Match[str]) -> str:

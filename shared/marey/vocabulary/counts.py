@@ -66,6 +66,19 @@ def stated_count(prompt: str, action: str) -> int | None:
     return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
 
 
+def stated_things(prompt: str, nouns: Set[str]) -> int | None:
+    """Return how many things a prompt speaks of: three of "goes up three steps"; None = it names no number of them, or
+    several.
+
+    Args:
+        prompt: as a user typed it.
+        nouns: that name the things, in both numbers.
+    """
+    things = re.compile(rf"{_NUMBER} (?:[a-z-]+ )?(?:{'|'.join(sorted(nouns))})\b")
+    found = {_value(match["number"]) for match in things.finditer(" ".join(prompt.lower().split()))}
+    return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
+
+
 def stated_number(words: str) -> int | None:
     """Return the first number in words for what is done: "three" of "does three burpees", "twice"; None = none.
 

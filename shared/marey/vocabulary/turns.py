@@ -29,6 +29,18 @@ _BARE = re.compile(
 )
 _CIRCLES = re.compile(r"\b(?:semi-?)?circles?\b|\bin a (?:ring|loop)\b|\barc\b")
 
+_IN_PLACE = re.compile(
+    r"\b(?:in place|on the spot|on (?:his|her|their|its|the|one) (?:heels?|spot)|pivot\w*|stationary|standing|stands?"
+    r"|(?:where|as) (?:he|she|they|it) stands?|about[ -](?:face|turn))\b"
+)
+_GOES = re.compile(
+    r"\b(?:walk|run|jog|sprint|march|strid|stroll|wander|sneak|tiptoe|rush|dash|skip|trot|step|continu|advanc|travel|limp"
+    r"|stagger|crawl|jump|hop|danc|driv|rid(?:e|ing)|skat|approach|proceed|retreat|veer|curv|swerv|keep)\w*\b"
+    r"|\b(?:go|goes|going|come|comes|coming|moves?|moving|heads?|heading|races?|racing|paces|pacing|rounds|rounding"
+    r"|carr(?:y|ies|ying) on|corners?|circles?|arcs?|paths?|roads?|streets?|track|bend|along|crossing)\b"
+)
+"""Words of bodies that go somewhere, and of where they go."""
+
 
 @dataclass(frozen=True)
 class Turn:
@@ -86,6 +98,16 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
         return None
     low, high = table.extent(text, usual)
     return Turn(low, high, even)
+
+
+def turns_in_place(prompt: str) -> bool:
+    """Return True if a prompt of a turn speaks of no way on which the body turns: "turns left", "pivots in place".
+
+    Args:
+        prompt: as a user typed it.
+    """
+    text = _plain(prompt)
+    return _IN_PLACE.search(text) is not None or _GOES.search(text) is None
 
 
 def stated_spins(prompt: str) -> int | None:

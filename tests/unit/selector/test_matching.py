@@ -132,6 +132,19 @@ def test_what_is_not_done_is_not_asked_for() -> None:
     assert wanted_of(["he does not wave"]) is None
 
 
+def test_a_turn_whose_words_speak_of_no_way_may_be_on_the_spot() -> None:
+    standing, turned = Body(3.0).joints(), np.radians(np.clip((np.arange(60) - 10) * 4.0, 0.0, 90.0))
+    cos, sin, zero = np.cos(turned), np.sin(turned), np.zeros(60)
+    rows = np.stack([cos, zero, sin, zero, zero + 1, zero, -sin, zero, cos], axis=-1).reshape(60, 3, 3)
+    middle = standing[:1, :1] * [1.0, 0.0, 1.0]
+    joints = np.einsum("tij,tkj->tki", rows, standing[:60] - middle) + middle
+    for prompt in ("someone turns left", "turns left by 90 degrees", "a woman takes a left turn"):
+        assert matched(joints, prompt) >= SHOWN
+    for prompt in ("someone turns right", "a person walks and turns left", "turns the corner to the left"):
+        assert matched(joints, prompt) < SHOWN
+    assert matched(walker(turn=90.0), "someone turns left") >= SHOWN
+
+
 def test_a_gait_with_a_turn_need_not_go_straight() -> None:
     assert matched(walker(turn=90.0), "a person walks and turns left") >= SHOWN
     assert matched(walker(), "a person walks and turns left") < SHOWN

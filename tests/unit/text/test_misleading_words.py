@@ -65,7 +65,7 @@ def test_who_returns_walks_ahead(prompt: str, read: str) -> None:
         ),
         ("pace up and down", "walk forward, turn around, walk forward, turn around and walk forward"),
         ("a father pacing to and fro", "a father walking forward, turning around and walking forward"),
-        ("walks up and down the stairs", "walks up and down the stairs"),
+        ("walks up and down the hill", "walks up and down the hill"),
         ("rocks back and forth", "rocks back and forth"),
     ],
 )
@@ -326,4 +326,25 @@ def test_who_lunges_without_a_weapon_exercises(prompt: str, exercise: bool) -> N
     ],
 )
 def test_a_dancer_leaps_from_one_foot_to_the_other(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("walks up the stairs and then back down", "walks up the stairs, turns around and walks down the stairs"),
+        ("climb the stairs, then go down again", "climb the stairs, turn around and go down the stairs"),
+        ("goes upstairs and comes back down", "goes upstairs, turns around and comes down the stairs"),
+        (
+            "walks up two steps, turns around, and walks back down",
+            "walks up two steps, turns around, and walks down the stairs",
+        ),
+        ("running up and down the stairs", "running up the stairs, turning around and running down the stairs"),
+        ("walks up the stairs and lies down", "walks up the stairs and lies down"),
+        ("walks up the steps and looks down", "walks up the steps and looks down"),
+        ("goes down the stairs", "goes down the stairs"),
+        ("walks up the stairs, then sits down", "walks up the stairs, then sits down"),
+    ],
+)
+def test_who_goes_up_the_stairs_and_down_again_turns_between(prompt: str, read: str) -> None:
     assert without_misleading(prompt) == read

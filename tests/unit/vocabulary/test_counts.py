@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from marey.reading.texts import manner_texts
-from marey.vocabulary.counts import MOST, stated_count
+from marey.vocabulary.counts import MOST, stated_count, stated_things
 
 
 @pytest.mark.parametrize(
@@ -60,3 +60,18 @@ def test_nineteen_of_twenty_texts_are_read_as_their_author_meant_them() -> None:
     texts = manner_texts()
     right = sum(stated_count(each.text, each.action) == each.count for each in texts)
     assert right >= 0.95 * len(texts)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "count"),
+    [
+        ("goes up three steps", 3),
+        ("climbs 12 steep stairs", 12),
+        ("descends a dozen steps", 12),
+        ("climbs the stairs", None),
+        ("two men go up the stairs", None),
+        ("three steps up, four steps down", None),
+    ],
+)
+def test_numbers_of_things_are_read(prompt: str, count: int | None) -> None:
+    assert stated_things(prompt, {"steps", "stairs"}) == count

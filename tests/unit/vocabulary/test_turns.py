@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.turns import STRAIGHT, Turn, stated_spins, stated_turn
+from marey.vocabulary.turns import STRAIGHT, Turn, stated_spins, stated_turn, turns_in_place
 
 
 @pytest.mark.parametrize(
@@ -94,3 +94,22 @@ def test_actions_of_the_table_are_in_the_vocabulary() -> None:
 
     table = _table()
     assert {*table.ways, *table.usual} <= set(load_vocabulary().actions)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "in_place"),
+    [
+        ("turns left", True),
+        ("a woman turns to face the other way", True),
+        ("makes a complete turn", True),
+        ("someone takes a right turn", True),
+        ("steps around on the spot until she faces us", True),
+        ("walks and turns left", False),
+        ("he is jogging and veers off", False),
+        ("turns the corner", False),
+        ("goes along, then turns right", False),
+        ("keeps moving and turns", False),
+    ],
+)
+def test_turns_whose_words_speak_of_no_way(prompt: str, in_place: bool) -> None:
+    assert turns_in_place(prompt) is in_place

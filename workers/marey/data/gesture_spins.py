@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
 from marey.data.gesture_steps import small_step_spin
-from marey.data.gesture_ways import about_vertical, posed, spine_yaw
 from marey.data.part import FPS, Part
 from marey.data.retarget import resample_points
 from marey.drawing.gesture import SIDES, Gesture
-from marey.motion.rotations import from_rotvec, rotate
+from marey.drawing.pivots import about_foot, ramped
+from marey.drawing.placed import about_vertical, posed, spine_yaw
 from marey.posing.bones import with_bones
-from marey.posing.limbs import LEG_CHAINS, LEVEL
+from marey.posing.limbs import LEVEL
 from marey.posing.standing import LEFT, StandingBody, eased
 
 Array = NDArray[np.floating]
@@ -59,46 +59,12 @@ def _one_foot_spin(rng: random.Random) -> Gesture:
         for one in SIDES:
             body.hold(one, arms, hands, lag=0.03)
         x = np.clip((t - start - shift) / lasts, 0.0, 1.0)
-        yaw = sign * np.radians(360.0 * turns) * (0.6 * eased(x) + 0.4 * _ramped(x))
+        yaw = sign * np.radians(360.0 * turns) * (0.6 * eased(x) + 0.4 * ramped(x))
         shoulders = yaw - sign * np.radians(wound) * winds
-        body.joints[:] = _about_foot(body.joints, foot, yaw, shoulders, on_foot, np.array([heel, lift]))
+        body.joints[:] = about_foot(body.joints, foot, yaw, shoulders, on_foot, np.array([heel, lift]))
 
     count = {1: "spin-once", 2: "spin-twice"}.get(turns, "spin-many")
     return Gesture(end + shift + rng.uniform(0.3, 0.9), ("spin", "spin-foot", count), change, side)
-
-
-def _ramped(x: Array) -> Array:
-    """Even progress with short soft ends, 0 to 1."""
-    return np.where(x < 0.5, 0.5 * (2 * x) ** 1.3, 1 - 0.5 * (2 - 2 * x) ** 1.3)
-
-
-def _about_foot(joints: Array, foot: int, yaw: Array, shoulders: Array, on_foot: Array, drawn: Array) -> Array:
-    """Turn an idle (T, 22, 3) about a toe.
-
-    Args:
-        joints: the idle.
-        foot: 0 (left) or 1.
-        yaw, shoulders: radians (T,) of the hips and of the shoulders.
-        on_foot: (T,) share of the weight that is on the foot alone.
-        drawn: degrees by which its heel rises, and metres by which the other foot is lifted.
-    """
-    local = about_vertical(joints, np.full(joints.shape[:2], -np.radians(heading(joints, FPS)[0])))
-    pivot = (local[0, _TOES[foot]] * LEVEL)[None]
-    local = local - pivot
-    toes = local[:, _TOES].copy()
-    over = on_foot[:, None] * (-0.8 * local[:, 0] * LEVEL)
-    root = local[:, 0] + over
-    toes[:, 1 - foot] += on_foot[:, None] * (0.6 * (root * LEVEL - toes[:, 1 - foot] * LEVEL) + [0, drawn[1], 0])
-    away = 1 if foot == 0 else -1
-    toes[:, 1 - foot, 0] -= on_foot * away * 0.09
-    toes[:, 1 - foot, 2] += on_foot * 0.05
-    for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
-        pitch = np.zeros((len(local), 3))
-        pitch[:, 0] = np.radians(drawn[0] if side == foot else 35.0) * on_foot
-        local[:, toe] = local[:, ankle] + rotate(from_rotvec(pitch), local[:, toe] - local[:, ankle])
-    root[:, 1] += 0.1 * np.sin(np.radians(drawn[0])) * on_foot
-    turned = np.repeat(yaw[:, None], 2, axis=1)
-    return posed(local, about_vertical(root, yaw), spine_yaw(yaw, shoulders), about_vertical(toes, turned), turned)
 
 
 def is_single_jump(part: Part) -> bool:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.data.gesture_idles import is_plain_idle, of_length
-from marey.data.gesture_steps import Footstep, Manner, stepped
 from marey.data.part import FPS, Part
+from marey.drawing.footsteps import Footstep, Manner, stepped
 from marey.drawing.gesture import Gesture
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody, eased
 

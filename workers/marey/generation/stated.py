@@ -1,7 +1,7 @@
 """Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
 or in a direction, a number of claps, steps aside by number or at a pace, blows to a part of the body, kicks with a
-spin, waves of both arms over the head, seats on the floor with crossed legs, jumps back or to a side, and movements
-that have a name alone.
+spin, waves of both arms over the head, seats on the floor with crossed legs, jumps back or to a side, turns on the spot
+and spins as far round as is said, stairs, and movements that have a name alone.
 
 A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
 nothing stays as the network makes it.
@@ -26,6 +26,8 @@ from marey.generation.hits import stated_hit
 from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
+from marey.generation.stairs import stairs_asked_for
+from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_place
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
 from marey.vocabulary.counts import stated_count
@@ -36,7 +38,7 @@ Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
 """`(wish, rng, seconds)`: the movement that the prompt states, None if it states none; seconds that it has to fill, or
 None."""
 
-AT_PACE = frozenset({"sidestep"})
+AT_PACE = frozenset({"sidestep", "turn", "turn-around", "spin", "climb-stairs"})
 """Actions that are drawn at the pace that is asked for."""
 _HIGH = re.compile(r"\boverhead\b|\b(?:above|over) (?:(?:his|her|their|the|your) )?heads?\b")
 _BOTH = re.compile(r"\b(?:both|arms|hands)\b")
@@ -95,6 +97,10 @@ STATED: Mapping[str, Statement] = {
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
     "hop": hops_away,
+    "turn": turn_in_place,
+    "turn-around": turn_asked_for,
+    "spin": spin_asked_for,
+    "climb-stairs": stairs_asked_for,
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }
 """Movements by action."""

@@ -115,6 +115,11 @@ def turn_around(m: Motion, side: str) -> float:
     return _turns_on_spot(m, side, (70, 270))
 
 
+def turn_standing(m: Motion, side: str) -> float:
+    """Turn on the spot as far as one does on a walk."""
+    return _turns_on_spot(m, side, (45, 200))
+
+
 def turn_by(degrees: float) -> Callable[[Motion, str], float]:
     """Return the rule of a walk or run that turns so far."""
     return lambda m, side: _turns_on_way(m, side, _about(degrees))

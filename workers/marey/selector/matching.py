@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from marey.quality.record import SHOWN
+from marey.selector.gaits import turn_standing
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
-from marey.vocabulary.turns import stated_turn
+from marey.vocabulary.turns import stated_turn, turns_in_place
 
 LEAST_PART = 0.5
 """Seconds that each action of several needs."""
@@ -49,12 +50,14 @@ class WantedAction:
         side: `left`, `right`, `both`, or empty: any.
         degrees: of an action of `EXACT`, where the words say how far; None: as in its definition.
         count: how often, of an action that `REPETITIONS` has; None: any number.
+        in_place: of a turn whose words speak of no way: one on the spot shows it, too.
     """
 
     action: str
     side: str = ""
     degrees: float | None = None
     count: int | None = None
+    in_place: bool = False
 
 
 Step = tuple[WantedAction, ...]
@@ -132,6 +135,7 @@ def _step(sentence: str) -> Step | None:
                 side if actions[name].sided else "",
                 degrees=_degrees(prompt, name),
                 count=stated_count(prompt, name) if name == counted else None,
+                in_place=name == TURNING and wanted == [TURNING] and turns_in_place(prompt),
             )
             for name in wanted
         )
@@ -179,6 +183,9 @@ def _grade(motion: Motion, step: Step) -> float:
 
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
     rule = rules[wanted.action] if wanted.degrees is None else EXACT[wanted.action](wanted.degrees)
+    if wanted.in_place:
+        on_way, on_spot = rule, turn_standing if wanted.degrees is None else EXACT[ON_THE_SPOT](wanted.degrees)
+        return lambda m, side: max(on_way(m, side), on_spot(m, side))
     return rule if wanted.count is None else _counted(rule, wanted.action, wanted.count)
 
 
