@@ -74,7 +74,7 @@ def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     assert hook[:, 1].max() > 0.12, "at the height of the head"
     elbow = drawn("punch", "a right hook", side="right")[:, [17, 19, 21]]
     bent = np.linalg.norm(elbow[:, 2] - elbow[:, 0], axis=-1)
-    assert bent[hook[:, 1] > 0.12].max() < 0.47, "the arm stays bent"
+    assert bent[hook[:, 1] > 0.12].max() < 0.49, "the arm stays bent"
     uppercut = hands(drawn("punch", "a right uppercut", side="right"))[:, 1]
     assert uppercut[:, 1].min() < -0.2
     assert uppercut[:, 1].max() > 0.05

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading, smooth
+from marey.drawing.gesture import SIDES
 from marey.drawing.placed import about_vertical, posed, spine_yaw
 from marey.motion.filters import smooth_above
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.limbs import FPS, LEG_CHAINS, LEVEL
-from marey.posing.standing import eased
+from marey.posing.standing import ARMS, SIGN, StandingBody, eased
 
 Array = NDArray[np.floating]
 
@@ -65,8 +66,15 @@ class Manner:
         return cls(rng.uniform(0.03, 0.08), rng.uniform(15, 38), rng.uniform(0.015, 0.04), rng.uniform(0.04, 0.16))
 
 
-def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner) -> Array:
-    """Let an idle (T, 22, 3) step; return joints that begin at the origin and face +Z."""
+def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: float = _SMOOTH) -> Array:
+    """Let an idle (T, 22, 3) step; return joints that begin at the origin and face +Z.
+
+    Args:
+        joints: the idle, metres.
+        steps: in their order.
+        manner: how they are made.
+        follows: seconds over which the body follows its feet.
+    """
     angle = np.radians(heading(joints, FPS)[0])
     local = about_vertical(joints - joints[0, 0] * LEVEL, np.full(joints.shape[:2], -angle))
     frames = np.arange(len(local))
@@ -78,7 +86,7 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner) -> Array:
         places[:, step.foot] += went * (target - places[-1, step.foot])
         lifted[:, step.foot] += np.sin(np.pi * np.clip((share - 0.08) / 0.92, 0, 1)) ** 2
         swings[:, step.foot] += np.sin(np.pi * share**0.6) ** 2
-    body = smooth(places.mean(1), _SMOOTH, FPS)
+    body = smooth(places.mean(1), follows, FPS)
     for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
         pitch = np.zeros((len(local), 3))
         pitch[:, 0] = np.radians(manner.heel) * swings[:, side]
@@ -113,3 +121,18 @@ def _too_high(local: Array, root: Array, yaw: Array, toes: Array, toe_yaw: Array
         level = np.minimum(np.linalg.norm(down * LEVEL, axis=-1), 0.9 * bones)
         over[:, side] = -down[:, 1] - np.sqrt((_REACH * bones) ** 2 - level**2)
     return smooth_above(np.maximum(over.max(1), 0.0), 2.0)
+
+
+def swing_arms_with(body: StandingBody, steps: Sequence[Footstep], degrees: float) -> None:
+    """Swing each arm ahead with the steps of the other foot."""
+    time = np.arange(len(body.joints)) / FPS
+    phase = np.zeros(len(time))
+    for step in steps:
+        share = np.clip((time - step.start) / step.seconds, 0.0, 1.0)
+        phase += SIGN[SIDES[step.foot]] * np.sin(np.pi * share)
+    phase = smooth(phase, 0.14, FPS)
+    for side in SIDES:
+        _, shoulder, elbow, _ = ARMS[side]
+        swung = SIGN[side] * degrees * phase
+        body.turn(shoulder, "left", swung)
+        body.turn(elbow, "left", -0.5 * np.maximum(-swung, 0.0) - 0.15 * degrees * np.abs(phase))

@@ -6,15 +6,11 @@ import random
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
-from marey.drawing.footsteps import Footstep, Manner, stepped
-from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.footsteps import Footstep, Manner, stepped, swing_arms_with
+from marey.drawing.gesture import Gesture
 from marey.posing.limbs import FPS
-from marey.posing.standing import ARMS, NECK, SIGN, StandingBody, eased
-
-Array = NDArray[np.floating]
+from marey.posing.standing import NECK, StandingBody, eased
 
 _PACES = {"slow": (0.86, 0.98), "": (0.56, 0.64), "fast": (0.36, 0.4)}
 """Seconds from one tread to the next, by pace."""
@@ -74,25 +70,10 @@ def walk_stairs(rng: random.Random, flight: Flight, waits: tuple[float, float]) 
         moving = eased((time - waits[0] + 0.2) / 0.5) * (1 - eased((time - end + 0.3) / 0.6))
         body.lean(stoop * moving, "left")
         body.turn(NECK, "left", gaze * moving)
-        _swing_arms_beside(body, steps, swing)
+        swing_arms_with(body, steps, swing)
         floor = body.joints[:, _TOES, 1].min()
         body.joints[:] = stepped(body.joints, steps, manner)
         body.joints[..., 1] += floor - body.joints[:, _TOES, 1].min()
 
     kinds = ("climb-stairs", "stairs-down" if down else "stairs-up")
     return Gesture(end + waits[1], kinds, change, times=count)
-
-
-def _swing_arms_beside(body: StandingBody, steps: list[Footstep], degrees: float) -> None:
-    """Swing each arm ahead with the steps of the other foot."""
-    time = np.arange(len(body.joints)) / FPS
-    phase = np.zeros(len(time))
-    for step in steps:
-        share = np.clip((time - step.start) / step.seconds, 0.0, 1.0)
-        phase += SIGN[SIDES[step.foot]] * np.sin(np.pi * share)
-    phase = smooth(phase, 0.14, FPS)
-    for side in SIDES:
-        _, shoulder, elbow, _ = ARMS[side]
-        swung = SIGN[side] * degrees * phase
-        body.turn(shoulder, "left", swung)
-        body.turn(elbow, "left", -0.5 * np.maximum(-swung, 0.0) - 0.15 * degrees * np.abs(phase))

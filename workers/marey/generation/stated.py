@@ -27,6 +27,7 @@ from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.stairs import stairs_asked_for
+from marey.generation.strides import strides_asked_for
 from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_place
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
@@ -38,7 +39,7 @@ Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
 """`(wish, rng, seconds)`: the movement that the prompt states, None if it states none; seconds that it has to fill, or
 None."""
 
-AT_PACE = frozenset({"sidestep", "turn", "turn-around", "spin", "climb-stairs"})
+AT_PACE = frozenset({"sidestep", "walk", "walk-backward", "turn", "turn-around", "spin", "climb-stairs"})
 """Actions that are drawn at the pace that is asked for."""
 _HIGH = re.compile(r"\boverhead\b|\b(?:above|over) (?:(?:his|her|their|the|your) )?heads?\b")
 _BOTH = re.compile(r"\b(?:both|arms|hands)\b")
@@ -101,6 +102,8 @@ STATED: Mapping[str, Statement] = {
     "turn-around": turn_asked_for,
     "spin": spin_asked_for,
     "climb-stairs": stairs_asked_for,
+    "walk": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=False),
+    "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=True),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }
 """Movements by action."""

@@ -16,8 +16,9 @@ Array = NDArray[np.floating]
 
 _ANKLE, _TOE = 0.075, 0.015
 """Metres of a foot that stands, over the floor."""
-_APART, _TURNED = (0.085, 0.13), (4.0, 16.0)
-"""Metres of the ankles from the middle, and degrees by which the feet point outward."""
+_APART, _TURNED = 0.105, 9.0
+"""Metres of the ankles from the middle, and degrees by which the feet point outward: the same of all bodies, so that
+the feet of one that stands between two movements need not shuffle."""
 _BEHIND = -0.035
 """Metres of the ankles before the hips: the weight is over the middle of the feet."""
 _BENT = 0.994
@@ -31,7 +32,7 @@ _SWAY = {"left": 0.008, "forward": 0.006, "up": 0.0025}
 
 def standing_still(frames: int, rng: random.Random) -> Array:
     """Joints (T, 22, 3) of a body that stands on the origin and faces +Z, with its breath and its sway; metres."""
-    body = StandingBody(np.repeat(_upright(rng)[None], frames, axis=0))
+    body = StandingBody(np.repeat(_upright()[None], frames, axis=0))
     for side in ARMS:
         (out, ahead), (fore_out, fore_ahead) = ((rng.uniform(*limits) for limits in bone) for bone in (_UPPER, _FORE))
         ways = _hanging(out, ahead), _hanging(0.3 * fore_out, ahead + fore_ahead)
@@ -49,7 +50,7 @@ def _hanging(out: float, ahead: float) -> Array:
     return normalize(np.array([np.tan(np.radians(out)), -1.0, np.tan(np.radians(ahead))]))
 
 
-def _upright(rng: random.Random) -> Array:
+def _upright() -> Array:
     """Joints (22, 3) of a body with feet on the floor and arms as in the skeleton's rest."""
     joints = np.zeros((len(PARENTS), 3))
     for joint, parent in enumerate(PARENTS):
@@ -57,15 +58,14 @@ def _upright(rng: random.Random) -> Array:
             joints[joint] = joints[parent] + HUMANML3D.offsets[joint]
     legs = list(LEGS.values())
     length = BONE_LENGTHS[legs[0][1]] + BONE_LENGTHS[legs[0][2]]
-    apart, turned = rng.uniform(*_APART), rng.uniform(*_TURNED)
     middle = 0.5 * (joints[legs[0][0]] + joints[legs[1][0]])
-    aside = apart - abs(joints[legs[0][0], 0] - middle[0])
+    aside = _APART - abs(joints[legs[0][0], 0] - middle[0])
     height = _ANKLE + np.sqrt((_BENT * length) ** 2 - aside**2)
     joints += np.array([-middle[0], height - middle[1], -middle[2]])
     for side, (hip, knee, ankle, toe) in LEGS.items():
-        joints[ankle] = SIGN[side] * apart, _ANKLE, _BEHIND
+        joints[ankle] = SIGN[side] * _APART, _ANKLE, _BEHIND
         joints[knee] = 0.5 * (joints[hip] + joints[ankle]) + np.array([0.0, 0.0, 0.04])
-        way = direction(SIGN[side] * turned, 0.0)
+        way = direction(SIGN[side] * _TURNED, 0.0)
         level = np.sqrt(BONE_LENGTHS[toe] ** 2 - (_ANKLE - _TOE) ** 2)
         joints[toe] = joints[ankle] + level * way - np.array([0.0, _ANKLE - _TOE, 0.0])
     return joints
