@@ -100,7 +100,9 @@ def test_turns_take_as_long_as_their_words_say() -> None:
 
 def test_a_turn_beside_others_is_brief() -> None:
     alone = len(drawn("turn-around", "turns around"))
-    assert len(drawn("turn-around", "turns around", beside=("walks", "waves"))) <= alone - 8
+    beside = drawn("turn-around", "turns around", beside=("walks", "waves"))
+    assert len(beside) <= alone - 7
+    assert abs(headings(beside)[-1]) == pytest.approx(180, abs=3), "the next movement begins where it ends"
     waits = headings(drawn("turn-around", "a man stands still, then turns around"))
     assert (np.abs(waits) > 5).argmax() >= 0.9 * FPS
 

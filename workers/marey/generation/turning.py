@@ -25,6 +25,8 @@ ON_FOOT = 0.35
 """Share of the single spins that are made on one foot, where the prompt does not say."""
 USUAL: Mapping[str, tuple[float, ...]] = {"turn": (90.0,), "turn-around": (90.0, 180.0)}
 """Degrees of a turn of which the prompt says nothing."""
+COMES_TO_REST_S = 0.34, 0.4
+"""Seconds behind the last step in which the hips come to where the feet are."""
 STANDS_S = 1.0, 1.3
 """Seconds that a body stands before it moves, where the prompt says that it stands first."""
 _ROUNDED = 30.0
@@ -90,12 +92,13 @@ def turned_side(wish: FineWish, rng: random.Random) -> str:
 
 
 def waits_of(wish: FineWish, rng: random.Random) -> tuple[float, float]:
-    """Return seconds that a body stands before and after a movement: hardly any beside others."""
+    """Return seconds that a body stands before and after a movement: beside others those in which the hips come over
+    the feet."""
     before, after = wish.beside
     first = STANDS_S if _STANDS_FIRST.search(wish.prompt.lower()) else (0.3, 0.45)
     return (
         rng.uniform(0.1, 0.15) if before else rng.uniform(*first),
-        rng.uniform(0.1, 0.15) if after else rng.uniform(0.5, 0.7),
+        rng.uniform(*COMES_TO_REST_S) if after else rng.uniform(0.5, 0.7),
     )
 
 
