@@ -123,3 +123,11 @@ def test_an_open_length_leaves_the_time_that_a_movement_takes() -> None:
     drawn = drawn_whole(LAYOUT, "jump-forward", FineWish(), 1, 30)
     assert drawn is not None
     assert len(drawn.features) > 45
+
+
+@pytest.mark.parametrize("frames", [24, 40, 160])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_body_that_stands_for_a_short_while_is_drawn_too(frames: int, seed: int) -> None:
+    made = drawn_whole(LAYOUT, "idle", FineWish(prompt="stops", fixed=True), seed, frames)
+    assert made is not None
+    assert len(made.features) == frames

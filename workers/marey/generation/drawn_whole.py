@@ -33,6 +33,7 @@ from marey.posing.still import standing_still
 from marey.quality.record import SHOWN
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import RULES
+from marey.vocabulary.scope import STANDING
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -55,7 +56,8 @@ DRAWN = 6
 MOST = 20
 """Times that a movement is drawn at most; a larger number is made of these (`marey.generation.repetitions`)."""
 SHORTER = 0.85
-"""Share of its own length to which a movement is cut at most, where the length is fixed: at its end the body waits."""
+"""Share of its own length to which a movement is cut at most, where the length is fixed: at its end the body waits. A
+body that stands has any length."""
 
 
 @dataclass(frozen=True, eq=False)
