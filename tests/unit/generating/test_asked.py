@@ -17,6 +17,7 @@ from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.generation.stepped import frames_of_steps
+from marey.generation.timed import CUT
 from marey.motion.courses import natural_course
 from marey.motion.features import HUMANML3D_263
 from marey.motion.skeleton import HUMANML3D
@@ -323,3 +324,10 @@ def test_a_number_of_what_is_only_drawn_is_kept(monkeypatch: pytest.MonkeyPatch)
         for number in ("once", "five times")
     )
     assert often > 2 * once
+
+
+def test_a_drawn_movement_behind_another_stands_still_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(OneMotion, "bundle", SimpleNamespace(manifest=SimpleNamespace(draws_bearings=True)))
+    request = replace(ask("a man throws a jab"), open=True, beside=("walks", ""))
+    joints = HUMANML3D_263.decode(make(walker(), request).features)
+    assert np.abs(np.diff(joints[: CUT + 1], axis=0)).max() < 0.03

@@ -74,3 +74,18 @@ def test_nods_and_falls_beside_others_are_shorter() -> None:
             for each in (("", ""), BESIDE)
         )
         assert beside < alone
+
+
+@pytest.mark.parametrize(
+    "beside", ["throws a jab", "punches the bag", "blocks the blow", "kicks high", "a boxer waits"]
+)
+def test_a_guard_is_kept_between_blows(beside: str) -> None:
+    assert all(
+        "kick-guard" in each.kinds for each in best("kick", StatedForm("a front kick", brief=True, beside=beside))
+    )
+
+
+@pytest.mark.parametrize("beside", ["", "walks ahead", "crosses the street", "opens a box"])
+def test_who_does_not_fight_needs_no_guard(beside: str) -> None:
+    found = best("kick", StatedForm("a front kick", beside=beside))
+    assert not all("kick-guard" in each.kinds for each in found)

@@ -64,3 +64,13 @@ def test_who_stays_up_is_not_let_down(said: str) -> None:
 def test_rows_on_the_floor_stay_as_they_are() -> None:
     rows = raised_rows([WAVES, ("climb-stairs", "walks up to the stairs", STANDS), WAVES], LAYOUT)
     assert all(np.array_equal(each.features, STANDS) for each in rows)
+
+
+@pytest.mark.parametrize(
+    "said", ["vaults over a fence", "clambers over the wall", "gets across a barrier", "hurdles it"]
+)
+def test_who_passes_over_something_is_on_the_floor_behind_it(said: str) -> None:
+    over = ("climb-onto", said, stairs(0.0, 0.8))
+    assert floors(over, WAVES)[1] == pytest.approx((0.0, 0.0), abs=0.05)
+    onto = ("climb-onto", "climbs onto a box", stairs(0.0, 0.8))
+    assert floors(onto, WAVES)[1] == pytest.approx((0.8, 0.8), abs=0.05)

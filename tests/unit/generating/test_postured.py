@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, PRONE, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, PRONE, SEAT, SLIDE, UPRIGHT
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.posture import NO_POSTURE, RowPosture
@@ -14,7 +14,7 @@ from marey.motion.features import HUMANML3D_263, encode_all
 
 LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
 LIES = dict.fromkeys((BACK, FRONT, PRONE), 0.125)
-LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, CROUCH: 0.52, **LIES}
+LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, FOURS: 0.47, CROUCH: 0.52, **LIES}
 STANDS_M, NEAR_M = 0.93, 0.15
 
 
@@ -130,3 +130,22 @@ def test_a_gun_is_aimed_ahead_on_the_elbows_and_shots_drive_it_back() -> None:
     ahead = [float(np.diff(joints[-30:, 21, 2]).min()) for joints in (aims, fires)]
     assert ahead[0] > -0.005
     assert ahead[1] < -0.015
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("action", "said"), [("reach-up", "reaches up"), ("raise-arm", "raises his right hand")])
+def test_arms_of_who_lies_go_up_from_the_floor(action: str, said: str, seed: int) -> None:
+    drawn = drawn_whole(LAYOUT, action, FineWish(prompt=said, beside=("lies", "")), seed, None)
+    assert drawn is not None
+    held = RowPosture(BACK, BACK, BACK, gesture=True, seed=seed)
+    joints = LAYOUT.decode(on_posture(drawn.features, LAYOUT, held, action, fixed=False, whole=False))
+    assert joints[:, [20, 21], 1].max() > 0.5
+    assert joints[:, 0, 1].max() < 0.2, "the body stays on the floor"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_posture_that_is_only_passed_is_left_soon(seed: int) -> None:
+    stays, passes = (
+        int((joints_of(RowPosture("", BACK, end, seed=seed))[:, 15, 1] < 0.25).sum()) for end in (BACK, FLOOR)
+    )
+    assert passes < stays

@@ -122,3 +122,27 @@ def test_who_crawled_on_the_belly_aims_from_there() -> None:
     assert (aims.begin, aims.own, aims.apart) == ("prone", "prone", True)
     assert postures(("crawl", "crawls on hands and knees"), ("aim", "takes aim"))[1] == ("", "", "")
     assert postures(("lie-down", "lies down"), ("aim", "takes aim"))[1] == ("", "", "")
+
+
+@pytest.mark.parametrize(
+    ("row", "entry"),
+    [
+        (("crawl", "crawls away"), "fours"),
+        (("crawl", "crawls on his belly"), "front"),
+        (("sit-ups", "does crunches"), "back"),
+    ],
+)
+@pytest.mark.parametrize(
+    "low", [("crouch", "crouches"), ("kneel", "kneels"), ("sit-down", "sits down"), ("lie-down", "lies down")]
+)
+def test_who_is_low_goes_on_from_there(row: tuple[str, str], entry: str, low: tuple[str, str]) -> None:
+    before, after = row_postures([low, row], 1)
+    assert before.end == entry
+    assert after.meets
+    assert not after.is_drawn
+    assert not row_postures([("walk", "walks"), row], 1)[1].meets
+
+
+@pytest.mark.parametrize("row", [("reach-up", "reaches up"), ("raise-arm", "raises a hand"), ("nod", "nods")])
+def test_arms_and_head_are_moved_on_the_back(row: tuple[str, str]) -> None:
+    assert postures(("lie", "lies on his back"), row) == [("back", "back", "back")] * 2

@@ -10,6 +10,7 @@ import pytest
 
 from marey.bundles.manifest import BundleManifest
 from marey.core.errors import InvalidInput
+from marey.generation.asked import action_of
 from marey.generation.candidates import DrawPlan, best_clips
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.export import finish
@@ -183,6 +184,67 @@ def test_movements_begin_where_the_one_before_ended(drawing: Any) -> None:
     assert heights[rises][-1] > 0.85
     assert all(row.end - row.start < 4.0 for row in made.timeline[:3])
     assert made.timeline[1].changes["posture"] == "knees"
+
+
+BLOWS = ("punch", "throws a jab"), ("punch", "throws a cross"), ("kick", "kicks")
+
+
+@pytest.mark.parametrize("said", [BLOWS, (("wave", "waves"), ("bow", "bows"), ("clap", "claps"))])
+def test_drawn_movements_go_on_into_each_other(drawing: Any, said: tuple[tuple[str, str], ...]) -> None:
+    request = resolve_request(drawing, Request(sequence_of(drawing, *said), 3))
+    (made,) = generate_any(drawing, [request])
+    assert isinstance(made, TimelineMotion)
+    speeds = np.linalg.norm(np.diff(drawing.layout.decode(made.features), axis=0), axis=-1).max(-1) * 20
+    for row in made.timeline[1:]:
+        begin = round(row.start * 20)
+        assert np.median(speeds[begin : begin + 6]) > 0.2  # the body is on its way
+    joints = drawing.layout.decode(made.features)
+    if said == BLOWS:
+        until = round(made.timeline[2].start * 20) + 6
+        assert (joints[:until, [20, 21], 1] - joints[:until, :1, 1]).min() > 0.1
+
+
+def test_a_way_before_a_drawn_movement_does_not_wait_for_it(drawing: Any) -> None:
+    said = ("walk", "walks ahead"), ("wave", "waves"), ("walk", "walks on")
+    request = resolve_request(drawing, Request(sequence_of(drawing, *said), 3))
+    (made,) = generate_any(drawing, [request])
+    assert isinstance(made, TimelineMotion)
+    alone = resolve_request(drawing, Request(sequence_of(drawing, said[1]), 3))
+    wave = made.timeline[1]
+    assert wave.end - wave.start < 2.6
+    assert alone.timeline is None
+
+
+@pytest.mark.parametrize(
+    ("jump", "said"),
+    [
+        ("jump", "jumps over a crate"),
+        ("jump", "jumps"),
+        ("hop", "hops across a ditch"),
+        ("jump-forward", "jumps ahead"),
+    ],
+)
+@pytest.mark.parametrize("run", ["run", "sprint"])
+def test_who_jumps_out_of_a_run_leaps(drawing: Any, jump: str, said: str, run: str) -> None:
+    rows = (run, "runs"), (jump, said), (run, "runs on")
+    request = resolve_request(drawing, Request(sequence_of(drawing, *rows), 3))
+    assert request.timeline is not None
+    assert [action_of(row.text) for row in request.timeline] == [run, "leap", run]
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (("walk", "walks"), ("jump", "jumps over a crate"), ("walk", "walks on")),
+        (("run", "runs"), ("jump", "jumps up and down"), ("run", "runs on")),
+        (("run", "runs"), ("hop", "hops on one leg"), ("run", "runs on")),
+        (("run", "runs"), ("jump", "jumps"), ("wave", "waves")),
+    ],
+)
+def test_other_jumps_are_no_leaps(drawing: Any, rows: tuple[tuple[str, str], ...]) -> None:
+    request = resolve_request(drawing, Request(sequence_of(drawing, *rows), 3))
+    assert request.timeline is not None
+    assert action_of(request.timeline[1].text) == rows[1][0]
 
 
 def test_models_that_draw_nothing_hand_no_posture_on(generator: Any) -> None:

@@ -16,7 +16,7 @@ from marey.posing.still import standing_still
 from marey.quality.measure import range_degrees
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
-from tests.support.bodies import Body
+from tests.support.bodies import Body, steady
 from tests.support.drawn_motions import drawn_on
 
 FPS = HUMANML3D_263.fps
@@ -320,3 +320,14 @@ def test_a_jump_turns_in_the_air_as_far_as_it_says(prompt: str, degrees: int | N
     assert abs(yaw[flies][-1] - yaw[flies][0]) > 0.5 * abs(turned)
     still = joints[-5:, [7, 8, 10, 11]]
     assert np.abs(still - still[-1]).max() < 0.01
+
+
+def test_a_leap_between_runs_is_drawn_where_a_network_stops() -> None:
+    wish = FineWish(prompt="leaps over a puddle", beside=("runs", "runs on"))
+    leaps, stands = FINE["leap"], Body(4.0).joints()
+    runs = Body(4.0, speed=steady(3.0)).joints()
+    assert leaps.is_well(runs, 20.0, wish)
+    assert not leaps.is_well(stands, 20.0, wish)
+    made = leaps.draw(stands, 20.0, wish, np.random.default_rng(1))
+    assert made is not None
+    assert made[-1, 0, 2] - made[0, 0, 2] > 2.0

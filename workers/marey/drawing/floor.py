@@ -307,6 +307,11 @@ def aiming_prone(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[S
     return low, ((0.7 * pace, low),), ()
 
 
+def half_kneeling() -> Posture:
+    """Return the posture between standing and being on all fours: on one knee, a hand on the other."""
+    return _HALF_KNEEL
+
+
 def get_up(rng: random.Random, form: str = "") -> Gesture:
     """A body that lies and gets up to stand: `form` is lie-back, lie-front, or fours (from hands and knees); one of the
     first two if empty."""

@@ -16,6 +16,11 @@ LONG_S, BRIEF_S = 6.5, 3.0
 _BOTH = re.compile(r"\b(?:both (?:\w+ )?(?:arms?|hands?)|(?:his|her|their|the|with|two) (?:arms|hands))\b")
 _ONE = re.compile(r"\b(?:(?:one|a|an|single) (?:\w+ )?(?:arm|hand)|one[- ](?:armed|handed))\b")
 _LONG = re.compile(r"\b(?:long|while|minutes?|seconds?|keeps?|hold\w*|stay\w*|remain\w*|continu\w*|on and on)\b")
+_BLOWS = re.compile(
+    r"\b(?:punch\w*|jabs?|hooks?|uppercuts?|kicks? (?!the )\w*|\w+ kicks?|block\w*|parr(?:y|ies)|dodg\w*|ducks?"
+    r"|weav\w*|guard|box(?:es|er|ers|ing)|fight\w*|spar(?:s|ring)|elbows?|kickbox\w*|karate\w*|strikes?|blows?)\b"
+)
+"""Words of a fight: between blows, a guard is not let down."""
 NAMED, UNASKED, OTHER = 8, 4, 1
 """Weights of a form that is named and missing, of one that is drawn and not named, and of an unusual or long one."""
 
@@ -28,11 +33,13 @@ class Forms:
         named: pattern of the words that ask for a kind, by kind.
         only: kinds that are drawn only if they are named.
         usual: kinds that are drawn where no other is named.
+        fights: kinds that are drawn beside other blows.
     """
 
     named: Mapping[str, re.Pattern[str]] = field(default_factory=dict[str, re.Pattern[str]])
     only: frozenset[str] = frozenset()
     usual: frozenset[str] = frozenset()
+    fights: frozenset[str] = frozenset()
 
 
 @cache
@@ -44,6 +51,7 @@ def load_forms() -> Mapping[str, Forms]:
             {kind: re.compile(words.replace("_", r"[\s-]")) for kind, words in table.get("named", {}).items()},
             frozenset(table.get("only", ())),
             frozenset(table.get("usual", ())),
+            frozenset(table.get("fights", ())),
         )
         for action, table in tables.items()
     }
@@ -59,6 +67,7 @@ class StatedForm:
         side: `left` or `right` of the limb that acts; empty = either.
         brief: it is one of several movements, whose length is open: short, and done once where no number is stated.
         seconds: that it has; None = as many as it takes.
+        beside: the movements before and after it, in lower case.
     """
 
     text: str
@@ -66,6 +75,7 @@ class StatedForm:
     side: str = ""
     brief: bool = False
     seconds: float | None = None
+    beside: str = ""
 
 
 def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
@@ -83,6 +93,7 @@ def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
     unasked += gesture.side == BOTH and bool(_ONE.search(text) or asked.side)
     unasked += gesture.times not in (1, asked.count) and (asked.count is not None or asked.brief)
     unusual = bool(forms.usual - kinds)
+    unusual += bool(forms.fights - kinds) and bool(_BLOWS.search(asked.beside))
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
     room = BRIEF_S if asked.brief else asked.seconds
     excess = too_long if room is None else max(gesture.seconds - room, 0.0)

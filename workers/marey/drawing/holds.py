@@ -10,19 +10,28 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from marey.drawing.crawls import on_fours
 from marey.drawing.crouches import crouched
-from marey.drawing.floor import aiming_prone, lying_back, lying_front, rising_from_seat, seated_on_floor, slid
+from marey.drawing.floor import (
+    aiming_prone,
+    half_kneeling,
+    lying_back,
+    lying_front,
+    rising_from_seat,
+    seated_on_floor,
+    slid,
+)
 from marey.drawing.kneels import kneeling
 from marey.drawing.postures import STAND, Posture
 from marey.drawing.seats import seated_on_seat
 from marey.drawing.sequels import Sequel, Step
 
 SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
-CROUCH, BACK, FRONT, PRONE, SLIDE = "crouch", "back", "front", "prone", "slide"
+CROUCH, BACK, FRONT, PRONE, SLIDE, FOURS = "crouch", "back", "front", "prone", "slide", "fours"
 """Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
 on one; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on the seat behind the
-feet, after a slide."""
-SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE})
+feet, after a slide; on hands and knees."""
+SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE, FOURS})
 LYING = frozenset({BACK, FRONT, PRONE})
 BEGINS_S, STANDS_S = 0.3, 0.5
 """Seconds in which a body waits before it moves, in a posture and standing."""
@@ -96,10 +105,14 @@ def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
         return holds[BACK].down[-2:]
     if begin == BACK or end == BACK:
         return (*_way(holds, begin, UPRIGHT), *_way(holds, UPRIGHT, end))
+    if begin == FRONT and end == FOURS:
+        return (*holds[FRONT].up[:2], (PASSES_S, holds[FOURS].low))
     if begin == FRONT:
         return (*holds[FRONT].up[:-1], (PASSES_S, holds[end].low))
     if end == FRONT:
         return holds[FRONT].down
+    if {begin, end} == {SEAT, FOURS}:  # over the feet
+        return (*holds[begin].up[:-1], *holds[end].down)
     if {begin, end} & SITTING and {begin, end} & KNEELING:  # legs do not pass under the hips
         return (*holds[begin].up[:-1], *holds[end].down)
     return ((PASSES_S, holds[end].low),)
@@ -115,6 +128,11 @@ def _on_knees(rng: random.Random, *, one: bool) -> tuple[Posture, tuple[Step, ..
     down = [(0.5, way), (0.4, low)] if one else [(0.5, way), (0.4, half), (0.6, low)]
     up = [*([] if one else [(0.6, half)]), (0.45, way), (0.55, STAND)]
     return low, tuple(down), tuple(up)
+
+
+def _on_fours(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    low, pace = on_fours(rng), rng.uniform(0.9, 1.1)
+    return low, ((0.7 * pace, half_kneeling()), (0.6 * pace, low)), ((0.9 * pace, half_kneeling()), (0.7 * pace, STAND))
 
 
 def _crouched(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
@@ -133,4 +151,5 @@ _HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], 
     FRONT: lying_front,
     PRONE: aiming_prone,
     SLIDE: slid,
+    FOURS: _on_fours,
 }

@@ -73,7 +73,8 @@ class AskedMotion:
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
             its end came after the action; `footed`, true where a run was held back by the slide of its
-            feet; `posture`, in which a gesture is done (`marey.generation.postured`).
+            feet; `posture`, in which a gesture is done
+            (`marey.generation.postured`), or `as before`, that in which the movement before has ended.
     """
 
     features: Float32 = field(repr=False)
@@ -222,8 +223,16 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
     if drawn is None or held or not request.beside[0]:
         return drawn
-    features = np.concatenate([drawn.features[:1].repeat(CUT, axis=0), drawn.features])
+    features = np.concatenate([_at_rest(drawn.features[:1].repeat(CUT, axis=0), generator.layout), drawn.features])
     return replace(drawn, features=features[: request.frames] if wish.action == STANDING else features)
+
+
+def _at_rest(features: Float32, layout: FeatureLayout) -> Float32:
+    """Return features (T, D) of one frame again and again, without its step to the next one."""
+    still = features.copy()
+    for group in ("yaw", "velocity", "velocities"):
+        still[:, layout.slices[group]] = 0.0
+    return still
 
 
 DRAWING = "drawing"

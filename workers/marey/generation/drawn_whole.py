@@ -33,7 +33,6 @@ from marey.posing.still import standing_still
 from marey.quality.record import SHOWN
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import RULES
-from marey.vocabulary.scope import STANDING
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -138,8 +137,8 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
     says first."""
     text = wish.prompt.lower()
-    seconds = frames / FPS if wish.fixed and frames is not None else None
-    asked = StatedForm(text, wish.count, wish.side, any(wish.beside) and not wish.fixed, seconds)
+    brief, seconds = any(wish.beside) and not wish.fixed, frames / FPS if wish.fixed and frames is not None else None
+    asked = StatedForm(text, wish.count, wish.side, brief, seconds, " ".join(wish.beside).lower())
     drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
     yield from (
         gesture

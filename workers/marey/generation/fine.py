@@ -9,6 +9,7 @@ the made clips of the training data are.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +20,13 @@ from marey.generation.dodging import dodged, dodges_well
 from marey.generation.fine_wish import FineWish
 from marey.generation.striking import punched
 from marey.generation.waving import waved, waves_well
-from marey.generation.whole_body import CHOICES, whole_body
+from marey.generation.whole_body import CHOICES, goes_out_of_a_run, whole_body
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, from_rotvec, length, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
+from marey.posing.limbs import LEVEL
 
 Float32 = NDArray[np.float32]
 Draw = Callable[[Array, float, FineWish, np.random.Generator], Array | None]
@@ -35,6 +37,8 @@ NODS, PAUSE_S = (3, 5), (0.6, 1.2)
 """Nods in a row, and seconds between two rows, where no number is asked for."""
 HELD_S = 0.8
 """Standard deviation of the filter that leaves out the nods that a head makes already, seconds."""
+GOES, GOES_S = 1.2, 0.4
+"""Metres a second that a body which leaps out of a run always goes, and seconds in which that is measured."""
 EDGE_S = 0.3
 """Seconds at both ends in which nothing is drawn."""
 SHAKE_HZ = (4.3, 5.2)
@@ -114,6 +118,16 @@ def never(joints: Array, fps: float, wish: FineWish) -> bool:
     return False
 
 
+def _goes_well(action: str, joints: Array, fps: float, wish: FineWish) -> bool:
+    """Return True if what a network makes of a movement of the whole body stays where it shows the action: one that
+    keeps the speed of the run before it."""
+    if not goes_out_of_a_run(action, wish):
+        return False
+    frames = round(GOES_S * fps)
+    way = np.linalg.norm((joints[frames:, 0] - joints[:-frames, 0]) * LEVEL, axis=-1) * fps / frames
+    return bool(way.min(initial=np.inf) > GOES)
+
+
 class Fine(NamedTuple):
     """A small movement.
 
@@ -137,6 +151,6 @@ FINE: Mapping[str, Fine] = {
     "dodge": Fine(dodged, dodges_well, sided=True),
     "kick-ball": Fine(kicked_ball, kicks_well, sided=True),
     "throw": Fine(thrown, sided=True),
-    **{action: Fine(whole_body(action), never) for action in CHOICES},
+    **{action: Fine(whole_body(action), partial(_goes_well, action)) for action in CHOICES},
 }
 """Small and sudden movements by action."""

@@ -14,6 +14,7 @@ class RowPosture:
         own: in which the movement is done, or which it comes to.
         end: in which the row after begins.
         gesture: the movement is one of arms, head and trunk, made by itself and put onto the posture.
+        enters: in which a movement begins that is drawn by itself, if the body is low before it; empty = it is not.
         apart: the row before ends otherwise than this one begins.
         falls: the movement comes to its posture by itself.
         fires: shots go off in the posture.
@@ -24,6 +25,7 @@ class RowPosture:
     own: str = ""
     end: str = ""
     gesture: bool = False
+    enters: str = ""
     apart: bool = False
     falls: bool = False
     fires: bool = False
@@ -32,7 +34,7 @@ class RowPosture:
     @property
     def meets(self) -> bool:
         """True if the row before it ends in its posture, and nothing is to be generated between the two."""
-        return bool(self.begin) and not self.apart
+        return bool(self.begin or self.enters) and not self.apart
 
     @property
     def is_drawn(self) -> bool:

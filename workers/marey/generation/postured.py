@@ -27,8 +27,9 @@ from marey.vocabulary.bearing_words import stated_bearings
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
 
-STAYS_S, WAITS_S = (0.9, 1.4), (1.5, 2.0)
-"""Seconds in a posture after it is reached, and of a movement that is nothing but a wait in it."""
+STAYS_S, PASSES_ON_S, WAITS_S = (0.9, 1.4), (0.4, 0.7), (1.5, 2.0)
+"""Seconds in a posture after it is reached, in one that is left again by the same movement, and of a movement that is
+nothing but a wait in it."""
 AIMS_S = (2.2, 3.2)
 """Seconds for which a gun is aimed on the front."""
 LONGEST_S = 4.2
@@ -41,6 +42,8 @@ BENDS = 40.0
 """Degrees by which a trunk bends in a gesture at most, on a posture."""
 WORK_S = 3.0
 """Seconds of work in a posture at least."""
+LIFTS = 0.3
+"""Share of its length by which a bone points down at which it begins to be taken for one that points up."""
 LEG_JOINTS = [joint for leg in LEGS.values() for joint in leg]
 HEAD = 15
 BENDS_S = 0.15
@@ -66,7 +69,8 @@ def drawn_posture(layout: FeatureLayout, held: RowPosture, said: str, seed: int,
         frames: that it keeps; None = as many as it takes.
     """
     rng = random.Random(f"{seed} posture")  # noqa: S311
-    stays = AIMS_S if held.own == PRONE else WAITS_S if held.begin == held.own else STAYS_S
+    stays = PASSES_ON_S if held.end not in ("", held.own) else STAYS_S
+    stays = AIMS_S if held.own == PRONE else WAITS_S if held.begin == held.own else stays
     seconds = rng.uniform(*stays) if held.own else 0.4
     return encode_all(layout, _fitted(held, max(seconds, gestures_s(said)), frames))
 
@@ -94,11 +98,11 @@ def on_posture(
     made = StandingBody(made.joints)
     there = np.arange(len(joints)) / FPS
     left = np.minimum(there, frames / FPS - there)
-    edge = np.clip(left / EDGE_S, 0.0, 1.0)
+    edge, lies = np.clip(left / EDGE_S, 0.0, 1.0), held.own in (BACK, FRONT)
     body = StandingBody(joints)
     _bend(body, made, eased(np.clip(left / BENDS_S, 0.0, 1.0)))
     for side, share in acts.items():
-        _carry(body, made, side, eased(edge) * share[index], in_trunk=action not in WAYS or held.own in (BACK, FRONT))
+        _carry(body, made, side, eased(edge) * share[index], lies=lies, in_trunk=lies or action not in WAYS)
     solved = body.solved()
     solved[:, LEG_JOINTS] = joints[:, LEG_JOINTS]  # solved knees of who kneels go through the floor
     return encode_all(layout, solved)
@@ -174,14 +178,26 @@ def _bend(body: StandingBody, made: StandingBody, edge: Array) -> None:
     body.lean(np.clip(twist - twist[0], -BENDS, BENDS) * edge, "up")
 
 
-def _carry(body: StandingBody, made: StandingBody, side: str, share: Array, *, in_trunk: bool) -> None:
-    """Bring an arm to where it is in a gesture, by `share` (T,)."""
+def _carry(body: StandingBody, made: StandingBody, side: str, share: Array, *, in_trunk: bool, lies: bool) -> None:
+    """Bring an arm to where it is in a gesture, by `share` (T,); of a body that `lies`, arms that go up go away from
+    the floor."""
     _, shoulder, elbow, wrist = ARMS[side]
     bones = [_way(made, side, *pair) for pair in ((shoulder, elbow), (elbow, wrist))]
+    if lies:
+        bones = [_before_chest(bone) for bone in bones]
     if in_trunk:
         turn = np.einsum("tki,tkj->tij", _trunk(made, side), _trunk(body, side))
         bones = [np.einsum("ti,tij->tj", bone, turn) for bone in bones]
     body.move_arm(side, share, *bones, lag=0.0, straight=True)
+
+
+def _before_chest(bone: Array) -> Array:
+    """Return directions (T, 3) of a bone, outward, up and forward, of which those that point up point forward, and
+    those that point down stay."""
+    raised = 0.5 * np.arccos(np.clip(-bone[:, 1], -1.0, 1.0))
+    lifted = np.clip((bone[:, 1] + LIFTS) / LIFTS, 0.0, 1.0)[:, None]
+    ahead = normalize(np.stack([0.5 * bone[:, 0], -np.cos(raised), np.sin(raised)], axis=-1))
+    return normalize((1 - lifted) * bone + lifted * ahead)
 
 
 def _trunk(body: StandingBody, side: str) -> Array:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FRONT, KNEE, KNEES, LYING, PRONE, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, LYING, PRONE, SEAT, SLIDE, UPRIGHT
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
 from marey.vocabulary.scope import STANDING
@@ -46,8 +46,12 @@ GESTURES = frozenset(
 """Actions of arms, head and trunk: they are done in the posture in which the body is."""
 AIMS = frozenset({"aim", "shoot"})
 """Actions that are done on the front, on the elbows."""
-LAIN = frozenset({STANDING, "wave", "clap", "laugh", "shiver", "talk"})
+LAIN = frozenset(
+    {STANDING, "wave", "clap", "laugh", "shiver", "talk", "reach-up", "reach-forward", "raise-arm", "cheer", "nod"}
+)
 """Actions that are done on the back."""
+ENTRIES: Mapping[str, str] = {"crawl": FOURS, "sit-ups": BACK}
+"""Postures in which movements begin that are drawn by themselves."""
 _UP = re.compile(
     r"\b(?:gets?|stands?|rises?|scrambles?|jumps?|springs?|clambers?|struggles?|climbs?|leaps?|pushes|straightens?"
     r"|picks? (?:him|her|them|it)sel\w+)\b.*\b(?:up|upright|feet)\b|\brises?\b|^\W*stands?\W*$"
@@ -83,7 +87,10 @@ def row_postures(rows: Sequence[Row], seed: int) -> list[RowPosture]:
         found.append(replace(_held(row, (before, after), begin), seed=seed))
         begin = found[-1].own
     last = RowPosture(begin=begin)
-    return [replace(held, end="" if after.apart else after.begin) for held, after in pairwise([*found, last])]
+    return [
+        replace(held, end="" if after.apart else after.begin or after.enters)
+        for held, after in pairwise([*found, last])
+    ]
 
 
 def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPosture:
@@ -106,6 +113,8 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
             falls=action == "die" and not begin and not crawled,
             fires=action == "shoot",
         )
+    if begin and not stays(row, begin) and action in ENTRIES:
+        return RowPosture(enters=FRONT if action == "crawl" and is_low_crawl(said) else ENTRIES[action])
     if not begin or not stays(row, begin):
         return RowPosture(begin if begin and rises(row) else "")
     if action == STANDING:

@@ -235,7 +235,8 @@ CHOICES: Mapping[str, Choice] = {
 AGAIN = frozenset({"roll", "flip", "jump-turn"})
 """Actions that begin and end standing, and are done again."""
 OUT_OF_A_RUN = frozenset({"leap"})
-"""Actions that are drawn where they stand alone: out of the run before it, the network's goes on at its speed."""
+"""Actions that are drawn where they stand alone: out of the run before it, the network's goes on at its speed, where it
+shows one."""
 LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {
     "roll": _IN_BED,
     "leap": _RUNS_FIRST,
@@ -248,11 +249,10 @@ LEFT_TO_NETWORKS: Mapping[str, re.Pattern[str]] = {
 def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Generator], Array | None]:
     """Return a function that draws an action in place of a motion; None for a kind that is not drawn, and for a motion
     that is too short for it."""
-    draws = is_drawn(action)
 
     def drawn(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
         del fps
-        if not draws(wish):
+        if _is_networks(action, wish):
             return None
         chance = random.Random(int(rng.integers(2**62)))  # noqa: S311
         times = min(wish.count or 1, MOST) if action in AGAIN else 1
@@ -265,12 +265,21 @@ def whole_body(action: str) -> Callable[[Array, float, FineWish, np.random.Gener
 
 def is_drawn(action: str) -> Callable[[FineWish], bool]:
     """Return a function that tells if a movement of an action is drawn as its prompt asks for it."""
-    others, alone = LEFT_TO_NETWORKS.get(action), action in OUT_OF_A_RUN
 
     def draws(wish: FineWish) -> bool:
-        return not (alone and any(wish.beside)) and (others is None or not others.search(wish.prompt.lower()))
+        return not (goes_out_of_a_run(action, wish) or _is_networks(action, wish))
 
     return draws
+
+
+def goes_out_of_a_run(action: str, wish: FineWish) -> bool:
+    """Return True if a movement is drawn only where a network does not show it, since that keeps the speed of a run."""
+    return action in OUT_OF_A_RUN and any(wish.beside)
+
+
+def _is_networks(action: str, wish: FineWish) -> bool:
+    others = LEFT_TO_NETWORKS.get(action)
+    return others is not None and others.search(wish.prompt.lower()) is not None
 
 
 def drawn_in_place(

@@ -20,6 +20,8 @@ Array = NDArray[np.floating]
 
 CLIMBS = frozenset({"climb-stairs", "climb-ladder", "climb-onto"})
 """Actions that may end higher than they begin."""
+_OVER = re.compile(r"\b(?:over|across|vaults?|vaulting|hurdl\w+|clears?)\b")
+"""Words of what is passed over, not climbed onto."""
 LEAST_M = 0.15
 """Metres by which a climb ends higher, or begins, at least."""
 ENDS = 5
@@ -70,7 +72,7 @@ def raised_rows(rows: Sequence[tuple[str, str, Float32]], layout: FeatureLayout)
         else:
             level = 0.0 if down else level
             found.append(RaisedRow(lifted(features, level, layout), level))
-        if down:
+        if down or (action == "climb-onto" and _OVER.search(said)):
             level = 0.0
         elif action in CLIMBS and ends - begins > LEAST_M:
             level += ends - begins

@@ -23,6 +23,7 @@ from marey.generation.row_postures import Row, rises, row_postures
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
+from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import stated_gaze
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.scope import STANDING
@@ -40,6 +41,14 @@ _ONLY_STOPS = re.compile(
     r"(?: for an? (?:\w+ )?(?:moment|second|beat|instant))?"
 )
 """Words of a body that stops and does nothing else."""
+LEAP, RUNS, JUMPS_AHEAD = "leap", frozenset({"run", "sprint"}), frozenset({"jump", "jump-forward", "hop"})
+"""Action of a jump out of a run, those of runs, and those of jumps that may be one."""
+_OVER = re.compile(r"\b(?:over|across|clear(?:s|ing))\b")
+_ON_SPOT = re.compile(
+    r"\b(?:up and down|in place|on (?:the spot|(?:one|his|her|their|the)(?: \w+)? (?:leg|foot))|straight up|for joy"
+    r"|high five|twice|times|backwards?|onto|into|off|down|up)\b"
+)
+"""Words of jumps that are none."""
 _DEAD = re.compile(r"\b(?:dead|dies|die|died|dying|death|killed|slain|lifeless(?:ly)?)\b")
 _LIVES = re.compile(
     r"\b(?:reviv\w*|resurrect\w*|reanimat\w*|respawn\w*|(?:to|back to) life|alive|zombies?|undead|ghosts?|spirits?"
@@ -65,6 +74,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         InvalidInput: as `Limits.check`.
     """
     movements = _until_death(_merged_falls(request.text), request.text.said.lower())
+    movements = _leaping(movements) if draws(generator, request) else movements
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not (movements and alone and generator.limits.keeps):
         return request
@@ -134,6 +144,21 @@ def _until_death(movements: Sequence[TextFeatures], said: str) -> tuple[TextFeat
         if not dead or row[0] in _RESTS:
             found.append(movement)
         dead = dead or (row[0] == "die" and bool(_DEAD.search(row[1])) and not _LIVES.search(said))
+    return tuple(found)
+
+
+def _leaping(movements: Sequence[TextFeatures]) -> tuple[TextFeatures, ...]:
+    """Return movements of which those that jump out of a run, over something or into the next run, are leaps: who jumps
+    on the spot stops before it."""
+    actions = [action_of(movement) for movement in movements]
+    found = list(movements)
+    for number, (movement, action) in enumerate(zip(movements, actions, strict=True)):
+        said = movement.said.lower()
+        runs = number > 0 and actions[number - 1] in RUNS
+        goes_on = (number + 1 < len(actions) and actions[number + 1] in RUNS) or _OVER.search(said) is not None
+        if action in JUMPS_AHEAD and runs and goes_on and not _ON_SPOT.search(said):
+            leap = f"{load_vocabulary().need(LEAP).plain_words}, {said}"
+            found[number] = replace(movement, rewritten=leap, actions=(), action_rows=None)
     return tuple(found)
 
 

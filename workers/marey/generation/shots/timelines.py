@@ -18,22 +18,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
 from marey.generation.asked import action_of, changes_of, generate_as_asked
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
+from marey.generation.shots.flowing import flowing, without_rest
+from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.levels import lifted, raised_rows
+from marey.generation.shots.raised_arms import RAISING, TURNING, kept_arms
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.motion.features import FeatureLayout
+from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import STANDING
 
 RISE, RISE_SPEED = 0.3, 0.6
 """Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
 stand up or to go down at this speed."""
 
+BENT, LOWER = frozenset({"bend-over"}), frozenset({KNEES, KNEE, FLOOR, BACK, FRONT, CROUCH, FOURS})
+"""Actions from whose bent trunk a body goes on down, and the postures that it comes to."""
 MEETS = 8
 """Frames in which a row passes into the next one that begins in the same posture."""
 
@@ -191,6 +200,20 @@ class _Row(_Strand):
         self.features: Float32 | None = None
         self.base = 0.0
         self.changes: Mapping[str, Any] = {}
+        self.entered = 0
+
+    @property
+    def is_drawn(self) -> bool:
+        """True if rules draw its movement."""
+        return self.open and "drawn" in self.changes
+
+    @property
+    def is_trimmed(self) -> bool:
+        """True if its rest may be left out: its features show the movement, no gesture is drawn on it later."""
+        waits = action_of(self.text) in ("", STANDING) or any(
+            each.bearing.gesture for each in stated_bearings(self.text.said)
+        )
+        return self.is_drawn and not (waits or self.held.is_drawn)
 
     def request(self) -> Request:
         """Return the request of the first window."""
@@ -306,6 +329,8 @@ class _Timeline:
                 and is_way(after.text)
             ):
                 before.features, after.features = without_halt(before.features, after.features, layout)
+        if layout.skeleton.name == HUMANML3D.name:
+            self._flow(layout)
         later, times = 0.0, list[TimedText]()
         heights = [_pelvis_heights(row.features, layout) for row in self.rows]
         for number, (timed, row) in enumerate(zip(self.timeline, self.rows, strict=True)):
@@ -321,6 +346,39 @@ class _Timeline:
         self.plan = plan_timeline(self.timeline, self.seed, self.limits)
         for row, part in zip(self.rows, self.plan.rows, strict=True):
             row.part = part
+
+    def _flow(self, layout: FeatureLayout) -> None:
+        """Let drawn movements go on into each other, and leave out their rest beside others."""
+        for number, row in enumerate(self.rows):
+            if row.features is not None and row.is_trimmed:
+                beside = [each and not each.is_drawn for each in (self._row(number - 1), self._row(number + 1))]
+                row.features = without_rest(row.features, layout, first=bool(beside[0]), last=bool(beside[1]))
+        for before, after in pairwise(self.rows):
+            if before.features is None or after.features is None or after.held.meets or after.held.apart:
+                continue
+            if after.is_drawn and freezes(action_of(before.text), action_of(after.text), after.text.said.lower()):
+                held = frozen(before.features, len(after.features), layout)
+                if held is not None:
+                    before.features, after.features, after.entered = held.before, held.after, held.entered
+                    after.changes = {**after.changes, "posture": AS_BEFORE}
+                continue
+            if before.is_drawn and action_of(before.text) in RAISING and action_of(after.text) in TURNING:
+                kept = kept_arms(before.features, after.features, layout) if after.open else None
+                if kept is not None:
+                    before.features, after.features = kept.before, kept.after
+            elif before.is_drawn and after.is_drawn:
+                whole = not before.is_trimmed, not after.is_trimmed
+                down = action_of(before.text) in BENT and after.held.own in LOWER
+                joined = flowing(
+                    before.features, after.features, layout, whole=whole, entered=before.entered, down=down
+                )
+                if joined is not None:
+                    after.changes = {**after.changes, **({"posture": AS_BEFORE} if down else {})}
+                    before.features, after.features, after.entered = joined.before, joined.after, joined.entered
+
+    def _row(self, number: int) -> _Row | None:
+        """Return a row; None before the first and behind the last."""
+        return self.rows[number] if 0 <= number < len(self.rows) else None
 
     def _whole_tokens(self, seconds: float) -> float:
         """Return a time in seconds, up to the next whole token of the model."""
@@ -340,7 +398,7 @@ class _Timeline:
             self.transitions = [
                 _Transition(self, number, self.limits, layout)
                 for number, (_, after) in enumerate(pairwise(self.rows))
-                if not after.held.meets
+                if not (after.held.meets or after.entered)
             ]
         return self.transitions
 

@@ -1,0 +1,245 @@
+"""Drawn movements that go on into each other, without a rest between them.
+
+Each movement of a sequence is drawn alone: it begins and ends with a body that stands at rest, or in guard, for a
+moment. Behind each other, a blow would be drawn back, the guard let down, and after a second the next one begun. Here
+the end of one and the beginning of the next are cut where the bodies are near each other and little time is
+lost; in between, the pose passes from one to the other, and feet that stand elsewhere take a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import heading
+from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.rotations import about, normalize, rotate
+from marey.posing.limbs import FPS, LEVEL
+from marey.posing.standing import ARMS, LEGS, StandingBody, eased
+
+Float32 = NDArray[np.float32]
+Array = NDArray[np.floating]
+
+ACTS = 0.6
+"""Share of its farthest way from rest behind which a movement comes back, and at which it is under way."""
+SLOW = 0.6
+"""Metres a second of its fastest joint under which a movement is not yet under way."""
+MOST_S = 2.0
+"""Seconds of a movement that are left out at most, at either end."""
+RESTS_M = 0.05
+"""Metres from rest within which a movement has not begun, where what is beside it is not drawn."""
+RESTS_SHARE = 0.25
+"""The same, as a share of the farthest way of a small movement."""
+SINKS_M, BENDS_M = 0.06, 0.05
+"""Metres by which the pelvis of a body that is at rest but for its arms is higher or lower than at its end, and by
+which its head is elsewhere over it."""
+REST_S = 0.15
+"""Seconds of rest that are left there."""
+TIME = 0.25
+"""Metres between two bodies that weigh as much as a second of rest."""
+HELD, LOWERED_M = 0.9, 0.2
+"""Share of its farthest way from rest in which a body is bent, and metres by which it is lowered when it goes down."""
+SPEED = 1.6
+"""Metres a second of a joint on the way from one movement to the next at most, if that has the time."""
+PASSES = (6, 16)
+"""Frames of that way."""
+STEPS_M, LIFT_M, SHARE = 0.05, 0.07, 0.62
+"""Metres by which a foot that takes a step is moved at least and lifted, and the share of the way that a step takes."""
+STEPS_S, METRES_S = 0.35, 0.8
+"""Seconds of a way with steps, and more for each metre of the longest."""
+STANDS_M, ON_FLOOR_M = 0.6, 0.13
+"""Metres of the pelvis of a body that stands at least, and of its lower ankle at most."""
+WIDE = 110.0
+"""Degrees by which an arm turns on that way that passes before the body."""
+HEAD = 15
+LEAST = 16
+"""Frames of a movement that are left at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedRows:
+    """Two movements of which the second goes on from the first.
+
+    Attributes:
+        before, after: features (T, D); the way from one to the other is part of `after`.
+        entered: frames of that way.
+    """
+
+    before: Float32 = field(repr=False)
+    after: Float32 = field(repr=False)
+    entered: int
+
+
+def flowing(
+    before: Float32,
+    after: Float32,
+    layout: FeatureLayout,
+    *,
+    whole: tuple[bool, bool] = (False, False),
+    entered: int = 0,
+    down: bool = False,
+) -> JoinedRows | None:
+    """Return two drawn movements that go on into each other; None if a body does not stand between them.
+
+    Args:
+        before: features (T, D), at 20 fps, on the skeleton of HumanML3D.
+        after: the same of the next movement.
+        layout: of the features.
+        whole: nothing is left out of the first, and of the second.
+        entered: frames at the beginning of the first in which it goes on from another one.
+        down: the body goes to the floor in the second out of the bent posture of the first.
+    """
+    first, second = (layout.decode(each).astype(np.float64) for each in (before, after))
+    if not (_stands(first[-1]) and _stands(second[0])) or min(len(first), len(second)) < LEAST:
+        return None
+    if len(first) - entered < LEAST // 2:
+        return None
+    ends, begins = entered + _ends(first[entered:], whole=whole[0]), _begins(second, whole=whole[1])
+    if down:
+        ends, begins = _bent(first), _lowered(second)
+    apart = _apart(_at_feet(first)[ends], _at_feet(second)[begins])
+    lost = (ends - ends[0])[:, None] + (begins[-1] - begins)[None]
+    cost = np.sqrt((apart**2).mean(-1)) + TIME / FPS * lost
+    one, other = np.unravel_index(int(cost.argmin()), cost.shape)
+    end, begin = int(ends[one]), int(begins[other])
+    count = _count(apart[one, other])
+    way = _way(first, second, end, begin, count)
+    joints = np.concatenate([first[:end], way, _beside(first[end], second, begin)[begin + 1 :]])
+    features = encode_all(layout, joints)
+    return JoinedRows(features[:end], features[end:], count)
+
+
+def without_rest(features: Float32, layout: FeatureLayout, *, first: bool, last: bool) -> Float32:
+    """Return features (T', D) of a drawn movement without the rest before it, behind it, or both."""
+    joints = layout.decode(features).astype(np.float64)
+    if not (_stands(joints[0]) and _stands(joints[-1])):
+        return features
+    begin, end, rest = 0, len(joints), round(REST_S * FPS)
+    if first and (moved := _moves(joints, 0)):
+        begin = min(max(moved[0] - rest, 0), round(MOST_S * FPS))
+    if last and (moved := _moves(joints, -1)):
+        end = max(min(moved[-1] + 1 + rest, end), end - round(MOST_S * FPS))
+    return features[begin:end] if end - begin >= LEAST else features
+
+
+def _stands(pose: Array) -> bool:
+    ankles = [leg[2] for leg in LEGS.values()]
+    return bool(pose[0, 1] > STANDS_M and pose[ankles, 1].min() < ON_FLOOR_M)
+
+
+def _moves(joints: Array, rest: int) -> list[int]:
+    """Return the frames in which a body is away from its pose in frame `rest`."""
+    away = _away(joints, rest)
+    return np.flatnonzero(away > min(RESTS_M, RESTS_SHARE * float(away.max()))).tolist()
+
+
+def _away(joints: Array, rest: int) -> Array:
+    """Return how far the farthest joint is from its place in frame `rest`, metres (T,)."""
+    seen = _at_feet(joints)
+    return np.linalg.norm(seen - seen[rest], axis=-1).max(-1)
+
+
+def _sinks(joints: Array, rest: int) -> NDArray[np.bool_]:
+    """Return the frames (T,) in which the pelvis is higher or lower than in frame `rest`, or the trunk is bent."""
+    head = _at_feet(joints)[:, HEAD]
+    bent = np.linalg.norm(head - head[rest], axis=-1) > BENDS_M
+    return bent | (np.abs(joints[:, 0, 1] - joints[rest, 0, 1]) > SINKS_M)
+
+
+def _ends(joints: Array, *, whole: bool) -> NDArray[np.intp]:
+    """Return the frames at which a movement may be left, while it comes back to rest."""
+    last = len(joints) - 1
+    if whole:
+        return np.array([last - PASSES[0]])
+    away = _away(joints, -1)
+    done = int(np.flatnonzero((away >= ACTS * away.max()) | _sinks(joints, -1))[-1])
+    return np.arange(max(min(done, last - 1), last - round(MOST_S * FPS), LEAST // 2), last)
+
+
+def _begins(joints: Array, *, whole: bool) -> NDArray[np.intp]:
+    """Return the frames at which a movement may be entered, before it is under way."""
+    if whole:
+        return np.array([PASSES[0]])
+    away = _away(joints, 0)
+    acts = int(np.flatnonzero((away >= ACTS * away.max()) | _sinks(joints, 0))[0])
+    speed = np.linalg.norm(np.diff(_at_feet(joints), axis=0), axis=-1).max(-1) * FPS
+    acts = int(np.flatnonzero(speed[: max(acts, 1)] < SLOW).max(initial=0)) + 1
+    return np.arange(1, max(min(acts, round(MOST_S * FPS), len(joints) - LEAST // 2), 2))
+
+
+def _bent(joints: Array) -> NDArray[np.intp]:
+    """Return the last frame in which a body is as far from rest as it comes."""
+    away = _away(joints, -1)
+    return np.flatnonzero(away >= HELD * away.max())[-1:]
+
+
+def _lowered(joints: Array) -> NDArray[np.intp]:
+    """Return the frames in which a body begins to go down."""
+    begins = np.flatnonzero(joints[0, 0, 1] - joints[:, 0, 1] > LOWERED_M)
+    return np.arange(1, max(int(begins[0]) if len(begins) else 1, 2))
+
+
+def _at_feet(joints: Array) -> Array:
+    """Return joints (T, 22, 3) from the middle of the ankles on the floor, with +Z ahead."""
+    middle = joints[:, [leg[2] for leg in LEGS.values()]].mean(1) * LEVEL
+    return rotate(about("Y", -np.radians(heading(joints, FPS)))[:, None], joints - middle[:, None])
+
+
+def _apart(one: Array, other: Array) -> Array:
+    """Return the metres (A, B, 22) between the joints of poses (A, 22, 3) and (B, 22, 3)."""
+    return np.linalg.norm(one[:, None] - other[None], axis=-1)
+
+
+def _count(apart: Array) -> int:
+    """Return the frames of the way between poses whose joints are so many metres (22,) apart."""
+    steps = float(apart[[leg[2] for leg in LEGS.values()]].max())
+    seconds = max(float(apart.max()) / SPEED, STEPS_S + METRES_S * steps if steps > STEPS_M else 0.0)
+    return int(np.clip(np.ceil(seconds * FPS), *PASSES))
+
+
+def _beside(pose: Array, joints: Array, frame: int) -> Array:
+    """Return joints (T, 22, 3), moved and turned so that those of a frame stand where a pose (22, 3) does."""
+    ankles = [leg[2] for leg in LEGS.values()]
+    degrees = heading(pose[None].repeat(2, axis=0), FPS)[0] - heading(joints, FPS)[frame]
+    there, here = (each[ankles].mean(0) * LEVEL for each in (pose, joints[frame]))
+    return rotate(about("Y", np.radians(degrees)), joints - here) + there
+
+
+def _way(first: Array, second: Array, end: int, begin: int, count: int) -> Array:
+    """Return so many joints (count, 22, 3) of the way from frame `end` of one movement to frame `begin` of another:
+    both go on meanwhile."""
+    leaves = first[np.minimum(end + np.arange(count), len(first) - 1)]
+    comes = _beside(first[end], second, begin)[np.maximum(begin + 1 + np.arange(count) - count, 0)]
+    share = np.arange(1, count + 1) / (count + 1)
+    way = (1 - eased(share))[:, None, None] * leaves + eased(share)[:, None, None] * comes
+    steps = {side: float(np.linalg.norm((comes[-1, leg[2]] - leaves[0, leg[2]]) * LEVEL)) for side, leg in LEGS.items()}
+    for number, side in enumerate(sorted(steps, key=lambda each: -steps[each])):
+        _, _, ankle, toe = LEGS[side]
+        goes = steps[side] > STEPS_M
+        done = np.clip((share - (1 - SHARE) * number) / SHARE, 0.0, 1.0) if goes else share
+        stepped = eased(done)
+        lift = np.array([0.0, 1.0, 0.0]) * (LIFT_M * goes * np.sin(np.pi * done))[:, None]
+        for joint in (ankle, toe):
+            way[:, joint] = (1 - stepped[:, None]) * leaves[:, joint] + stepped[:, None] * comes[:, joint] + lift
+    leaves, way, comes = (np.concatenate([leaves[:1], each, comes[-1:]]) for each in (leaves, way, comes))
+    body = StandingBody(way)
+    for side in ARMS:
+        _pass_arm(body, leaves, comes, side)
+    return body.solved()[1:-1]
+
+
+def _pass_arm(body: StandingBody, leaves: Array, comes: Array, side: str) -> None:
+    """Bring an arm from its way in one movement to that in another: bones that point in opposite directions pass before
+    the body."""
+    _, shoulder, elbow, wrist = ARMS[side]
+    share = np.linspace(0.0, 1.0, len(leaves))
+    wide = 0.0
+    bones = list[Array]()
+    for a, b in ((shoulder, elbow), (elbow, wrist)):
+        here, there = (normalize(each[:, b] - each[:, a]) for each in (leaves, comes))
+        body.joints[:, b] = body.joints[:, a] + leaves[:, b] - leaves[:, a]
+        bones.append(body.local(there, side))
+        wide = max(wide, float(np.degrees(np.arccos(np.clip((here * there).sum(-1), -1.0, 1.0))).max()))
+    body.move_arm(side, eased(share), *bones, lag=0.0, straight=wide < WIDE)
