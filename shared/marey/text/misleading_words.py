@@ -153,11 +153,49 @@ _SEAT = re.compile(
     re.IGNORECASE,
 )
 _SIDEWAYS = re.compile(
-    r"""\b(?P<way>(?:sneak|creep|prowl|tip-?toe|crouch(?:ed|ing)?[ -]?walk)(?:s|ing|ed)?)(?P<how>\ \w+ly)?
+    r"""\b(?P<way>(?:sneak|creep|prowl|tip-?toe|crouch(?:ed|ing)?[ -]?walk)(?:s|ing|ed)?)
+    (?:\ (?:walk|strafe|strafing|walking|move|step|run)s?)?(?P<how>\ \w+ly)?
     (?=\ (?:to\ (?:the|his|her|their)\ )?(?:left|right|side)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
 """A crouched way to a side, of which models read one ahead."""
+_TO_BOTH_SIDES = re.compile(
+    r"""(?P<work>\b(?:mop|sweep|scrub|wip|rak|polish|vacuum|hoover|saw|brush|clean|wash|rub|paint|dust|sand|plan|buff|comb
+    |scrap|iron|grat|whisk|stir)(?:p?e?s|p?ing|e)?\b[^,.;]*?)
+    \ (?:from\ (?:one\ )?side\ to\ (?:the\ other|(?:the\ )?side)|side\ to\ side|back\ and\ forth|to\ and\ fro
+    |(?:from\ )?left\ (?:to|and)\ right
+    |(?:from\ )?right\ (?:to|and)\ left)(?=$|[,.;!]|\ (?:and|then|with|while|as)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Strokes of work, of which models read steps to the sides: "mops the floor from side to side"."""
+_SPINS_AROUND = re.compile(
+    r"\b(?P<spins>(?:spin|twirl|whirl)(?:s|n?ing)?) (?:a)?round "
+    r"(?=(?:exactly |just |only )?(?:once|twice|thrice|[\w-]+ times)\b)",
+    re.IGNORECASE,
+)
+"""A number of spins, of which models read one turn to face back."""
+_COWERS = re.compile(
+    r"""\bcower(?P<end>s|ing|ed)?(?:\ (?:down|back|in\ (?:fear|terror)|low))*
+    (?P<where>\ (?:behind|under|in|against|on|before)\ [^,.;]*?)?
+    (?:,?\ (?:and\ )?(?:with\ )?
+    (?:(?:covers|covering|shields|shielding|protects|protecting)\ (?:his|her|their)\ head(?:\ with\ [^,.;]*)?
+    |(?:(?:both|the|his|her|their)\ )*(?:arms|hands)\ (?:(?:held|raised|up)\ )?
+    (?:over|above|around|on|covering)\ (?:(?:the|his|her|their)\ )?head))?
+    (?=$|[,.;!]|\ (?:and|then|while|as)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that is afraid, of which models read a guard or nothing."""
+_COVERS_HEAD = re.compile(
+    r"""(?P<low>\b(?:crouch|duck|squat|hunch|huddl)\w*(?:\ down)?(?:\ low)?)(?:,|\ and|,\ and|\ while|,\ while)?
+    \ (?:with\ )?
+    (?:(?:cover|shield|protect)(?:s|ing)?\ (?:his|her|their)\ head
+    (?:\ with\ (?:(?:both|his|her|their)\ )*(?:arms|hands))?
+    |(?:(?:both|the|his|her|their)\ )*(?:arms|hands)\ (?:(?:held|raised|up)\ )?
+    (?:over|above|around|on|covering)\ (?:(?:the|his|her|their)\ )?head)
+    (?=$|[,.;!]|\ (?:and|then|while|as)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The head that who crouches covers, of which models read a guard or a raised arm."""
 _SHIFTS = re.compile(
     r"""\b(?P<shifts>shift(?:s|ing|ed)?(?:[ ](?:his|her|their|its|the))?[ ](?:body[ ]?)?weight)(?:[ ](?:a[ ])?\w+)??
     [ ](?:from[ ](?:(?:one|the|his|her|their)[ ])?(?:(?:left|right)[ ])?(?:leg|foot|side|hip)
@@ -181,6 +219,13 @@ _ROLLS_OVER = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A body that lies and turns over, of which models read a dive roll; "turns to the side" is said of others."""
+_ROLLS_FROM_THERE = re.compile(
+    r"""(?P<lies>\b(?:l(?:ies|ie|ying|ay)|asleep|sleeps?|sleeping|prone|supine|in\ bed)\b[^.;]*?)
+    \b(?P<rolls>roll(?:s|ing)?)(?P<how>\ \w+ly)?\ over(?=$|[,.;!]|\ (?:and|then|slowly|once|again)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that lies and turns over, where the words do not say onto what: "lies on his back and rolls over"."""
+_ON_FRONT = re.compile(r"\b(?:stomach|belly|front|face[ -]?down|prone)\b", re.IGNORECASE)
 _LYING = re.compile(r"\b(?:l(?:ies|ie|ying|ay)|asleep|sleep\w*|bed|prone|supine|floor|ground|over)\b", re.IGNORECASE)
 _OVER_KNEES = re.compile(
     r"""\b(?:falls?|drops?|sinks?|collapses?|goes|crumples?|slumps?)(?:[ ]\w+ly)?(?:[ ]down)?[ ](?:to|on|onto)
@@ -280,6 +325,8 @@ def without_misleading(prompt: str) -> str:
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, prompt)
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
+    prompt = _COVERS_HEAD.sub(r"\g<low>", prompt)
+    prompt = _COWERS.sub(_crouches, _SPINS_AROUND.sub(r"\g<spins> ", _TO_BOTH_SIDES.sub(r"\g<work>", prompt)))
     prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
     prompt = _HAND_OVER_HAND.sub("climbing ", _UP_ROPE.sub(_climbs, prompt))
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
@@ -288,6 +335,7 @@ def without_misleading(prompt: str) -> str:
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
+    text = _ROLLS_FROM_THERE.sub(_rolls_onto, text)
     text = _OVER_KNEES.sub(_falls_over_knees, _ROLLS_OVER.sub(_lies, text))
     text = _SHIFTS.sub(r"\g<shifts>", _HURDLE.sub(_jumps_over, _KNEE.sub(_knee_strike, text)))
     return _HIT_LEG.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
@@ -304,6 +352,12 @@ def _as_person(found: re.Match[str]) -> str:
     if named & named_actions(found["doer"]) or (named == {STANDING} and _PREPARED.search(does)):
         return found[0]
     return f"{_AN.sub('a ', found['who'] or 'a ')}person{does}"
+
+
+def _crouches(found: re.Match[str]) -> str:
+    """Return a crouch with covered head in the form of the verb that is found."""
+    end = {"s": "es", None: ""}.get(found["end"], found["end"] or "")
+    return f"crouch{end} down{found['where'] or ''}"
 
 
 def _against(found: re.Match[str]) -> str:
@@ -385,6 +439,12 @@ def _lies(found: re.Match[str]) -> str:
         return found[0]
     lies = "lying" if found["ing"] else "lies" if found["s"] else "lie"
     return f"{lies} on {found['where']}" if found["where"] else f"{lies} "
+
+
+def _rolls_onto(found: re.Match[str]) -> str:
+    """Return a body that turns over onto the other side than the one on which it lies."""
+    onto = "back" if _ON_FRONT.search(found["lies"]) else "stomach"
+    return f"{found['lies']}{found['rolls']}{found['how'] or ''} over onto the {onto}"
 
 
 def _falls_over_knees(found: re.Match[str]) -> str:

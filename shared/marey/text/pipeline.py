@@ -18,6 +18,7 @@ from marey.items.prompts import check_prompt
 from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
 from marey.text.clause_normalization import join_in_order
+from marey.text.elided_words import with_elided
 from marey.text.encoded_texts import EncodedTexts
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
@@ -237,7 +238,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_misleading(as_words(text)) for text in texts]
+        texts = [without_misleading(with_elided(as_words(text))) for text in texts]
         encoded = self._texts_to_read
         if encoded is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]

@@ -17,6 +17,7 @@ from marey.text.action_reader import (
     named_actions,
 )
 from marey.text.clause_parts import parts_in_time
+from marey.text.elided_words import parts_by_sides
 from marey.text.encoders import Encoding
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
 from marey.text.plain_action import with_plain_action
@@ -120,6 +121,8 @@ class TrainedReaders:
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
         if only_gaze(bare.prompt):
             return ReadPrompt.of(bare.prompt, STANDING, surely=True)
+        if self._movements and (movements := self._by_sides(bare.prompt)):
+            return ReadPrompt(bare.prompt, movements)
         if self._movements and (movements := self._after_gaze(bare.prompt)):
             return ReadPrompt(bare.prompt, movements)
         read = self._read_bare(bare)
@@ -129,6 +132,12 @@ class TrainedReaders:
             return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, movements)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
         return ReadPrompt.of(bare.prompt, read.likely(UNSPLIT) if self._movements else read.action, surely=surely)
+
+    def _by_sides(self, prompt: str) -> tuple[ReadMovement, ...]:
+        """Return the movements of a prompt that asks for one action on one side and then on the other; else none."""
+        parts = [(part, self._read_action(part).likely(UNSPLIT)) for part in parts_by_sides(prompt)]
+        alike = len({action for _, action in parts}) == 1 and None not in {action for _, action in parts}
+        return tuple(ReadMovement(part, action) for part, action in parts) if alike else ()
 
     def _after_gaze(self, prompt: str) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt that has the head turn first, and then asks for one action; else none."""

@@ -17,7 +17,9 @@ from typing import Any, Literal, cast
 from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
-Gait = Literal["limp", "stagger", "high-knees", "skip", "foot-tap", "stomp", "shuffle", "rope", "tiptoe", ""]
+Gait = Literal[
+    "limp", "stagger", "high-knees", "skip", "foot-tap", "weight-shift", "stomp", "shuffle", "rope", "tiptoe", ""
+]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 

@@ -27,7 +27,12 @@ _NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split()[:12], 1
     "half a dozen": 6,
     "dozen": 12,
 }
-_NUMBER = rf"(?<!\bor )(?<!\bto )\b(?P<number>\d{{1,3}}|{'|'.join(sorted(_NUMBERS, key=len, reverse=True))})"
+_COMPOUND = "(?:hand|arm|leg|foot|knee|fist|finger|edg|blad|head|side?|face|point)e?d|handers?"
+"""Behind a number: an adjective of how it is done ("a two-handed swing"), not of how often."""
+_NUMBER = (
+    rf"(?<!\bor )(?<!\bto )\b(?P<number>\d{{1,3}}|{'|'.join(sorted(_NUMBERS, key=len, reverse=True))})"
+    rf"(?![ -](?:{_COMPOUND})\b)"
+)
 _TIMES = re.compile(
     rf"{_NUMBER} ?(?:(?:more|whole|separate|consecutive) )?"
     r"(?:times|time|occasions?|reps?|repetitions?|x|×)\b(?! as\b| (?:the )?(?:speed|pace|tempo|normal)\b)"

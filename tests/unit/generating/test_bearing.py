@@ -258,7 +258,7 @@ def test_a_bearing_of_a_part_leaves_the_rest() -> None:
 
 @pytest.mark.parametrize("name", sorted(name for name, each in load_bearings().items() if not each.moves))
 def test_every_bearing_moves_a_walk_smoothly_and_keeps_its_bones(name: str) -> None:
-    bearing, joints = load_bearings()[name], standing(5.0) if name == "foot-tap" else walker(5.0)
+    bearing, joints = load_bearings()[name], standing(5.0) if name in ("foot-tap", "weight-shift") else walker(5.0)
     before, after = drawn(joints), drawn(joints, named(name))
     assert np.isfinite(after).all()
     if not bearing.gait:  # a trunk that is twisted in the first frame turns the axes of the whole motion
@@ -470,3 +470,20 @@ def test_who_leans_on_a_wall_has_the_feet_ahead_of_hips_and_head() -> None:
 
 def test_a_phone_stays_at_the_ear_of_who_nods() -> None:
     assert StatedBearing("phone-call").shown_in("nod") == "body"
+
+
+def test_a_sword_is_drawn_from_the_other_hip_and_brought_back_to_it() -> None:
+    for name, first in (("sword-drawn", True), ("sword-sheathed", False)):
+        joints = drawn(standing(4.0), named(name))
+        hand = joints[:, 21] - joints[:, PELVIS]
+        at_hip, out = hand[:, 0].argmax(), hand[:, 2].argmax()  # to the left of a body that faces +Z
+        assert hand[at_hip, 0] > 0.08
+        assert hand[at_hip, 1] < 0.25
+        assert hand[out, 1] > hand[at_hip, 1] + 0.15
+        assert (at_hip < out) == first
+
+
+def test_a_restless_body_goes_from_one_foot_to_the_other() -> None:
+    before, after = drawn(standing(6.0)), drawn(standing(6.0), named("weight-shift"))
+    assert np.ptp(after[:, PELVIS, 0]) > np.ptp(before[:, PELVIS, 0]) + 0.08
+    assert np.abs(after[:, TOES] - before[:, TOES]).max() < 0.02

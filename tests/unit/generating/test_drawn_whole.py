@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,8 +11,8 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import AskedMotion, changes_of, generate_as_asked
-from marey.generation.drawn_whole import drawn_whole
+from marey.generation.asked import AskedMotion, _Wish, changes_of, generate_as_asked
+from marey.generation.drawn_whole import _asked_for, drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.port import Limits, NoControl, Request
 from marey.generation.shots.windows import no_text
@@ -131,3 +132,50 @@ def test_a_body_that_stands_for_a_short_while_is_drawn_too(frames: int, seed: in
     made = drawn_whole(LAYOUT, "idle", FineWish(prompt="stops", fixed=True), seed, frames)
     assert made is not None
     assert len(made.features) == frames
+
+
+@pytest.mark.parametrize(
+    ("action", "said", "joint"),
+    [
+        ("raise-arm", "raises an arm", [20, 21]),
+        ("kneel", "kneels", [0]),
+        ("bow", "bows", [15]),
+        ("sit-down", "sits down", [0]),
+    ],
+)
+def test_what_is_drawn_is_done_at_the_pace_that_is_asked_for(action: str, said: str, joint: list[int]) -> None:
+    def fastest(prompt: str) -> float:
+        speeds = list[float]()
+        for seed in range(4):
+            (made,) = generate_as_asked(Network(), [replace(ask(prompt), seed=seed)])  # type: ignore[arg-type]
+            assert made is not None
+            assert changes_of(made)["drawn"] == action
+            joints = LAYOUT.decode(made.features)
+            speeds.append(float(np.linalg.norm(np.diff(joints[:, joint], axis=0), axis=-1).max()))
+        return float(np.mean(speeds))
+
+    slow, usual, quick = (fastest(f"{said}{how}") for how in (" slowly", "", " quickly"))
+    assert slow < 0.8 * usual
+    assert slow < 0.6 * quick
+
+
+def test_a_form_that_is_named_is_drawn_from_every_seed() -> None:
+    for seed in range(12):
+        wish = FineWish(side="left", prompt="roundhouse kick, left leg")
+        gestures = list(_asked_for("kick", wish, random.Random(f"{seed} kick"), None))
+        assert "kick-round" in gestures[0].kinds
+        assert gestures[0].side == "left"
+
+
+def test_who_stands_before_others_does_so_for_a_moment() -> None:
+    request = ask("stands still", beside=("", "walks"), frames=40, open=True)
+    (made,) = generate_as_asked(Network(), [request])  # type: ignore[arg-type]
+    assert made is not None
+    assert len(made.features) == 40
+
+
+@pytest.mark.parametrize(("prompt", "turns"), [("spins once", 1), ("twirls around twice", 2), ("spins", None)])
+def test_a_number_of_spins_is_as_many_whole_turns(prompt: str, turns: int | None) -> None:
+    turn = _Wish.of(ask(prompt)).turn
+    assert turn is not None
+    assert (turn.least == 360.0 * turns) if turns else turn.whole

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 
+import numpy as np
 import pytest
 
 from marey.drawing.forms import BRIEF_S, StatedForm, misfit
@@ -89,3 +90,35 @@ def test_a_guard_is_kept_between_blows(beside: str) -> None:
 def test_who_does_not_fight_needs_no_guard(beside: str) -> None:
     found = best("kick", StatedForm("a front kick", beside=beside))
     assert not all("kick-guard" in each.kinds for each in found)
+
+
+@pytest.mark.parametrize("text", ["combat idle, fists up", "stands in guard", "a boxer on guard"])
+@pytest.mark.parametrize("seed", range(3))
+def test_guards_are_at_the_height_of_the_chin_and_bounce(text: str, seed: int) -> None:
+    drawn = drawn_whole(HUMANML3D_263, "fight-stance", FineWish(prompt=text), seed, None)
+    assert drawn is not None
+    joints = HUMANML3D_263.decode(drawn.features)
+    middle = slice(len(joints) // 2, len(joints) // 2 + 20)
+    over = joints[middle, [[20], [21]], 1] - joints[middle, [16, 17], 1].mean(1)
+    assert over.mean() > -0.02
+    assert np.ptp(joints[middle, 0, 1]) > 0.008
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_deep_bow_is_deep_and_takes_its_time(seed: int) -> None:
+    drawn = drawn_whole(HUMANML3D_263, "bow", FineWish(prompt="bows deeply"), seed, None)
+    assert drawn is not None
+    joints = HUMANML3D_263.decode(drawn.features)
+    trunk = joints[:, 12] - joints[:, 0]
+    lean = np.degrees(np.arctan2(np.hypot(trunk[:, 0], trunk[:, 2]), trunk[:, 1]))
+    assert lean.max() > 56
+    assert (lean > 30).sum() > 30  # frames
+
+
+@pytest.mark.parametrize("text", ["cowers in fear", "crouches and covers his head"])
+def test_who_cowers_has_both_hands_over_the_head(text: str) -> None:
+    drawn = drawn_whole(HUMANML3D_263, "crouch", FineWish(prompt=text), 1, None)
+    assert drawn is not None
+    joints = HUMANML3D_263.decode(drawn.features)
+    low = joints[int(joints[:, 0, 1].argmin())]
+    assert np.linalg.norm(low[[20, 21]] - low[15], axis=-1).max() < 0.3

@@ -40,6 +40,7 @@ def test_every_bearing_that_moves_is_drawn() -> None:
         "does lunges",
         "a knee strike",
         "moonwalks",
+        "stumbles forward and catches himself",
         "dives to the left",
         "slides on the ground feet first",
     ],
@@ -130,3 +131,14 @@ def test_who_slides_runs_up_has_a_leg_ahead_and_gets_up_unless_that_comes_next()
     assert np.median(joints[low][:, ANKLES, 2].max(axis=1) - joints[low][:, PELVIS, 2]) > 0.6
     assert joints[-1, PELVIS, 1] > 0.85
     assert drawn("slides on the ground feet first", after="gets up and runs on")[-1, PELVIS, 1] < 0.25
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_who_stumbles_is_pitched_forward_steps_and_stands_upright_again(seed: int) -> None:
+    joints = drawn("a man stumbles forward and catches his balance", seed=seed)
+    trunk = joints[:, HEAD] - joints[:, PELVIS]
+    lean = np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1]))
+    assert lean.max() > 30
+    assert abs(lean[-1] - lean[0]) < 8
+    assert 0.6 < joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] < 1.8
+    assert joints[:, PELVIS, 1].min() > 0.7

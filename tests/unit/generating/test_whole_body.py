@@ -331,3 +331,10 @@ def test_a_leap_between_runs_is_drawn_where_a_network_stops() -> None:
     made = leaps.draw(stands, 20.0, wish, np.random.default_rng(1))
     assert made is not None
     assert made[-1, 0, 2] - made[0, 0, 2] > 2.0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_plain_jump_out_of_a_run_is_no_split(seed: int) -> None:
+    joints = drawn("leap", "running jump forward", seed=seed)
+    high = int(joints[:, PELVIS, 1].argmax())
+    assert np.linalg.norm(joints[high, 7] - joints[high, 8]) < 0.85

@@ -270,6 +270,9 @@ def test_shifted_weight_is_rest_and_a_thing_before_a_jump_is_jumped_over(prompt:
         ("turns to the side", "turns to the side"),
         ("walks on and turns onto his left side", "walks on and turns onto his left side"),
         ("rolls over his shoulder", "rolls over his shoulder"),
+        ("lies on his back and rolls over", "lies on his back and lies on the stomach"),
+        ("lying on her stomach, then rolling over", "lying on her stomach, then lying on the back"),
+        ("a soldier rolls over", "a soldier rolls over"),
         ("a barrel roll onto his back", "a barrel roll onto his back"),
     ],
 )
@@ -348,3 +351,47 @@ def test_a_dancer_leaps_from_one_foot_to_the_other(prompt: str, read: str) -> No
 )
 def test_who_goes_up_the_stairs_and_down_again_turns_between(prompt: str, read: str) -> None:
     assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("cowers, arms over the head", "crouches down"),
+        ("a man is cowering in the corner", "a man is crouching down in the corner"),
+        ("cowers in fear and then runs", "crouches down and then runs"),
+        ("crouches and covers his head with both arms", "crouches"),
+        ("crouches and covers the hole", "crouches and covers the hole"),
+    ],
+)
+def test_who_cowers_crouches(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("mops the floor from side to side", "mops the floor"),
+        ("scrubs the deck back and forth and sings", "scrubs the deck and sings"),
+        ("polishes the bar left and right", "polishes the bar"),
+        ("walks from side to side", "walks from side to side"),
+    ],
+)
+def test_strokes_of_work_are_no_steps(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("spins around twice and bows", "spins twice and bows"),
+        ("twirling round three times", "twirling three times"),
+        ("spins around and bows", "spins around and bows"),
+    ],
+)
+def test_a_number_of_spins_is_no_turn_to_face_back(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize("prompt", ["sneak walk left", "sneak left", "crouch walk to the left"])
+def test_a_crouched_way_to_a_side_is_named_as_one(prompt: str) -> None:
+    assert " sideways " in without_misleading(prompt)

@@ -367,3 +367,31 @@ def test_a_call_that_is_ended_apart_from_its_beginning_ends() -> None:
     assert call.ends
     assert call.side == "left"
     assert not stated_bearings("answers the phone and nods twice")[0].ends
+
+
+@pytest.mark.parametrize(
+    ("prompt", "name"),
+    [
+        ("stumbles forward and catches his balance", "stumble"),
+        ("a man stumbles", "stumble"),
+        ("trips over a stone but catches herself", "stumble"),
+        ("nearly trips", "stumble"),
+        ("stumbles home", "drunk"),
+        ("draws a sword", "sword-drawn"),
+        ("the knight unsheathes his blade", "sword-drawn"),
+        ("sheathes the katana", "sword-sheathed"),
+        ("puts the sword back in its scabbard", "sword-sheathed"),
+        ("a child throws a huge temper tantrum", "tantrum"),
+        ("bored idle", "bored"),
+        ("idle, shifting weight", "weight-shift"),
+    ],
+)
+def test_stumbles_swords_and_restless_bodies_are_read(prompt: str, name: str) -> None:
+    assert [each.name for each in stated_bearings(prompt)] == [name]
+
+
+@pytest.mark.parametrize(
+    "prompt", ["draws a bow", "draws a circle with a sword", "stumbles and falls", "throws a fitted ball"]
+)
+def test_other_drawing_falling_and_throwing_is_none_of_them(prompt: str) -> None:
+    assert not stated_bearings(prompt)

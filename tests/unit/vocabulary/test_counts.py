@@ -75,3 +75,17 @@ def test_nineteen_of_twenty_texts_are_read_as_their_author_meant_them() -> None:
 )
 def test_numbers_of_things_are_read(prompt: str, count: int | None) -> None:
     assert stated_things(prompt, {"steps", "stairs"}) == count
+
+
+@pytest.mark.parametrize(
+    ("prompt", "action"),
+    [
+        ("two-handed axe swing", "slash"),
+        ("a two handed sword slash", "slash"),
+        ("one-armed push-ups", "push-ups"),
+        ("a two-footed jump", "jump"),
+        ("double-edged sword slash", "slash"),
+    ],
+)
+def test_a_number_of_an_adjective_is_none_of_the_action(prompt: str, action: str) -> None:
+    assert stated_count(prompt, action) is None

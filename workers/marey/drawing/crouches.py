@@ -28,7 +28,7 @@ _FORMS = {
 }
 """Height of the hips, metres, lean of hips and spine, degrees, and where the hands may be."""
 
-_WORDS = {"crouch-haunches": "haunches", "crouch-cover": "cover", "crouch-duck": "duck"}
+_WORDS = {"crouch-haunches": "haunches", "crouch-cover": r"cover\b", "crouch-duck": "duck"}
 """Words of the vocabulary that are true of one form alone."""
 
 

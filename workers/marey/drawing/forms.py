@@ -15,6 +15,8 @@ LONG_S, BRIEF_S = 6.5, 3.0
 """Seconds from which on a movement is longer than one is who asks for no length, alone and beside others."""
 _BOTH = re.compile(r"\b(?:both (?:\w+ )?(?:arms?|hands?)|(?:his|her|their|the|with|two) (?:arms|hands))\b")
 _ONE = re.compile(r"\b(?:(?:one|a|an|single) (?:\w+ )?(?:arm|hand)|one[- ](?:armed|handed))\b")
+_TEMPOS: Mapping[str, tuple[str, ...]] = {"slow": ("-slow", "-calm"), "fast": ("-quick", "-fast", "-brisk")}
+"""Ends of kinds that are at a pace."""
 _LONG = re.compile(r"\b(?:long|while|minutes?|seconds?|keeps?|hold\w*|stay\w*|remain\w*|continu\w*|on and on)\b")
 _BLOWS = re.compile(
     r"\b(?:punch\w*|jabs?|hooks?|uppercuts?|kicks? (?!the )\w*|\w+ kicks?|block\w*|parr(?:y|ies)|dodg\w*|ducks?"
@@ -68,6 +70,7 @@ class StatedForm:
         brief: it is one of several movements, whose length is open: short, and done once where no number is stated.
         seconds: that it has; None = as many as it takes.
         beside: the movements before and after it, in lower case.
+        pace: `slow` or `fast`; empty = either.
     """
 
     text: str
@@ -76,6 +79,7 @@ class StatedForm:
     brief: bool = False
     seconds: float | None = None
     beside: str = ""
+    pace: str = ""
 
 
 def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
@@ -92,12 +96,18 @@ def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
     unasked += gesture.side in SIDES and bool(_BOTH.search(text))
     unasked += gesture.side == BOTH and bool(_ONE.search(text) or asked.side)
     unasked += gesture.times not in (1, asked.count) and (asked.count is not None or asked.brief)
+    unasked += any(is_at_pace(gesture, pace) for pace in _TEMPOS if asked.pace and pace != asked.pace)
     unusual = bool(forms.usual - kinds)
     unusual += bool(forms.fights - kinds) and bool(_BLOWS.search(asked.beside))
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
     room = BRIEF_S if asked.brief else asked.seconds
     excess = too_long if room is None else max(gesture.seconds - room, 0.0)
     return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + excess)
+
+
+def is_at_pace(gesture: Gesture, pace: str) -> bool:
+    """Return True if a movement is one of the kinds that are at a pace: `slow` or `fast`."""
+    return any(kind.endswith(_TEMPOS.get(pace, ())) for kind in gesture.kinds)
 
 
 @lru_cache(maxsize=64)  # the same for each of the movements that one prompt chooses from

@@ -18,7 +18,7 @@ Array = NDArray[np.floating]
 _NECK = (12,)
 _LONGEST = 9.3
 _GUARDS = {
-    "guard-boxing": (((0.03, 0.12), (-0.06, 0.06), (0.27, 0.36)), ((0.02, 0.1), (-0.05, 0.05), (0.16, 0.23))),
+    "guard-boxing": (((0.03, 0.12), (0.02, 0.1), (0.27, 0.34)), ((0.02, 0.1), (0.03, 0.1), (0.17, 0.23))),
     "guard-karate": (((0.02, 0.14), (-0.22, -0.06), (0.34, 0.43)), ((0.04, 0.14), (-0.32, -0.2), (0.16, 0.24))),
     "guard-open": (((0.1, 0.22), (-0.18, 0.0), (0.32, 0.42)), ((0.1, 0.22), (-0.2, -0.02), (0.28, 0.38))),
     "guard-low": (((0.06, 0.16), (-0.32, -0.2), (0.3, 0.4)), ((0.06, 0.16), (-0.34, -0.22), (0.22, 0.3))),
@@ -93,7 +93,7 @@ def fight_stance(rng: random.Random) -> Gesture:
     for one, limits in zip((lead, OTHER_SIDE[lead]), _GUARDS[form], strict=True):
         hands[one] = np.array([rng.uniform(*limit) for limit in limits])
     mood = rng.choice(["still", "bounce", "bounce", "weave"])
-    rate, high = rng.uniform(1.3, 2.4), rng.uniform(0.012, 0.03) if mood == "bounce" else 0.003
+    rate, high = rng.uniform(1.3, 2.4), rng.uniform(0.018, 0.034) if mood == "bounce" else 0.005
     sway, slow = rng.uniform(0.02, 0.05) if mood == "weave" else rng.uniform(0.003, 0.014), rng.uniform(0.3, 0.7)
     phases = [rng.uniform(0, 6.28) for _ in range(6)]
     busy = rng.uniform(0.006, 0.02)

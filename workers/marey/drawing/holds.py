@@ -22,16 +22,17 @@ from marey.drawing.floor import (
     slid,
 )
 from marey.drawing.kneels import kneeling
-from marey.drawing.postures import STAND, Posture
+from marey.drawing.postures import STAND, Posture, mirrored
 from marey.drawing.seats import seated_on_seat
 from marey.drawing.sequels import Sequel, Step
 
 SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
+RIGHT_KNEE = "right-knee"
 CROUCH, BACK, FRONT, PRONE, SLIDE, FOURS = "crouch", "back", "front", "prone", "slide", "fours"
 """Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
-on one; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on the seat behind the
-feet, after a slide; on hands and knees."""
-SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE, FOURS})
+on one, the left or the right; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on
+the seat behind the feet, after a slide; on hands and knees."""
+SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE, RIGHT_KNEE, FOURS})
 LYING = frozenset({BACK, FRONT, PRONE})
 BEGINS_S, STANDS_S = 0.3, 0.5
 """Seconds in which a body waits before it moves, in a posture and standing."""
@@ -135,6 +136,12 @@ def _on_fours(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step
     return low, ((0.7 * pace, half_kneeling()), (0.6 * pace, low)), ((0.9 * pace, half_kneeling()), (0.7 * pace, STAND))
 
 
+def _on_right_knee(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    low, down, up = _on_knees(rng, one=True)
+    ways = (tuple((seconds, mirrored(posture)) for seconds, posture in way) for way in (down, up))
+    return mirrored(low), next(ways), next(ways)
+
+
 def _crouched(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
     low, seconds = crouched(rng), rng.uniform(0.7, 1.0)
     return low, ((seconds, low),), ((1.1 * seconds, STAND),)
@@ -146,6 +153,7 @@ _HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], 
     UPRIGHT: lambda rng: _on_floor(rng, "floor-stretched"),
     KNEES: lambda rng: _on_knees(rng, one=False),
     KNEE: lambda rng: _on_knees(rng, one=True),
+    RIGHT_KNEE: _on_right_knee,
     CROUCH: _crouched,
     BACK: lying_back,
     FRONT: lying_front,

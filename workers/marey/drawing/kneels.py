@@ -33,7 +33,7 @@ def kneeling(rng: random.Random, *, one: bool) -> tuple[Posture, Posture, Postur
 
 
 def kneel(rng: random.Random) -> Gesture:
-    """The left knee goes down, or both do, the left one first."""
+    """The left knee goes down, or both do, the left one first; mirrored by chance."""
     one = rng.random() < 0.5
     heels = not one and rng.random() < 0.4
     hands = rng.choices(list(_PRAYS), (3, 2, 3, 3 if one else 0))[0]
@@ -75,4 +75,6 @@ def kneel(rng: random.Random) -> Gesture:
     down = "kneel-down" if begin == "stand" else "kneel-stay"
     kinds = ["kneel", "kneel-one" if one else "kneel-both", down]
     kinds += ["kneel-clasped" if hands == "kneel-clasped" else "", "kneel-up" if rises else ""]
-    return done.either(rng).gesture(rng, kinds)
+    side = rng.choice(SIDES)
+    told = done if side == LEFT else done.mirrored()
+    return told.gesture(rng, kinds, side if one else "")

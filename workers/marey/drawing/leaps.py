@@ -14,6 +14,8 @@ from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT
 
 _UP, _RUNS = 0.95, 0.9
 """Metres of the hips of a body that stands, and that runs."""
+_STRIDE, _JUMPS = 0.5, 0.34
+"""Metres from the hips to a foot ahead and behind in a flight: of a leap, and of a plain jump out of a run."""
 _STEPS = ((0.5, 0.44), (0.68, 0.34), (0.85, 0.3))
 """Metres and seconds of the steps of a run-up, the last ones of these."""
 _OUT = {side: HandPlace((0.46, 0.02, 0.06), "shoulder", (0.1, -0.8, -0.6)) for side in SIDES}
@@ -35,6 +37,7 @@ class _Leap:
         split: 0 to 1: the legs of a runner, or straight ones that are level.
         dances: with arms held as a dancer does.
         starts: before the first step.
+        stride: from the hips to each foot in the air, beside what the split adds.
     """
 
     steps: int
@@ -43,6 +46,7 @@ class _Leap:
     split: float
     dances: bool
     starts: float
+    stride: float = _STRIDE
 
     def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
         """The postures over the feet of an idle."""
@@ -107,7 +111,7 @@ class _Leap:
         """In the air, with the hips so far ahead and up, after a share of the flight."""
         apart = 1 - abs(2 * share - 1) ** 2
         ahead, up = at
-        reach = 0.5 + 0.26 * self.split * apart
+        reach = self.stride + 0.26 * self.split * apart
         front = FootPlace(
             (0.08, up - 0.62 + (0.1 + 0.26 * self.split) * apart, ahead + reach), (0, -0.5 - 0.3 * self.split, 0.8)
         )
@@ -152,13 +156,17 @@ def leap(rng: random.Random, form: str = "", side: str = "") -> Gesture:
 
     Args:
         rng: decides everything that is not given.
-        form: `far`, `split` for legs that are stretched apart, `dance` for those of a dancer; empty = any but that.
+        form: `far`, `jump` for a plain jump out of a run, `split` for legs that are stretched apart, `dance` for those
+            of a dancer; empty = a leap, far or not.
         side: of the foot that takes off.
     """
     form, side = form or rng.choice(("", "far")), side or rng.choice(SIDES)
     far = rng.uniform(1.9, 2.3) if form == "far" else rng.uniform(1.5, 2.0)
     split = rng.uniform(0.8, 1.0) if form in ("split", "dance") else rng.uniform(0.2, 0.5)
     seconds = min(max(far / 4.2, 0.4) + 0.04 * (split > 0.7), 0.54)
-    way = _Leap(rng.choice((2, 3)), far, seconds, split, form == "dance", rng.uniform(0.2, 0.5))
+    steps, starts = rng.choice((2, 3)), rng.uniform(0.2, 0.5)
+    way = _Leap(steps, far, seconds, split, form == "dance", starts)
+    if form == "jump":
+        way = replace(way, split=0.0, stride=_JUMPS)
     kinds = ["leap", "leap-split" if split > 0.7 else "", "leap-high" if flight_height(seconds) > 0.3 else ""]
     return on_feet(way.sequel, kinds, rng.uniform(0.4, 0.8), side=side, mirror=side == RIGHT)

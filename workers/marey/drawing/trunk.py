@@ -11,16 +11,20 @@ from marey.drawing.gesture import BOTH, SIDES, Gesture
 from marey.drawing.parts import GesturePace
 from marey.posing.standing import StandingBody, envelope, swings, tremble
 
-_SLIGHT, _DEEP = 36.0, 66.0
+_SLIGHT, _DEEP, _DEEPEST = 36.0, 66.0, 100.0
 """Degrees of a bow from the hips to the neck; the trunk as a whole tilts by three quarters of this."""
+_DEEPLY, _DEEP_HOLD_S = 1.4, 0.7
+"""How many times as long as another a deep bow takes to go down, and seconds for which it is held at least."""
 
 
 def bow(rng: random.Random, *, times: int | None = None) -> Gesture:
-    degrees = rng.choice([rng.uniform(24, _SLIGHT), rng.uniform(_SLIGHT, _DEEP), rng.uniform(_DEEP, 90)])
+    degrees = rng.choice([rng.uniform(24, _SLIGHT), rng.uniform(_SLIGHT, _DEEP), rng.uniform(80, _DEEPEST)])
     times = times or rng.choices((1, 2, 3), (8, 1, 1))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = {"quick": (0.35, 0.55), "": (0.6, 1.1), "slow": (1.0, 1.6)}[tempo]
     hold = {"quick": (0.05, 0.2), "": (0.15, 0.9), "slow": (1.0, 2.0)}[tempo]
+    if degrees > _DEEP and tempo != "quick":
+        rise, hold = (rise[0] * _DEEPLY, rise[1] * _DEEPLY), (max(hold[0], _DEEP_HOLD_S), hold[1] + _DEEP_HOLD_S)
     paces = [GesturePace.draw(rng, rise, hold)]
     for _ in range(times - 1):
         one = replace(paces[0], start=paces[-1].seconds + rng.uniform(0.0, 0.3))
@@ -33,7 +37,8 @@ def bow(rng: random.Random, *, times: int | None = None) -> Gesture:
         ways = [pace.way(body) for pace in paces]
         if hand:
             first, last = paces[0].start, paces[-1].seconds
-            held = envelope(len(body.joints), max(first - 0.5, 0.0), 0.5, last - first, 0.6)
+            rises = max(0.5, 0.8 * paces[0].rise)
+            held = envelope(len(body.joints), max(first - 0.5, 0.0), rises, last - first, 0.6)
             pelvis = body.from_shoulder(hand, body.joints[:, 0])
             target = pelvis + np.array([0.02, belly[0], belly[1]])
             body.move_arm(hand, held, *body.reach(hand, target), 0.0)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.drawing.kinds import COUNTED
+from marey.generation.drawn_sides import drawn_side
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
 from marey.generation.fine import FINE, drawn_features
@@ -51,7 +52,7 @@ from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
 from marey.vocabulary.scope import STANDING
-from marey.vocabulary.turns import Turn, stated_spins, stated_turn
+from marey.vocabulary.turns import WHOLE, Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
 
@@ -88,6 +89,9 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
 
 COUNTABLE = frozenset({*REPETITIONS, *AGAIN, *(COUNTED.keys() - FINE.keys())})
 """Actions that are done as often as a prompt asks: their number is found in a motion, or they are drawn so often."""
+SPINNING = "spin"
+ENDS_TURNED = frozenset({ON_THE_SPOT, SPINNING})
+"""Actions that end where the body has turned as far as is asked for."""
 ALIKE = frozenset({"idle", "nod", "flinch"})
 """Actions that networks make nearly alike from every seed: every other motion is the mirror image."""
 
@@ -105,6 +109,8 @@ class _Wish:
         pace: at which it is done.
         gaze: where the head turns.
         joined: a transition replaces the first frames.
+        drawn_side: of the movement that is drawn, where it is not simply the limb that acts (`drawn_sides`); empty =
+            either, or that of the limb.
     """
 
     steps: tuple[Step, ...] | None = None
@@ -115,6 +121,7 @@ class _Wish:
     pace: AskedPace = field(default_factory=AskedPace)
     gaze: tuple[Glance, ...] = ()
     joined: bool = False
+    drawn_side: str = ""
 
     @classmethod
     def of(cls, request: Request) -> _Wish:
@@ -130,10 +137,14 @@ class _Wish:
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
         count = stated_count(prompt, action) if action in COUNTABLE else None
-        if action == "spin":
+        if action == SPINNING:
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
-        return cls(steps, action, limb_of(prompt, action), count, turn, pace, gaze, bool(request.beside[0]))
+        if action == SPINNING and count is not None:
+            turn = Turn(count * WHOLE, count * WHOLE)
+        own = drawn_side(prompt, action)
+        limb = limb_of(prompt, action) if own is None else None
+        return cls(steps, action, limb, count, turn, pace, gaze, bool(request.beside[0]), own or "")
 
     @property
     def side(self) -> str:
@@ -143,7 +154,7 @@ class _Wish:
     def fine(self, request: Request) -> FineWish:
         """Return what is asked for of a movement that is drawn."""
         fixed = request.frames is not None and not request.open
-        return FineWish(self.count, self.side, request.text.said, fixed, request.beside)
+        return FineWish(self.count, self.drawn_side or self.side, request.text.said, fixed, request.beside)
 
     def for_network(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
@@ -221,8 +232,10 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     fine = wish.fine(request)
     held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
     drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
-    if drawn is None or held or not request.beside[0]:
+    if drawn is None or held or not any(request.beside):
         return drawn
+    if not request.beside[0]:  # who stands before others does so for a moment
+        return replace(drawn, features=drawn.features[: request.frames]) if wish.action == STANDING else drawn
     features = np.concatenate([_at_rest(drawn.features[:1].repeat(CUT, axis=0), generator.layout), drawn.features])
     return replace(drawn, features=features[: request.frames] if wish.action == STANDING else features)
 
@@ -283,7 +296,7 @@ def _as_asked(
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
     if whole is None or not whole.exact or wish.action not in AT_PACE:
-        features = _retimed(features, layout, wish, fixed, changes)
+        features = _retimed(features, layout, wish, fixed, changes, whole)
     changed = changes or made is None or len(features) != len(made.features)
     return AskedMotion(features, changes) if changed else made
 
@@ -307,6 +320,8 @@ def _in_posture(
 def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: int, *, drawn: bool) -> bool:
     """Return True if the mirror image of a motion is what the prompt asks for, or does as well and differs from that of
     the seed before."""
+    if drawn and wish.drawn_side:
+        return False
     if wish.limb or wish.side:
         return _is_better_mirrored(features, layout, wish)
     return not drawn and wish.action in ALIKE and seed % 2 == 1
@@ -343,7 +358,7 @@ def _turned(
         return features
     lost = cut_of(len(features)) if wish.joined else 0
     replaced, features = features[:lost], features[lost:]
-    first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action == ON_THE_SPOT else None
+    first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action in ENDS_TURNED else None
     enough = features if first is None else first
     bent = turned_features(enough, layout, wish.turn, wish.side)
     if first is not None or bent is not None:
@@ -384,10 +399,18 @@ def _ended(
 
 
 def _retimed(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+    features: Float32,
+    layout: FeatureLayout,
+    wish: _Wish,
+    fixed: int | None,
+    changes: dict[str, Any],
+    whole: DrawnWhole | None,
 ) -> Float32:
     """Return the motion at the pace that is asked for, in as many frames as are `fixed`; `changes` says so."""
-    speed = wish.pace.of_motion(features, layout)
+    if whole is None or wish.pace.of_way:
+        speed = wish.pace.of_motion(features, layout)
+    else:
+        speed = wish.pace.of_drawn(len(features) / layout.fps, at_pace=whole.at_pace)
     frames = max(round(len(features) / speed), 2)
     if fixed is not None and (not wish.pace.of_way or frames < fixed):
         frames = fixed

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.forms import StatedForm, misfit
+from marey.drawing.forms import NAMED, StatedForm, is_at_pace, misfit
 from marey.drawing.gesture import Gesture
 from marey.drawing.kinds import COUNTED, DRAWINGS
 from marey.generation.ball_games import dribbles_on_spot
@@ -33,6 +33,7 @@ from marey.posing.still import standing_still
 from marey.quality.record import SHOWN
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import RULES
+from marey.vocabulary.paces import stated_pace
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -50,6 +51,8 @@ ROUNDS_S: Mapping[str, tuple[float, float]] = {"dodge": (2.1, 1.2), "nod": (0.75
 """Seconds of each of a stated number, and beside them."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
+MOST_TRIES = 160
+"""The same where none of them is of the kind that the prompt names."""
 DRAWN = 6
 """Movements that are drawn and graded at most."""
 MOST = 20
@@ -66,10 +69,12 @@ class DrawnWhole:
     Attributes:
         features: (T, D), in the layout's own units.
         exact: its number, pace and end are as asked for already.
+        at_pace: it is of a kind that is at the pace that is asked for.
     """
 
     features: Float32 = field(repr=False)
     exact: bool = False
+    at_pace: bool = False
 
 
 def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, frames: int | None) -> DrawnWhole | None:
@@ -93,12 +98,16 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
         return None if joints is None else DrawnWhole(encode_all(layout, joints))
     if action not in DRAWINGS or (frames is not None and frames < SHORTEST):
         return None
-    joints = _shown(action, wish, random.Random(f"{seed} {action}"), frames)  # noqa: S311
-    if joints is not None and action in FINE and wish.count is not None:
+    shown = _shown(action, wish, random.Random(f"{seed} {action}"), frames)  # noqa: S311
+    if shown is None:
+        return None
+    gesture, joints = shown
+    if action in FINE and wish.count is not None:
         joints = FINE[action].draw(joints, FPS, wish, rng)
     if joints is not None and wish.fixed and frames is not None and len(joints) > frames:
         joints = retimed(joints, frames)
-    return None if joints is None else DrawnWhole(encode_all(layout, joints))
+    at_pace = is_at_pace(gesture, stated_pace(wish.prompt))
+    return None if joints is None else DrawnWhole(encode_all(layout, joints), at_pace=at_pace)
 
 
 def _frames(action: str, wish: FineWish, rng: np.random.Generator) -> int:
@@ -121,15 +130,15 @@ ALONE: Mapping[str, Callable[[FineWish], bool]] = {
 """Actions of `FINE`, by what prompts are drawn without what a network made."""
 
 
-def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> Array | None:
-    """Return joints (T, 22, 3) of the first movement that shows its action; None if none does."""
+def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> tuple[Gesture, Array] | None:
+    """Return the first movement that shows its action, and its joints (T, 22, 3); None if none does."""
     for number, gesture in enumerate(_asked_for(action, wish, rng, frames)):
         if number == DRAWN:
             break
         joints = _drawn(gesture, wish.fixed, frames, rng)
         side = wish.side if gesture.side in (LEFT, RIGHT) else ""
         if RULES[action](Motion(joints, FPS), side) >= SHOWN:
-            return joints
+            return gesture, joints
     return None
 
 
@@ -138,13 +147,16 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     says first."""
     text = wish.prompt.lower()
     brief, seconds = any(wish.beside) and not wish.fixed, frames / FPS if wish.fixed and frames is not None else None
-    asked = StatedForm(text, wish.count, wish.side, brief, seconds, " ".join(wish.beside).lower())
-    drawn = [_draw(action, rng, wish.count) for _ in range(TRIES)]
-    yield from (
-        gesture
-        for gesture in sorted(drawn, key=lambda each: misfit(each, action, asked))
-        if _may_be(gesture, text, wish.side, frames if wish.fixed else None)
-    )
+    beside = " ".join(wish.beside).lower()
+    asked = StatedForm(text, wish.count, wish.side, brief, seconds, beside, stated_pace(text))
+    found: list[tuple[float, Gesture]] = []
+    for number in range(MOST_TRIES):
+        if number >= TRIES and any(far < NAMED for far, _ in found):
+            break
+        gesture = _draw(action, rng, wish.count)
+        if _may_be(gesture, text, wish.side, frames if wish.fixed else None):
+            found.append((misfit(gesture, action, asked), gesture))
+    yield from (gesture for _, gesture in sorted(found, key=lambda each: each[0]))
 
 
 def _draw(action: str, rng: random.Random, count: int | None) -> Gesture:

@@ -1,5 +1,6 @@
 """Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps, steps on the toes and
-feet that are dragged; and, drawn on a body that stands, a foot that taps and hops over a rope.
+feet that are dragged; and, drawn on a body that stands, a foot that taps, weight that goes from one foot to the other,
+and hops over a rope.
 
 A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
 slower. Frames are played at other times, so standing feet stay. Knees are lifted while their feet pass the other ones;
@@ -72,6 +73,10 @@ HOPS, HOP_FROM = 0.12, 0.6
 """Metres by which who skips leaves the floor, and the share of the lift of the other knee from which on."""
 STILL = 0.15
 """Metres a second of the hips, under which a body stands."""
+SHIFTS, SHIFTS_HZ, SHIFTS_RESTS = 0.075, (0.17, 0.24), 1.8
+"""Metres by which the hips of a restless body go over each foot, how often a second, and how long it rests there."""
+SHIFTS_SINK, SHIFTS_LEAN = 0.012, 3.0
+"""Metres by which they sink on the way, and degrees by which the trunk leans back to the middle."""
 TAPS, TAPS_HZ, TAPS_S = 0.05, 2.6, (1.6, 1.0)
 """Metres by which the toes of a tapping foot rise, how often a second, and seconds of tapping and of rest."""
 
@@ -264,12 +269,27 @@ def tapping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
     return StandingBody(moved).solved()
 
 
+def shifting(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a body that stands, whose weight goes from one foot to the other and back in the
+    frames `begin` to `end`; see `limping`."""
+    del side  # over both
+    time, body = np.arange(len(joints)) / layout.fps, StandingBody(joints)
+    stands = smooth((_speed(joints, layout.fps) < STILL).astype(float), 0.2, layout.fps)
+    way = _inside(len(joints), begin, end, layout.fps) * np.clip(stands, 0.0, 1.0)
+    swing = np.sin(2 * np.pi * rng.uniform(*SHIFTS_HZ) * time + rng.uniform(0, 2 * np.pi))
+    over = way * np.tanh(SHIFTS_RESTS * swing) / np.tanh(SHIFTS_RESTS)
+    body.shift(-SHIFTS_SINK * way * (1.0 - np.abs(over)), 0.0 * over, SHIFTS * over)
+    body.lean(SHIFTS_LEAN * over, "forward")
+    return body.solved()
+
+
 GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Generator], Array]] = {
     "limp": limping,
     "stagger": staggering,
     "high-knees": with_high_knees,
     "skip": skipping,
     "foot-tap": tapping,
+    "weight-shift": shifting,
     "stomp": stomping,
     "shuffle": shuffling,
     "rope": over_rope,

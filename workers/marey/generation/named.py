@@ -1,5 +1,5 @@
 """Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, lunges,
-knee strikes, moonwalks, dives to a side, slides.
+knee strikes, moonwalks, stumbles, dives to a side, slides.
 
 Readers and networks know nothing of them. Their words are those of bearings that move (`moves` in `bearings.toml`), so
 that they are read as what is done by a body that stands, and the movement is drawn in its place.
@@ -17,6 +17,7 @@ from marey.drawing.gesture import Gesture
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
+from marey.drawing.stumbles import stumble
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import StatedBearing
@@ -83,6 +84,11 @@ def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds
     return moonwalk(rng, seconds=seconds)
 
 
+def _stumble(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated, wish, seconds
+    return stumble(rng)
+
+
 def _side_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del wish, seconds
     return side_dive(rng, stated.side)
@@ -98,6 +104,7 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "lunges": _lunges,
     "knee-strike": _knee_strike,
     "moonwalk": _moonwalk,
+    "stumble": _stumble,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,
 }

@@ -22,6 +22,13 @@ Float32 = NDArray[np.float32]
 
 SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.4}
 """How many times as fast a motion is played, by the pace that its prompt names."""
+DRAWN_SPEEDS: Mapping[str, float] = {"slow": 0.52, "fast": 1.5}
+"""The same of movements that are drawn at no pace of their own: they are drawn as they are usually done, so that a
+slow one has to differ from the slowest of these."""
+PACED_SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.3}
+"""The same of movements of kinds that are at the pace already."""
+LONGEST_S = 8.0
+"""Seconds beyond which no drawn movement is slowed down by more than others."""
 FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
 """Actions whose pace gravity decides."""
 
@@ -86,6 +93,18 @@ class AskedPace:
     def most(self) -> float:
         """How many times as fast it is played at most."""
         return WAY_SPEEDS[self.action].played[1] if self.of_way and self.pace == "fast" else self.share
+
+    def of_drawn(self, seconds: float, *, at_pace: bool) -> float:
+        """Return how many times as fast a drawn movement is played.
+
+        Args:
+            seconds: of the movement as it is drawn.
+            at_pace: it is of a kind that is at the pace already.
+        """
+        if self.of_way:
+            return 1.0
+        speed = (PACED_SPEEDS if at_pace else DRAWN_SPEEDS).get(self.pace, 1.0)
+        return max(speed, min(self.share, seconds / LONGEST_S)) if speed < 1.0 else speed
 
     def of_motion(self, features: Float32, layout: FeatureLayout) -> float:
         """Return how many times as fast a motion (T, D) in the layout's own units is played."""

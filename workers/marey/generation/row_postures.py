@@ -12,9 +12,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, LYING, PRONE, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import (
+    BACK,
+    CROUCH,
+    FLOOR,
+    FOURS,
+    FRONT,
+    KNEE,
+    KNEES,
+    LYING,
+    PRONE,
+    RIGHT_KNEE,
+    SEAT,
+    SLIDE,
+    UPRIGHT,
+)
+from marey.generation.drawn_sides import drawn_side
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
+from marey.posing.standing import RIGHT
 from marey.vocabulary.scope import STANDING
 
 Row = tuple[str, str]
@@ -128,7 +144,8 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
     if not begin and _SLIDES.search(said) and action in ("", "get-up", "idle", "run"):
         return SLIDE
     if action == "kneel":
-        return KNEE if _ONE_KNEE.search(said) else KNEES
+        side = drawn_side(said, action)
+        return RIGHT_KNEE if side == RIGHT else KNEE if side or _ONE_KNEE.search(said) else KNEES
     if action == "die":
         return FRONT if falls_on_front(said, "" if before is None else before[1]) else BACK
     if action in AIMS and (begin in (FRONT, PRONE) or _crawls_low(before)):

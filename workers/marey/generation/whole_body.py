@@ -53,6 +53,8 @@ _DANCES = re.compile(
 )
 _SPLIT = re.compile(r"\b(?:split\w*|legs? (?:\w+ ){0,3}(?:apart|wide|open|stretched|extended|straight))\b")
 _FAR = re.compile(r"\b(?:far|long|big|huge|great|wide|large|gap|chasm|river|stream|ditch|rooftops?)\b")
+_JUMPS, _LEAPS = re.compile(r"\bjump\w*\b"), re.compile(r"\b(?:leap\w*|bound\w*)\b")
+"""Words of a jump out of a run, and of a leap, in which the legs are far apart."""
 _RUNS_FIRST = re.compile(r"\b(?:runs?|sprints?|jogs?|races?)\b[^.;]*\b(?:and|then|before)\b")
 """Words of a run that is as much of a motion as the leap behind it."""
 _KNEES = re.compile(r"\bknees?\b")
@@ -146,6 +148,8 @@ def _leap(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = wish.prompt.lower()
     form = "dance" if _DANCES.search(text) else "split" if _SPLIT.search(text) else "far" if _FAR.search(text) else ""
+    if form in ("", "far") and _JUMPS.search(text) and not _LEAPS.search(text):
+        form = "jump"
     return leap(rng, form, wish.side)
 
 

@@ -16,7 +16,7 @@ MORE = 1.1
 """How many times as much as the other a limb does that is the one that acts."""
 LIFTED = frozenset({"kick", "kick-ball"})
 """Actions of the foot that is lifted; in others, such as a balance, a prompt may name the one that stands."""
-_ARM = re.compile(r"\b(?:left|right|l|r)(?:[ -]handed|[ -](?:hand|arm|fist|palm|elbow))\b")
+_ARM = re.compile(r"\b(?:left|right|l|r)(?:[ -]handed|[ -](?:hand|arm|forearm|fist|palm|elbow|wrist))\b")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,128 @@
+"""Words that prompts leave out, written back before they are read (ours): the verb of what is done on one side and then
+on the other ("points left, then right"), and the ends of takes that a name says ("walk start", "idle to run")."""
+
+from __future__ import annotations
+
+import re
+
+from marey.vocabulary.inflection import third_person
+from marey.vocabulary.lengths import TO_TWENTY
+
+_NUMBER = rf"(?:{'|'.join(TO_TWENTY.split()[:12])}|\d{{1,2}})"
+_TIMES = rf"(?:once|twice|thrice|{_NUMBER}[ ](?:more[ ])?times)"
+_LIMB = r"(?:hand|arm|foot|leg|knee|fist|elbow|palm|side|shoulder|forearm|heel)"
+_ON = r"(?:on|with|to|using|from|over)"
+_OWN = r"(?:(?:the|his|her|their|its)[ ])?"
+_OTHER_SIDE = re.compile(
+    rf"""(?:^|(?<=[,;.]\ )|(?<=\band\ )|(?<=\bthen\ ))
+    (?P<who>(?:(?:a|an|the|this|that|one|my)\ (?:[\w-]+\ ){{1,3}}?(?=(?:is\ )?\w+(?:s|ing)\ )
+    |he\ |she\ |they\ )?(?:is\ )?)
+    (?P<number>{_NUMBER}\ (?:more\ )?)?(?P<verb>(?!(?:left|right|a|an|the|his|her|and|then)\b)[a-z]+)
+    (?P<how>(?:\ (?!(?:and|then|left|right|{_TIMES}
+    |{_ON}\ (?:(?:the|his|her|their)\ )?(?:left|right))\b)[\w'-]+){{0,5}})
+    (?P<times>\ {_TIMES})?(?P<on>\ {_ON})?\ (?P<own>{_OWN})
+    (?P<side>left|right)(?P<limb>\ {_LIMB})?(?P<after>\ {_TIMES})?
+    (?P<join>,?\ (?:and\ )?then\ |,\ |,?\ and\ )
+    (?P<again>(?:{_TIMES}|{_NUMBER})\ )?
+    (?:(?P<verb2>[a-z]+)\ )??(?:{_ON}\ )?{_OWN}
+    (?P<other>left|right)(?P<limb2>\ (?:{_LIMB}|one))?
+    (?P<last>\ {_TIMES})?(?=\W*$|;|\.)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_READ_AS_ONE = re.compile(
+    r"^(?:look|glanc|gaz|peer|peek|star|check|scan|watch|punch|jab|hook|cross|uppercut|strik|box|sway|shift|rock|dodg|duck|weav|turn"
+    r"|shak|nod|wobbl|block|pac|sling|wag)",
+    re.IGNORECASE,
+)
+"""Verbs whose sides are read together, one after the other."""
+_WAYS = {
+    **dict.fromkeys(("walk", "run", "jog", "sprint", "sneak", "crawl", "march", "dance", "limp", "swim"), ""),
+    "walking": "walk",
+    "running": "run",
+    "jogging": "jog",
+    "sprinting": "sprint",
+    "locomotion": "walk",
+}
+_WAY = (
+    rf"(?P<way>{'|'.join(sorted(_WAYS, key=len, reverse=True))})"
+    r"(?P<how>\ (?:forwards?|backwards?|left|right|slow|fast))?"
+)
+_NEXT_WAY = _WAY.replace("<way>", "<next>").replace("<how>", "<next_how>")
+_STARTS = re.compile(
+    rf"^\W*(?:(?:start|begin)\ (?P<first>{'|'.join(_WAYS)})|{_WAY}\ (?:start|begin|starting)"
+    rf"|(?:idle|stand|standing|stop|rest)\ (?:to|into|2)\ {_NEXT_WAY})"
+    r"(?P<ends>\ (?:to|and|then)\ (?:stop|idle|end|stand|halt))?\W*$",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Names of takes in which a body that stands begins to go: "walk start", "idle to run", "run start to stop"."""
+_STOPS = re.compile(
+    rf"^\W*{_WAY}\ (?:(?:to|into|2)\ (?:an?\ )?)?(?:stop|idle|end|stand|halt|rest)\W*$", re.IGNORECASE | re.VERBOSE
+)
+"""The same of one that comes to rest: "walk stop", "run to idle"."""
+_THEN = ", then "
+_SIDES = frozenset(("left", "right"))
+_WORD = re.compile(r"[a-z]+")
+
+
+def parts_by_sides(prompt: str) -> tuple[str, ...]:
+    """Return the parts of a prompt that has one movement done on one side and then on the other, such as "points left,
+    then points right"; none of any other."""
+    parts = tuple(prompt.split(_THEN))
+    if len(parts) != 2 or re.search(r"[;,]|\band\b", parts[1]):
+        return ()
+    first, second = (_WORD.findall(part.lower()) for part in parts)
+    verb = next((word for word in second if not re.fullmatch(_NUMBER, word)), "")
+    sides = [_SIDES.intersection(words) for words in (first, second)]
+    in_turn = len(sides[0]) == 1 == len(sides[1]) and sides[0] != sides[1]
+    if not in_turn or verb not in first or "and" in first or _READ_AS_ONE.match(verb):
+        return ()
+    return parts
+
+
+def with_elided(prompt: str) -> str:
+    """Return a prompt with the words that it leaves out: "points left, then points right" of "points left, then right",
+    "stands still, then walks" of "walk start". Any other prompt is returned as it is."""
+    return _OTHER_SIDE.sub(_said_again, _STOPS.sub(_stopping, _STARTS.sub(_starting, prompt)))
+
+
+def _said_again(found: re.Match[str]) -> str:
+    """Return what is done on one side, and again with its verb on the other."""
+    counted = bool(found["again"] or found["last"])
+    one_of_both = "then" not in found["join"] and not counted
+    other_verb = found["verb2"] is not None and found["verb2"].lower() != found["verb"].lower()
+    as_one = _READ_AS_ONE.match(found["verb"]) is not None and not counted
+    if found["side"].lower() == found["other"].lower() or one_of_both or other_verb or as_one:
+        return found[0]
+    again = (found["again"] or "").strip()
+    is_number = bool(again) and "times" not in again and again not in ("once", "twice", "thrice")
+    if found["number"]:
+        act = f"{again or found['number'].strip()} {found['verb']}{found['how']}"
+        times = ""
+    else:
+        act = f"{found['verb']}{found['how']}"
+        times = (
+            f"{again} times"
+            if is_number
+            else again or (found["last"] or found["times"] or found["after"] or "").strip()
+        )
+    limb = (found["limb2"] if found["limb2"] not in (None, " one") else found["limb"]) or ""
+    on = f"{found['on'] or ''} {found['own'] or ''}{found['other']}{limb}"
+    first = found[0][: found.start("join") - found.start()]
+    return f"{first}, then {act}{f' {times}' if times else ''}{on}"
+
+
+def _third(way: str, how: str | None) -> str:
+    """Return a way in the third person: "walks forward"."""
+    return third_person(_WAYS[way.lower()] or way.lower()) + (how or "")
+
+
+def _starting(found: re.Match[str]) -> str:
+    """Return a body that stands, and then goes."""
+    way = found["first"] or found["way"] or found["next"]
+    goes = _third(way, found["how"] or found["next_how"])
+    return f"stands still, then {goes}{', then stops' if found['ends'] else ''}"
+
+
+def _stopping(found: re.Match[str]) -> str:
+    """Return a way, and a body that stops."""
+    return f"{_third(found['way'], found['how'])} and stops"

@@ -1,0 +1,71 @@
+"""Words that prompts leave out, written back."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.text.elided_words import parts_by_sides, with_elided
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("points left, then right", "points left, then points right"),
+        (
+            "he waves with the left hand and then with the right",
+            "he waves with the left hand, then waves with the right hand",
+        ),
+        (
+            "a tired archer points to the left, then to the right",
+            "a tired archer points to the left, then points to the right",
+        ),
+        (
+            "three hops on the right foot, two on the left",
+            "three hops on the right foot, then two hops on the left foot",
+        ),
+        (
+            "hops twice on his left leg, then once on the right",
+            "hops twice on his left leg, then hops once on his right leg",
+        ),
+        ("lifts the left leg, then the right arm", "lifts the left leg, then lifts the right arm"),
+        ("waves left and right", "waves left and right"),
+        ("looks left, then right", "looks left, then right"),
+        ("jabs left, then right", "jabs left, then right"),
+        ("raises the left hand, then waves right", "raises the left hand, then waves right"),
+    ],
+)
+def test_what_is_done_on_the_other_side_has_its_verb(prompt: str, read: str) -> None:
+    assert with_elided(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("walk start", "stands still, then walks"),
+        ("start jogging", "stands still, then jogs"),
+        ("idle to run", "stands still, then runs"),
+        ("run start to stop", "stands still, then runs, then stops"),
+        ("sprint to idle", "sprints and stops"),
+        ("a person starts walking", "a person starts walking"),
+        ("walk to the stop", "walk to the stop"),
+    ],
+)
+def test_names_of_takes_have_a_body_stand_before_or_after_a_way(prompt: str, read: str) -> None:
+    assert with_elided(prompt) == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "parts"),
+    [
+        (
+            "kicks with the left leg, then kicks with the right leg",
+            ("kicks with the left leg", "kicks with the right leg"),
+        ),
+        ("three hops on the left, then two hops on the right", ("three hops on the left", "two hops on the right")),
+        ("dodges left, then dodges right", ()),
+        ("points left, then walks right", ()),
+        ("points left", ()),
+    ],
+)
+def test_sides_in_turn_are_parts(prompt: str, parts: tuple[str, ...]) -> None:
+    assert parts_by_sides(prompt) == parts
