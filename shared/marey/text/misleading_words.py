@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from marey.text.action_reader import named_actions
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.scope import STANDING
 
 _UP_TO = re.compile(
@@ -148,6 +149,14 @@ _ON_FLOOR = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A seat on the floor that does not say so: "sits down cross-legged"."""
+_LAYS_LEG = re.compile(
+    r"""(?P<sits>\b(?:sits?|sitting|sat|(?:takes?|taking)\ a\ seat|seated)\b
+    (?:(?!\b(?:floor|ground|and|then)\b)[^.;,])*?)
+    (?:,?\ and\ then|,?\ and|,?\ then|,|\ to)\ (?:(?:he|she)\ )?cross(?:es|ing)?\ (?:(?:his|her|their)\ legs
+    |one\ leg\ over\ (?:the\ )?other)\b""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A leg that is laid over the other on a seat, which is one movement with the way there."""
 _SEAT = re.compile(
     r"\b(?:floor|ground|grass|mat|carpet|rug|sand|bed|chair|bench|sofa|couch|seat|stool|throne|table|cushion|pillow)\b",
     re.IGNORECASE,
@@ -174,17 +183,6 @@ _SPINS_AROUND = re.compile(
     re.IGNORECASE,
 )
 """A number of spins, of which models read one turn to face back."""
-_COWERS = re.compile(
-    r"""\bcower(?P<end>s|ing|ed)?(?:\ (?:down|back|in\ (?:fear|terror)|low))*
-    (?P<where>\ (?:behind|under|in|against|on|before)\ [^,.;]*?)?
-    (?:,?\ (?:and\ )?(?:with\ )?
-    (?:(?:covers|covering|shields|shielding|protects|protecting)\ (?:his|her|their)\ head(?:\ with\ [^,.;]*)?
-    |(?:(?:both|the|his|her|their)\ )*(?:arms|hands)\ (?:(?:held|raised|up)\ )?
-    (?:over|above|around|on|covering)\ (?:(?:the|his|her|their)\ )?head))?
-    (?=$|[,.;!]|\ (?:and|then|while|as)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A body that is afraid, of which models read a guard or nothing."""
 _COVERS_HEAD = re.compile(
     r"""(?P<low>\b(?:crouch|duck|squat|hunch|huddl)\w*(?:\ down)?(?:\ low)?)(?:,|\ and|,\ and|\ while|,\ while)?
     \ (?:with\ )?
@@ -317,16 +315,17 @@ def without_misleading(prompt: str) -> str:
     on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
-    leg to leg stands, and who falls over the knees falls once.
+    leg to leg stands, and who falls over the knees falls once. A leg is laid over the other as the body sits.
     Who goes up the stairs and "back down" turns around at their end, and who hauls himself up a rope climbs it. A
     dancer who leaps does so from one foot to the other.
     """
     prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, prompt)
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
+    prompt = _LAYS_LEG.sub(r"\g<sits> with one leg over the other", prompt)
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
     prompt = _COVERS_HEAD.sub(r"\g<low>", prompt)
-    prompt = _COWERS.sub(_crouches, _SPINS_AROUND.sub(r"\g<spins> ", _TO_BOTH_SIDES.sub(r"\g<work>", prompt)))
+    prompt = _SPINS_AROUND.sub(r"\g<spins> ", _TO_BOTH_SIDES.sub(r"\g<work>", prompt))
     prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
     prompt = _HAND_OVER_HAND.sub("climbing ", _UP_ROPE.sub(_climbs, prompt))
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
@@ -342,22 +341,19 @@ def without_misleading(prompt: str) -> str:
 
 
 def _as_person(found: re.Match[str]) -> str:
-    """Return a prompt of one movement whose subject is a person, if its other words name an action; else as it is."""
+    """Return a prompt of one movement whose subject is a person, if its other words name an action, and ask for the
+    same bearings of anybody; else as it is."""
     does, verb = found["does"], found["verb"].lower()
     named = named_actions(f"a person{does}")
     if not named or _JOINED.search(does) or (verb != STANDING and not named_actions(f"a person {verb}")):
         return found[0]
     if lunges_as_exercise(does) and not lunges_as_exercise(found[0]):
         return found[0]
+    if {each.name for each in stated_bearings(found[0])} != {each.name for each in stated_bearings(f"a person{does}")}:
+        return found[0]
     if named & named_actions(found["doer"]) or (named == {STANDING} and _PREPARED.search(does)):
         return found[0]
     return f"{_AN.sub('a ', found['who'] or 'a ')}person{does}"
-
-
-def _crouches(found: re.Match[str]) -> str:
-    """Return a crouch with covered head in the form of the verb that is found."""
-    end = {"s": "es", None: ""}.get(found["end"], found["end"] or "")
-    return f"crouch{end} down{found['where'] or ''}"
 
 
 def _against(found: re.Match[str]) -> str:

@@ -102,6 +102,11 @@ _WITH_HAND = re.compile(
     r",? (?:with|using) (?:(?:his|her|their|its|the|one's) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
 )
 """Words of the hand that does a gesture, behind its own."""
+_OVER_AND_OVER = re.compile(
+    r" (?:(?:from )?side to side|back and forth|up and down|to and fro|left and right|over and over(?: again)?)\b"
+)
+"""Words of how work goes on, behind its own."""
+_HANDED = re.compile(r"\b(?:left|right)[- ]handed\b")
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
 _BRINGING = frozenset(
     [
@@ -135,6 +140,8 @@ _BRINGING = frozenset(
 """Verbs by which arms come to where they are held: what is told before and after is done before and after."""
 _GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
 """Nouns of ways before which an adjective is one of the person: "sad walk"."""
+_DOES = "does"
+"""Group of the words that ask for a bearing, behind the people of whom they do so."""
 _GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
 _POSTURES = re.compile(r"\b(?:kneel\w*|knelt|crouch\w*|squat\w*|sit|sits|sitting|sat|seated|knees?)\b")
 _WAYS = (
@@ -300,9 +307,11 @@ def _tidied(text: str, places: Sequence[int]) -> tuple[str, tuple[int, ...]]:
 def _says_more(text: str) -> bool:
     """Return True if a text names more than who acts."""
     lists = load_word_lists()
-    words = set(re.findall(r"[a-z']+", text.lower()))
+    words = set(re.findall(r"[a-z']+", _HANDED.sub("", text.lower())))
     said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
-    return len(said) > 1 or (bool(said) and not _DOER.search(text.lower()))
+    if len(said) > 1:
+        return not _doers().match(text.lower())
+    return bool(said) and not _DOER.search(text.lower())
 
 
 @lru_cache(maxsize=KEPT_READINGS)
@@ -329,13 +338,16 @@ def _matches(text: str) -> Iterator[_Words]:
                 yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
             elif kind == "read":
                 yield _Words(*match.span(), stated, match[0])
+            elif kind == "by":
+                yield _Words(*match.span(_DOES), replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
             elif kind == "beside":
                 if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
                     yield _Words(*match.span(), stated)
             elif kind == "how" or _is_subject(text[: match.start()]):
                 hand = _WITH_HAND.match(text, match.end()) if not stated.side and stated.bearing.gesture else None
+                over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
                 if hand is None:
-                    yield _Words(*match.span(), stated)
+                    yield _Words(match.start(), match.end() if over is None else over.end(), stated)
                 else:
                     yield _Words(match.start(), hand.end(), replace(stated, side=_side(hand[0])))
 
@@ -421,6 +433,9 @@ def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]
     either = "|".join(entries)
     if kind in ("how", "beside", "read"):
         yield kind, "|".join(map(_expanded, entries))
+    elif kind == "by":
+        for who, does in (entry.split(" : ", 1) for entry in entries):
+            yield kind, rf"(?:{who})\b[^.;]*?(?<![\w'-])(?P<{_DOES}>{_expanded(does)})"
     elif kind in ("gaits", "loads"):
         for verbs, tail in map(_verbs_and_tail, entries):
             forms = frozenset(form for verb in verbs for form in verb_forms(verb))
@@ -455,6 +470,13 @@ def _longest_first(words: frozenset[str]) -> str:
 def _people() -> str:
     lists = load_word_lists()
     return _longest_first(lists.people - lists.body_parts - _PRONOUNS)
+
+
+@lru_cache(maxsize=1)
+def _doers() -> re.Pattern[str]:
+    """Return the pattern of the people of whom words ask for a bearing that they do not ask for of others."""
+    people = (entry.split(" : ", 1)[0] for _, words in bearing_words() for entry in words.get("by", ()))
+    return re.compile(rf"\W*(?:(?:{_ALL}) )?(?:{'|'.join(people)})\W*$")
 
 
 @lru_cache(maxsize=1)

@@ -47,7 +47,7 @@ _BRINGS = re.compile(
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
-WORDS = ("how", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
+WORDS = ("how", "by", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
 
@@ -106,6 +106,7 @@ class Bearing:
         load: something is carried in it.
         work: something that is done ("saws a plank"), not a way to do something else.
         moves: it is a movement of the whole body (`marey.generation.named`), made in place of a body that stands.
+        across: the arm that acts is not on the side that the words name: "rubs his left shoulder".
         also: actions beside which all of it is drawn, though the body is not upright in them, or its arms not free.
         arms: by `left` and `right`, those that it moves.
     """
@@ -133,6 +134,7 @@ class Bearing:
     load: bool = False
     work: bool = False
     moves: bool = False
+    across: bool = False
     also: tuple[str, ...] = ()
     keys: Keys | None = None
     arms: Mapping[str, ArmPose] = field(default_factory=dict[str, ArmPose])
@@ -163,6 +165,12 @@ class StatedBearing:
     side: Side = ""
     whole: bool = False
     words: str = field(default="", compare=False)
+
+    @property
+    def acts(self) -> Side:
+        """The side of the arm that acts; empty if the words name none."""
+        other: dict[Side, Side] = {"left": "right", "right": "left"}
+        return other.get(self.side, "") if self.bearing.across else self.side
 
     @property
     def first(self) -> str:

@@ -487,3 +487,50 @@ def test_a_restless_body_goes_from_one_foot_to_the_other() -> None:
     before, after = drawn(standing(6.0)), drawn(standing(6.0), named("weight-shift"))
     assert np.ptp(after[:, PELVIS, 0]) > np.ptp(before[:, PELVIS, 0]) + 0.08
     assert np.abs(after[:, TOES] - before[:, TOES]).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "wrist", "joint", "near"),
+    [
+        ("shoulder-rubbed", "", 21, 16, 0.2),
+        ("shoulder-rubbed", "left", 21, 16, 0.2),
+        ("shoulder-rubbed", "right", 20, 17, 0.2),
+        ("knee-rubbed", "", 21, 5, 0.25),
+        ("knee-rubbed", "left", 20, 4, 0.25),
+    ],
+)
+def test_a_hand_comes_to_the_part_that_hurts(name: str, side: str, wrist: int, joint: int, near: float) -> None:
+    joints = drawn(standing(5.0), named(name, side))
+    away = np.linalg.norm(joints[:, wrist] - joints[:, joint], axis=1)
+    assert away.min() < near < away[0]
+    assert (away < near + 0.05).sum() > 1.5 * FPS
+    other = np.linalg.norm(joints[:, 41 - wrist] - joints[:, joint], axis=1)
+    assert other.min() > near
+
+
+def test_hands_that_tie_a_shoe_are_at_one_foot() -> None:
+    joints = drawn(standing(5.0), named("lace-tying"))
+    apart = np.linalg.norm(joints[:, 20] - joints[:, 21], axis=1)
+    assert apart[len(joints) // 2 :].max() < 0.25
+    assert joints[len(joints) // 2 :, WRISTS, 1].max() < 0.72  # of a body that stands
+
+
+def test_arms_of_victory_stand_away_from_the_head_in_a_v() -> None:
+    joints = drawn(standing(4.0), named("victory"))
+    top = int(joints[:, WRISTS, 1].mean(1).argmax())
+    assert joints[top, WRISTS, 1].min() > joints[top, HEAD, 1] + 0.2
+    assert np.linalg.norm(joints[top, WRISTS] - joints[top, HEAD], axis=1).min() > 0.35
+
+
+def test_a_shrug_raises_the_shoulders() -> None:
+    joints = drawn(standing(4.0), named("shrug"))
+    assert (joints[:, SHOULDERS, 1] - joints[0, SHOULDERS, 1]).max(0).min() > 0.035
+
+
+def test_both_hands_of_a_conductor_go_round_in_curves() -> None:
+    joints = drawn(standing(6.0), named("conducting"))
+    for wrist in WRISTS:
+        way = joints[:, wrist] - joints[:, PELVIS]
+        assert np.ptp(way[:, 1]) > 0.25
+        assert np.ptp(way[:, 0]) > 0.2
+        assert (np.linalg.norm(np.diff(way, axis=0), axis=1) * FPS > 0.05).mean() > 0.95

@@ -115,8 +115,8 @@ def test_a_deep_bow_is_deep_and_takes_its_time(seed: int) -> None:
     assert (lean > 30).sum() > 30  # frames
 
 
-@pytest.mark.parametrize("text", ["cowers in fear", "crouches and covers his head"])
-def test_who_cowers_has_both_hands_over_the_head(text: str) -> None:
+@pytest.mark.parametrize("text", ["crouches, arms over the head", "crouches and covers his head"])
+def test_who_covers_the_head_has_both_hands_over_it(text: str) -> None:
     drawn = drawn_whole(HUMANML3D_263, "crouch", FineWish(prompt=text), 1, None)
     assert drawn is not None
     joints = HUMANML3D_263.decode(drawn.features)

@@ -16,7 +16,7 @@ from marey.vocabulary.bearings import load_bearings
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
 SEEDS = range(3)
-PELVIS, HEAD, ANKLES, TOES, WRISTS = 0, 15, [7, 8], [10, 11], [20, 21]
+PELVIS, HEAD, ANKLES, TOES, SHOULDERS, WRISTS = 0, 15, [7, 8], [10, 11], [16, 17], [20, 21]
 
 
 def drawn(prompt: str, *, seed: int = 1, frames: int | None = None, after: str = "") -> np.ndarray:
@@ -43,6 +43,18 @@ def test_every_bearing_that_moves_is_drawn() -> None:
         "stumbles forward and catches himself",
         "dives to the left",
         "slides on the ground feet first",
+        "a tennis serve",
+        "throws a javelin",
+        "throws a discus",
+        "puts the shot",
+        "throws a frisbee",
+        "a woman bowls a strike",
+        "two jump shots",
+        "a fencer advances and lunges",
+        "lifts a box onto a high shelf",
+        "ties both shoes",
+        "curtsies",
+        "cowers",
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
@@ -142,3 +154,139 @@ def test_who_stumbles_is_pitched_forward_steps_and_stands_upright_again(seed: in
     assert abs(lean[-1] - lean[0]) < 8
     assert 0.6 < joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] < 1.8
     assert joints[:, PELVIS, 1].min() > 0.7
+
+
+@pytest.mark.parametrize(
+    ("prompt", "strikes"),
+    [
+        ("serves a tennis ball", 21),
+        ("a left-handed tennis player serves", 20),
+        ("an overhead serve with the left hand", 20),
+    ],
+)
+def test_a_serve_tosses_with_one_hand_and_strikes_overhead_with_the_other(prompt: str, strikes: int) -> None:
+    joints = drawn(prompt)
+    tosses = 41 - strikes
+    struck, tossed = int(joints[:, strikes, 1].argmax()), int(joints[:, tosses, 1].argmax())
+    assert 0.2 * FPS < struck - tossed < FPS
+    assert joints[[struck, tossed], [strikes, tosses], 1].min() > joints[0, HEAD, 1] + 0.2
+    behind = joints[struck - 4 : struck, strikes] - joints[struck - 4 : struck, HEAD]
+    assert behind[:, 2].min() < -0.1  # drops behind the back before
+    assert joints[struck : struck + round(0.8 * FPS), strikes, 1].min() < 1.1
+    assert np.linalg.norm(joints[-1, ANKLES, 2] - joints[0, ANKLES, 2]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("prompt", "way", "height"),
+    [
+        ("an athlete throws the javelin", 1.6, 1.7),
+        ("puts the shot", 0.6, 1.6),
+        ("throws a discus", 0.0, 1.2),
+        ("throws a frisbee across the park", 0.0, 1.1),
+    ],
+)
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_throws_of_sports_let_go_ahead_after_the_hand_was_drawn_back(
+    prompt: str, way: float, height: float, side: str
+) -> None:
+    joints = drawn(f"{prompt} with the {side} hand")
+    hand = joints[:, 21 if side == "right" else 20] - joints[:, PELVIS]
+    fastest = int(np.linalg.norm(np.diff(hand, axis=0), axis=1).argmax())
+    ahead = fastest + int(hand[fastest : fastest + 8, 2].argmax())
+    assert hand[max(fastest - 20, 0) : fastest + 1, 2].min() < hand[ahead, 2] - 0.25
+    assert (hand + joints[:, PELVIS])[fastest : ahead + 3, 1].max() > height
+    assert joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] == pytest.approx(way, abs=0.45)
+    assert joints[-1, PELVIS, 1] > 0.88
+
+
+def test_who_bowls_steps_ahead_and_lets_go_low() -> None:
+    joints = drawn("throws a bowling ball down the lane")
+    hand = joints[:, 21] - joints[:, PELVIS]
+    low = int(joints[:, PELVIS, 1].argmin())
+    assert joints[low, PELVIS, 1] < 0.75
+    assert hand[: low + 1, 2].min() < -0.2
+    assert hand[low : low + 15, 2].max() > 0.35
+    assert joints[-1, PELVIS, 2] > joints[0, PELVIS, 2] + 0.8
+
+
+@pytest.mark.parametrize(
+    ("prompt", "times"), [("a jump shot", 1), ("three jump shots", 3), ("shoots a three-pointer with a jump shot", 1)]
+)
+def test_a_jump_shot_lets_go_in_the_air(prompt: str, times: int) -> None:
+    joints = drawn(prompt)
+    up = joints[:, TOES, 1].min(1) > 0.08
+    assert (np.diff(up.astype(int)) == 1).sum() == times
+    first = np.flatnonzero(up)
+    assert joints[first, 21, 1].max() > joints[first, HEAD, 1].max() + 0.15
+
+
+@pytest.mark.parametrize(
+    ("prompt", "wrist", "times"),
+    [("a fencer lunges", 21, 1), ("a fencer lunges twice with her left arm", 20, 2)],
+)
+def test_a_fencer_lunges_with_a_stretched_sword_arm_and_recovers(prompt: str, wrist: int, times: int) -> None:
+    joints = drawn(prompt)
+    down = joints[:, PELVIS, 1] < 0.72
+    assert (np.diff(down.astype(int)) == 1).sum() == times
+    low = int(joints[:, PELVIS, 1].argmin())
+    assert np.linalg.norm(joints[low, wrist] - joints[low, wrist - 4]) > 0.46
+    assert joints[low, wrist, 2] > joints[low, PELVIS, 2] + 0.4
+    assert abs(joints[low, ANKLES[0], 2] - joints[low, ANKLES[1], 2]) > 0.8
+    assert joints[low, 41 - wrist, 2] < joints[low, PELVIS, 2]
+    assert joints[-1, PELVIS, 1] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("prompt", "height"),
+    [
+        ("lifts a box onto the top shelf", 1.65),
+        ("lifts a crate onto the shelf", 1.4),
+        ("lifts a box onto the table", 1.0),
+    ],
+)
+def test_a_load_is_lifted_from_the_floor_with_bent_knees_and_put_up(prompt: str, height: float) -> None:
+    joints = drawn(prompt)
+    low = int(joints[:, WRISTS, 1].mean(1).argmin())
+    assert joints[low, WRISTS, 1].max() < 0.4
+    assert joints[low, PELVIS, 1] < 0.65
+    assert joints[low:, WRISTS, 1].min(1).max() == pytest.approx(height, abs=0.16)
+    apart = np.linalg.norm(joints[:, 20] - joints[:, 21], axis=1)
+    carried = slice(low, int(joints[:, WRISTS, 1].min(1).argmax()))
+    assert np.ptp(apart[carried]) < 0.16
+
+
+@pytest.mark.parametrize(("prompt", "ankle"), [("ties his left shoe", 7), ("kneels to tie her right shoe", 8)])
+def test_hands_that_tie_a_shoe_come_down_to_it(prompt: str, ankle: int) -> None:
+    joints = drawn(prompt)
+    near = np.linalg.norm(joints[:, WRISTS] - joints[:, None, ankle], axis=-1).max(1) < 0.24
+    assert near.sum() > 1.5 * FPS
+    assert joints[near, ANKLES[1 - ANKLES.index(ankle)] - 3, 1].max() < 0.16  # the knee of the other leg is down
+    assert joints[-1, PELVIS, 1] > 0.9
+
+
+@pytest.mark.parametrize(("prompt", "times"), [("curtsies", 1), ("curtsies twice", 2)])
+def test_a_curtsy_crosses_a_foot_behind_and_bends_the_knees(prompt: str, times: int) -> None:
+    joints = drawn(prompt)
+    down = joints[:, PELVIS, 1] < 0.82
+    assert (np.diff(down.astype(int)) == 1).sum() == times
+    low = int(joints[:, PELVIS, 1].argmin())
+    assert joints[low, 8, 0] > joints[low, 7, 0] - 0.03  # the right foot is behind the left one
+    assert joints[low, 8, 2] < joints[low, 7, 2] - 0.15
+
+
+def test_who_cowers_goes_down_behind_the_arms_and_rises() -> None:
+    joints = drawn("cowers in fear", frames=120)
+    low = int(joints[:, PELVIS, 1].argmin())
+    assert joints[low, PELVIS, 1] < 0.68
+    assert np.linalg.norm(joints[low, WRISTS] - joints[low, HEAD], axis=1).max() < 0.35
+    assert joints[-1, PELVIS, 1] > 0.88
+
+
+def test_who_rows_pulls_with_legs_trunk_and_arms() -> None:
+    joints = drawn("rows a boat")
+    away = joints[:, PELVIS, 2] - joints[:, ANKLES, 2].mean(1)
+    assert joints[:, PELVIS, 1].max() < 0.35
+    assert np.ptp(away) > 0.25
+    near = np.linalg.norm(joints[:, WRISTS] - joints[:, SHOULDERS], axis=-1).mean(1)
+    assert near[int(away.argmin())] < near[int(away.argmax())] - 0.12
+    assert np.ptp(joints[:, ANKLES], axis=0).max() < 0.02

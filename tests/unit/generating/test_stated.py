@@ -222,3 +222,25 @@ def test_who_sits_down_cross_legged_stands_at_first_and_crosses_the_legs() -> No
         assert joints[-1, 7, 0] < joints[-1, 1, 0] - 0.05  # the left foot on the right
         assert joints[-1, 8, 0] > joints[-1, 2, 0] + 0.05
     assert stated_features(LAYOUT, "sit-floor", FineWish(prompt="sits on the floor"), 60, 1) is None
+
+
+@pytest.mark.parametrize(
+    "prompt", ["sits with one leg over the other", "sits on a chair with his legs crossed", "sits crossing her legs"]
+)
+@pytest.mark.parametrize("action", ["sit", "sit-down"])
+def test_one_leg_lies_over_the_other_on_a_seat(prompt: str, action: str) -> None:
+    features = stated_features(LAYOUT, action, FineWish(prompt=prompt), 60, 1)
+    assert features is not None
+    joints = LAYOUT.decode(features).astype(np.float64)
+    knees, ankles = joints[-1, [4, 5]], joints[-1, [7, 8]]
+    over = int(ankles[:, 1].argmax())
+    sign = 1.0 if over == 0 else -1.0
+    assert ankles[over, 1] - ankles[1 - over, 1] > 0.15
+    assert sign * (ankles[over, 0] - ankles[1 - over, 0]) < -0.05  # on the other side of the leg that stands
+    assert knees[over, 1] > knees[1 - over, 1]
+    assert (joints[0, 0, 1] > 0.85) == (action == "sit-down")
+    assert joints[-1, 0, 1] < 0.62
+
+
+def test_who_sits_without_such_words_is_left_as_it_is() -> None:
+    assert stated_features(LAYOUT, "sit", FineWish(prompt="sits on a chair"), 60, 1) is None

@@ -8,6 +8,7 @@ from dataclasses import replace
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel, Step, both, near
+from marey.posing.standing import OTHER_SIDE
 
 _PACES = {"quick": (0.6, 0.85), "": (0.9, 1.4), "slow": (1.6, 2.4)}
 """Seconds from standing to sitting or back."""
@@ -65,6 +66,54 @@ def seated_on_seat(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple
     down = ((0.55 * fall, _leaning(rng, seated, rng.uniform(0.35, 0.5))), (0.55 * fall, seated))
     over, mid = (_leaning(rng, seated, rng.uniform(*share)) for share in ((0.0, 0.12), (0.5, 0.65)))
     return seated, down, ((0.45 * rise, over), (0.35 * rise, mid), (0.55 * rise, STAND))
+
+
+def _legs_crossed(rng: random.Random, seated: Posture) -> Posture:
+    """A seated posture with one leg over the other, the hands on the upper one."""
+    over = rng.choice(SIDES)
+    left, up, forward = seated.pelvis or (0.0, 0.54, -0.35)
+    hangs = FootPlace(near(rng, (-0.2, 0.27, 0.16), 0.015), (-0.1, -0.45, 0.9))
+    stands = FootPlace((0.06, 0.07, 0.0))
+    upper = HandPlace((0.04, 0.07, -0.1), "knee", (0.8, -0.2, -0.6))
+    lower = HandPlace((-0.19, 0.16, -0.08), "knee", (0.8, -0.2, -0.6))
+    return replace(
+        seated,
+        pelvis=(left, max(0.5, min(up, 0.56)), forward),
+        feet={over: hangs, OTHER_SIDE[over]: stands},
+        knees={over: (-0.3, 0.9, 0.7), OTHER_SIDE[over]: (0.0, 0.3, 1.0)},
+        hands={over: upper, OTHER_SIDE[over]: lower},
+    )
+
+
+def sit_legs_crossed(rng: random.Random, *, down: bool = False, seconds: float | None = None) -> Gesture:
+    """A body that sits on a seat and lays one leg over the other, where it stays.
+
+    Args:
+        rng: decides everything that is not given.
+        down: it stands at first, and sits down.
+        seconds: to be filled; None = for about four seconds on the seat.
+    """
+    _, seated = _seated(rng)
+    seated = replace(seated, spine=(rng.uniform(0, 8), 0, rng.uniform(-3, 3)), hands=both(_HANDS["sit-thighs"]))
+    crossed = _legs_crossed(rng, seated)
+    lifted = replace(
+        crossed,
+        feet={side: replace(foot, at=(0.06, 0.34, 0.1)) if foot.toes else foot for side, foot in crossed.feet.items()},
+        knees=dict.fromkeys(SIDES, (0.2, 0.9, 1.0)),
+        hands=seated.hands,
+    )
+    done = Sequel([rng.uniform(0.3, 0.6)], [STAND if down else seated])
+    if down:
+        fall = rng.uniform(*_PACES[""])
+        done.then(0.55 * fall, _leaning(rng, seated, rng.uniform(0.35, 0.5)))
+        done.then(0.55 * fall, seated, 0.3)
+    done.then(0.4, lifted)
+    done.then(0.45, crossed, 0.6)
+    until = max(seconds or 0.0, done.times[-1] + rng.uniform(1.8, 2.6)) - 1.0
+    while done.times[-1] < until:
+        neck = (rng.uniform(-6, 8), rng.uniform(-4, 4), rng.choice((0.0, rng.uniform(-30, 30))))
+        done.then(rng.uniform(0.7, 1.1), replace(crossed, neck=neck), rng.uniform(0.3, 0.9))
+    return done.gesture(rng, ["sit", "sit-legs-crossed"])
 
 
 def sit_down(rng: random.Random) -> Gesture:

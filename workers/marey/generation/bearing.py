@@ -282,7 +282,7 @@ class _Drawing:
         self._body, self._ways, self._rng = body, ways, rng
         self._bearing: Bearing = stated.bearing
         self._arms = arms_of(stated)
-        self._is_exchanged = stated.side == LEFT and len(self._arms) == len(ARMS)
+        self._is_exchanged = stated.acts == LEFT and len(self._arms) == len(ARMS)
         self._time = np.arange(len(ways.trunk)) / fps
         self._fps = fps
         self._pace = float(rng.uniform(0.92, 1.08))
@@ -387,6 +387,8 @@ class _Drawing:
             "head": joints[:, HUMANML3D.index("head")],
             "hips": joints[:, 0],
             "shoulder": joints[:, ARMS[side][1]],
+            "knee": joints[:, LEGS[side][1]],
+            "foot": joints[:, LEGS[side][3]],
         }[at]
 
 
@@ -396,14 +398,14 @@ def arms_of(stated: StatedBearing) -> Mapping[str, ArmPose]:
     Where one arm acts, or both do the same, it is the side that the prompt names; else they are exchanged if it names
     the left, since poses of two arms act with the right one.
     """
-    arms = stated.bearing.arms
-    if not stated.side or stated.bearing.gait:
+    arms, side = stated.bearing.arms, stated.acts
+    if not side or stated.bearing.gait:
         return arms
     if len(arms) == 1:
-        return {stated.side: next(iter(arms.values()))}
+        return {side: next(iter(arms.values()))}
     if arms.get(LEFT) == arms.get(RIGHT):
-        return {stated.side: arms[stated.side]} if arms else arms
-    return {OTHER_SIDE[side]: pose for side, pose in arms.items()} if stated.side == LEFT else arms
+        return {side: arms[side]} if arms else arms
+    return {OTHER_SIDE[one]: pose for one, pose in arms.items()} if side == LEFT else arms
 
 
 def with_bearing(manifest: Mapping[str, Any], spans: Sequence[BorneSpan], fps: float) -> dict[str, Any]:

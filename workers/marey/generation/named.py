@@ -1,5 +1,5 @@
 """Movements of the whole body that are asked for by name and are no action of the vocabulary: burpees, lunges,
-knee strikes, moonwalks, stumbles, dives to a side, slides.
+knee strikes, moonwalks, stumbles, dives to a side, slides, serves and throws of sports, loads lifted onto shelves.
 
 Readers and networks know nothing of them. Their words are those of bearings that move (`moves` in `bearings.toml`), so
 that they are read as what is done by a body that stands, and the movement is drawn in its place.
@@ -13,10 +13,12 @@ from collections.abc import Callable, Mapping
 
 from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
+from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
 from marey.drawing.gesture import Gesture
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
+from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
 from marey.drawing.stumbles import stumble
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
@@ -37,6 +39,13 @@ _RISES = re.compile(
     r"\b(?:gets?|getting|stands?|rises?|jumps?|springs?|picks?|scrambles?)\b.*\bup\b|\brises?\b"
     r"|\bto (?:his|her) feet\b"
 )
+_LEFT_HANDED = re.compile(r"\bleft[- ]hand(?:ed)?\b|\bleft arm\b|\bsouthpaw\b|\blefty\b")
+_ADVANCES = re.compile(r"\badvanc\w+|\bsteps? (?:forward|in)\b|\bapproach\w*")
+_HIGH = re.compile(r"\b(?:high|top|upper|overhead|tall)\b|\babove (?:his|her|their) head\b")
+_LOW = re.compile(r"\b(?:tables?|desks?|counters?|workbench|bench|low(?:er)?|truck|trunk|cart|trolley|conveyor)\b")
+_LIGHT = re.compile(r"\b(?:light|small|little|empty|quickly)\b")
+_POINTS = re.compile(r"\bthree[- ]point\w*")
+_BOTH_SHOES = re.compile(r"\bboth\b|\beach shoe\b")
 
 
 def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
@@ -99,6 +108,64 @@ def _ground_slide(stated: StatedBearing, wish: FineWish, rng: random.Random, sec
     return ground_slide(rng, rises=not _RISES.search(wish.beside[1].lower()))
 
 
+def _hand(stated: StatedBearing, wish: FineWish) -> str:
+    """Return the side of the hand that acts: the one that is named, and the left one of who is left-handed."""
+    return stated.side or wish.side or ("left" if _LEFT_HANDED.search(wish.prompt.lower()) else "")
+
+
+def _tennis_serve(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return tennis_serve(rng, _hand(stated, wish))
+
+
+def _field_throw(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return field_throw(rng, stated.name.partition("-")[0], _hand(stated, wish))
+
+
+def _bowling(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return bowling(rng, _hand(stated, wish))
+
+
+def _jump_shot(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    number = stated_number(_POINTS.sub("", stated.words))
+    return jump_shot(rng, _hand(stated, wish), None if number is None else min(number, MOST))
+
+
+def _fencing_lunge(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    advances = bool(_ADVANCES.search(wish.prompt.lower())) or None
+    return fencing_lunge(rng, _hand(stated, wish), _times(stated), advances=advances)
+
+
+def _shelf_lift(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    height = "high" if _HIGH.search(stated.words) else "low" if _LOW.search(stated.words) else ""
+    return shelf_lift(rng, height, heavy=not _LIGHT.search(stated.words))
+
+
+def _shoe_tied(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return shoe_tied(rng, stated.side, both_shoes=bool(_BOTH_SHOES.search(stated.words)))
+
+
+def _curtsy(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return curtsy(rng, stated.side, _times(stated))
+
+
+def _cower(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated, wish
+    return cower(rng, seconds)
+
+
+def _rowing(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish
+    return rowing(rng, _times(stated), seconds)
+
+
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
@@ -107,5 +174,18 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "stumble": _stumble,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,
+    "tennis-serve": _tennis_serve,
+    "javelin-throw": _field_throw,
+    "discus-throw": _field_throw,
+    "shot-put": _field_throw,
+    "frisbee-throw": _field_throw,
+    "bowling": _bowling,
+    "jump-shot": _jump_shot,
+    "fencing-lunge": _fencing_lunge,
+    "shelf-lift": _shelf_lift,
+    "shoe-tied": _shoe_tied,
+    "curtsy": _curtsy,
+    "cower": _cower,
+    "rowing": _rowing,
 }
 """Movements by the bearing that names them."""

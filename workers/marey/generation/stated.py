@@ -1,6 +1,6 @@
 """Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
 or in a direction, a number of claps, steps aside by number or at a pace, blows to a part of the body, kicks with a
-spin, waves of both arms over the head, seats on the floor with crossed legs, jumps back or to a side, turns on the spot
+spin, waves of both arms over the head, seats with crossed legs, jumps back or to a side, turns on the spot
 and spins as far round as is said, stairs, and movements that have a name alone.
 
 A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
@@ -20,6 +20,7 @@ from marey.drawing.arms import clap_times, wave_overhead
 from marey.drawing.floor import sit_floor
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.kicks import spin_kick
+from marey.drawing.seats import sit_legs_crossed
 from marey.drawing.sidesteps import sidestep
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
@@ -49,6 +50,10 @@ _GOES = re.compile(r"\b(?:walk|run|jog|sit|kneel|jump|turn|danc)\w*")
 _SPINS = re.compile(r"\b(?:spin\w*|spun|tornado|turning|360|whirl\w*|wheel[ -]kick|back[ -]?hook)\b")
 _CROSSED = re.compile(
     r"\bcross(?:ed|ing)?[ -]leg\w*|\blegs (?:\w+ )?crossed\b|\b(?:crossed|crosses (?:his|her|their)) legs\b|\blotus\b"
+)
+_LEG_OVER = re.compile(
+    r"\bcross(?:ed|ing)?[ -]leg\w*|\blegs (?:\w+ )?crossed\b|\bcross(?:ed|es|ing)? (?:(?:his|her|their|one) )?legs?\b"
+    r"|\b(?:leg|knee|ankle) (?:crossed |thrown |resting )?(?:over|on|across) (?:the (?:other|opposite)|another)\b"
 )
 _DOWN = re.compile(r"\bdown\b|\btakes? a seat\b|\bfrom standing\b")
 _TO_AND_FRO = re.compile(r"\b(?:side to side|back and forth|to and fro|left and right|right and left|both)\b")
@@ -88,6 +93,15 @@ def _cross_legged(wish: FineWish, rng: random.Random, seconds: float | None) -> 
     return sit_floor(rng, "floor-crossed", down=True if _DOWN.search(text) else None)
 
 
+def _leg_over(*, down: bool) -> Statement:
+    """Return the rule of a body on a seat: one leg lies over the other if the prompt says so."""
+
+    def state(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+        return sit_legs_crossed(rng, down=down, seconds=seconds) if _LEG_OVER.search(wish.prompt.lower()) else None
+
+    return state
+
+
 STATED: Mapping[str, Statement] = {
     "raise-arm": stated_raise,
     "clap": _claps,
@@ -97,6 +111,8 @@ STATED: Mapping[str, Statement] = {
     "kick": _spin_kick,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
+    "sit": _leg_over(down=False),
+    "sit-down": _leg_over(down=True),
     "hop": hops_away,
     "turn": turn_in_place,
     "turn-around": turn_asked_for,
