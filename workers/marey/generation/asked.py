@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.drawing.kinds import COUNTED
+from marey.generation.begun import begun, frames_to_begin
 from marey.generation.drawn_sides import drawn_side
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
@@ -74,8 +75,8 @@ class AskedMotion:
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
             its end came after the action; `footed`, true where a run was held back by the slide of its
-            feet; `posture`, in which a gesture is done
-            (`marey.generation.postured`), or `as before`, that in which the movement before has ended.
+            feet; `begun`, how many seconds of its beginning were left out, in which a run stood; `posture`, in which a
+            gesture is done (`marey.generation.postured`), or `as before`, that in which the movement before has ended.
     """
 
     features: Float32 = field(repr=False)
@@ -158,7 +159,17 @@ class _Wish:
 
     def for_network(self, request: Request, limits: Limits) -> Request:
         """Return the request that the network draws: as many frames as become the length asked for, if that is
-        fixed."""
+        fixed, and those in which it does not move yet."""
+        asked = self._for_length(request, limits)
+        if asked.frames is None or self.count is not None:
+            return asked
+        return replace(asked, frames=frames_to_begin(self.action, asked.frames, limits))
+
+    def length(self, request: Request, limits: Limits) -> int | None:
+        """Return the frames of the motion that becomes the length asked for."""
+        return self._for_length(request, limits).frames
+
+    def _for_length(self, request: Request, limits: Limits) -> Request:
         if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
             return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
         if self.pace.most == 1.0 or request.open or request.frames is None:
@@ -281,10 +292,15 @@ def _as_asked(
     if source is None:
         return None
     layout, features = generator.layout, source.features
+    late = 0 if whole is not None or wish.count is not None else begun(features, layout, wish.action)
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze and request.drawing else {}
     if not request.held.is_drawn and _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
         features, changes["mirrored"] = layout.mirror(features), True
     fixed = None if request.open else request.frames
+    if late:
+        features, changes["begun"] = features[late:], round(late / layout.fps, 2)
+    if whole is None and fixed is not None:
+        features = features[: wish.length(request, generator.limits)]
     if whole is not None:
         changes["drawn"] = wish.action or "idle"
     elif layout.skeleton.name == HUMANML3D.name:
@@ -377,7 +393,7 @@ def _on_floor(
         return features
     if wish.action in RUNS and (held := footed(features, layout, RUNS[wish.action])) is not None:
         features, changes["footed"] = held, True
-    if wish.action in ON_FEET and (grounded := on_floor(features, layout)) is not None:
+    if wish.action in ON_FEET and (grounded := on_floor(features, layout, wish.action)) is not None:
         features, changes["grounded"] = grounded, True
     if wish.action in JUMPS and fixed is None:
         falls = fallen(features, layout)

@@ -13,6 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
+from marey.generation.footing import RUNS
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.feet import runs
 from marey.posing.limbs import GRAVITY
@@ -36,6 +37,8 @@ PASSES_S = 0.05
 """Standard deviation of the filter in which the pace passes into that of a flight, seconds."""
 REACH_S, DRIFT_M = 0.4, 0.015
 """Seconds before and after a moment within which a foot is on the floor, and metres of a drift that is looked at."""
+STEP_REACH_S = 0.2
+"""The same seconds in a run, whose steps follow each other faster."""
 SHORTEST_S = 1.0
 """Seconds that a motion keeps whose beginning is left out."""
 
@@ -68,17 +71,19 @@ def fallen(features: Float32, layout: FeatureLayout) -> Float32 | None:
     return encode_all(layout, (1 - share) * joints[below] + share * joints[below + 1])
 
 
-def on_floor(features: Float32, layout: FeatureLayout) -> Float32 | None:
-    """Return features (T, D) of a body that comes down to the floor at least once a second; None if it does.
+def on_floor(features: Float32, layout: FeatureLayout, action: str = "") -> Float32 | None:
+    """Return features (T, D) of a body that comes down to the floor at least once a second, and in each step of a run;
+    None if it does.
 
     Args:
         features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
         layout: of the features.
+        action: its id in the vocabulary; empty = none that is known.
     """
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
-    reach = round(REACH_S * fps)
+    reach = round((STEP_REACH_S if action in RUNS else REACH_S) * fps)
     near = sliding_window_view(np.pad(lowest_foot(joints), reach, mode="edge"), 2 * reach + 1)
-    drift = smooth(near.min(1), 0.5 * REACH_S, fps)
+    drift = smooth(near.min(1), 0.5 * reach / fps, fps)
     if drift.max() < DRIFT_M:
         return None
     joints[..., 1] -= np.maximum(drift, 0.0)[:, None]
