@@ -38,6 +38,15 @@ _MANNER = re.compile(
     r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
 )
 """Words that say how something is done, though one of them names an action."""
+_WITH = re.compile(
+    r"""\W*(?:(?:with|without|like|as\ if|using|behind|beside|above)\b(?!\ that\b)
+    |(?:\d+|an?|one|two|three|four|five|six|seven|eight|nine|ten|several|a\ few)\ (?:\w+\ )?
+    (?:strokes?|times?|blows?|hits?|knocks?|swings?|beats?|reps?|repetitions?|rounds?|turns?)\W*$)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Beginning of words that say how or how often the movement before them is done: "with his sleeve", "four strokes"."""
+_MEANWHILE = re.compile(r"\W*(?!(?:go|com|follow|end|be)ing\b)\w{2,}ing\b", re.IGNORECASE)
+"""Beginning of what comes with the movement before it: "serves, tossing the ball"."""
 _UNTIL = re.compile(r"\W*until (?:he|she|they|it)(?:'s|'re| (?:is|are|can\W?t|cannot|has|have))\b", re.IGNORECASE)
 """Words of the state in which a movement ends: "until he is worn out"."""
 _END = re.compile(
@@ -73,6 +82,10 @@ _OTHERS = re.compile(
     re.IGNORECASE,
 )
 """Beginning of a clause that tells what others do."""
+
+
+_ONE = (("bend-over", "pick-up"),)
+"""Pairs of movements of which the second begins with the first."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +141,8 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
     merged: list[list[ReadClause]] = []
     for group in groups:
         last = merged[-1] if merged else []
-        if len(group) == len(last) == 1 and group[0].name == last[0].name:
+        alike = len(group) == len(last) == 1 and (last[0].name, group[0].name) in (*_ONE, (group[0].name,) * 2)
+        if alike:
             surer = max(group[0].probability, last[0].probability)
             merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
         else:
@@ -137,20 +151,30 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
 
 
 def with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
-    """Return clauses; what comes behind "from", says how, or is the end of a movement belongs to the one before: "gets
-    up from | lying on the ground", "sneaks ahead | in a crouch", "bows | and straightens up"; and so does what is done
-    at a wheel or by hands that hold: "drives | and swerves left", "hangs from a ledge | and shimmies along"."""
+    """Return clauses; what comes behind "from", says how or how often, or is the end of a movement belongs to the one
+    before: "gets up from | lying on the ground", "sneaks ahead | in a crouch", "wipes his mouth | with a sleeve",
+    "chops wood, | four strokes", "bows | and straightens up"; and so does what is done at a wheel or by hands that
+    hold: "drives | and swerves left", "hangs from a ledge | and shimmies along"."""
     found: list[ReadClause] = []
     for clause in clauses:
         text = without_joints(clause.text)
         goes_on = BOUND_TO_HANDS.get(found[-1].name) if found else None
         how = _MANNER.match(clause.text) or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
+        how = how or (bool(found) and comes_with(found[-1].text, clause.text))
         belongs = how or _END.fullmatch(text) or (goes_on and goes_on.match(text))
-        if found and (belongs or found[-1].text.lower().endswith(" from")):
+        if found and (belongs or found[-1].text.lower().endswith((" from", " while"))):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:
             found.append(clause)
     return found
+
+
+def comes_with(before: str, text: str) -> bool:
+    """Return True if a clause says how or how often the one before it is done, or comes at the same time: "serves, |
+    tossing the ball"; "walking in, | sitting down" are two."""
+    if _WITH.match(text):
+        return True
+    return bool(_MEANWHILE.match(text)) and not re.search(r"\b\w{2,}ing\b", before) and only_named(text) is None
 
 
 def parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
@@ -166,4 +190,4 @@ def parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
             yield clause if named is None else replace(clause, name=named, probability=PLAIN)
             continue
         for place, (text, action) in enumerate(parts):
-            yield ReadClause(action, clause.probability, text, clause.at_once and place == 0)
+            yield ReadClause(action, max(clause.probability, PLAIN), text, clause.at_once and place == 0)

@@ -15,6 +15,8 @@ from marey.vocabulary.lengths import verb_forms
 
 MOST_WORDS = 4
 """Words of a part without a verb at its beginning: "arm circles", "right hook"."""
+MOST_PARTS = 8
+"""Parts of a clause that are told apart at most."""
 ALONE = frozenset({"cartwheel", "flip", "roll", "jump-turn", "push-ups", "sit-ups", "climb-onto", "crawl"})
 """Actions of the whole body, beside which no other is done: behind them, "and" separates as well."""
 BESIDE = frozenset({"wave", "clap", "cheer", "laugh", "nod", "talk", "signal", "raise-arm", "shiver", "drink"})
@@ -23,8 +25,8 @@ JUMPS = frozenset({"jump", "jump-forward", "hop", "leap"})
 """Actions in the air, where a body may turn: "jumps and turns around"."""
 SERIES = frozenset({"karate", "dance"})
 """Actions that consist of others: "practises karate, punches and kicks"."""
-CHANGES = frozenset({"slow", "speed", "accelerate"})
-"""Verbs of who goes on at another pace: "slows to a walk"."""
+CHANGES = frozenset({"slow", "speed", "accelerate", "step"})
+"""Verbs of who goes on at another pace or place: "slows to a walk", "steps back"."""
 _SIGN = re.compile(
     r"\s*(?:;|\.(?=\s)|->|→|,)\s*(?:and\s+)?(?:then\s+|finally\s+|next\s+)?|\s+(?:and\s+)?then\s+|\s+(?P<and>and)\s+",
     re.IGNORECASE,
@@ -48,7 +50,15 @@ def parts_in_time(text: str, *, listed: bool = False) -> list[tuple[str, str]]:
         listed: it comes behind others, so that "and" may separate what follows: "walks up, then turns and runs".
     """
     parts = list(_parts(text, listed))
-    return parts if all(action for _, action in parts) else []
+    return parts if len(parts) <= MOST_PARTS and all(action for _, action in parts) else []
+
+
+def before_next_verb(text: str) -> tuple[str, str]:
+    """Return a clause without a verb of its own, and what is behind it: "with a sleeve", "throws it away"."""
+    for sign in _SIGN.finditer(text):
+        if _begins_with_verb(text[sign.end() :]):
+            return text[: sign.start()].strip(), text[sign.end() :]
+    return text, ""
 
 
 def only_named(text: str) -> str | None:

@@ -16,7 +16,8 @@ from marey.text.action_reader import (
     joins_clauses,
     named_actions,
 )
-from marey.text.clause_parts import parts_in_time
+from marey.text.clause_order import comes_with
+from marey.text.clause_parts import before_next_verb, parts_in_time
 from marey.text.elided_words import parts_by_sides
 from marey.text.encoders import Encoding
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
@@ -169,7 +170,11 @@ class TrainedReaders:
         if not bare.stated:
             return None
         if self._movements and (movements := self._movements_of_parts(parts_by_gestures(bare.prompt))):
-            return ReadPrompt(bare.prompt, movements, drawn=True)
+            only, *others = movements
+            if others:
+                return ReadPrompt(bare.prompt, movements, drawn=True)
+            if only.action == STANDING:
+                return replace(ReadPrompt.of(bare.prompt, STANDING, surely=True), drawn=True)
         acts = without_gaze(bare.text)
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
             stands = not acts or not all(each.whole for each in bare.stated)
@@ -178,8 +183,10 @@ class TrainedReaders:
             return replace(ReadPrompt.of(bare.prompt, STANDING, surely=True), drawn=True) if stands else None
         reading = self._reading(bare)
         shown = [each.action for each in reading.movements] or [self._read_bare(bare).action]
-        fits = any(action is not None and bare.fits(action) for action in shown)
-        return replace(reading, drawn=True) if fits else None
+        if any(action is not None and bare.fits(action) for action in shown):
+            return replace(reading, drawn=True)
+        written = self._reading(as_written(bare.prompt)) if reading.movements else None
+        return reading if written is not None and not written.movements else None
 
     def _movements_of_parts(self, parts: Sequence[str]) -> tuple[ReadMovement, ...]:
         """Return the movements of the parts of a prompt, some of which are gestures.
@@ -189,6 +196,11 @@ class TrainedReaders:
         """
         found: list[ReadMovement] = []
         for part in parts:
+            if found and comes_with(found[-1].text, part):
+                how, part = before_next_verb(part)
+                found[-1] = replace(found[-1], text=f"{found[-1].text} {how}")
+            if not part:
+                continue
             bare = BarePrompt.of(part)
             stays = found and found[-1].action in STAYING and stated_length(found[-1].text).seconds is None
             if stays and not without_gaze(bare.text):
@@ -202,7 +214,7 @@ class TrainedReaders:
             action = self._read_action(text).action
             asked = action is not None or named_actions(text)
             found += reading.movements or ([ReadMovement(part, action)] if asked else [])
-        return tuple(found) if len(found) > 1 else ()
+        return tuple(found) if len(found) > 1 or len(parts) > 1 else ()
 
     def _read_action(self, text: str) -> ReadAction:
         if text not in self._actions:

@@ -23,6 +23,7 @@ from marey.core.hashing import sha256_of
 from marey.text.action_reader import OUTSIDE, RISING, named_actions, word_marks
 from marey.text.clause_order import (
     BOUND_TO_HANDS,
+    CONTEXT,
     PLAIN,
     SURE,
     ReadClause,
@@ -44,7 +45,7 @@ from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 7
+VERSION = 8
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -100,6 +101,15 @@ TURN_AROUND, CARRYING = "turn-around", WAYS | {"carry"}
 BACKWARD: Mapping[str, str] = {"walk-backward": "walk"}
 """Ways ahead, by those backward."""
 _ACROSS = re.compile(r"\b(?:over|across)\b", re.IGNORECASE)
+_WAKES = re.compile(
+    r"(?:(?:he|she|they) )?(?:\w+ly )?(?:wakes?(?: up)?|awakes?|awakens?|stirs?)(?: \w+ly| with a start)?\W*",
+    re.IGNORECASE,
+)
+"""Words of who is awake and stays where he is."""
+_GOES_ON = re.compile(
+    r"(?:(?:he|she|they) )?(?:climbs?|goes|keeps|continues?|carries)\b.*\b(?:on|climbing|up)\W*$", re.I
+)
+"""Words of who climbs further."""
 _STANDS = re.compile(r"\bst(?:and|ood|ays? (?:up|standing))|\bupright\b", re.IGNORECASE)
 _WITHOUT = re.compile(r"\bwithout (?:\w+ly )?\w+ing\b[^,;.]*", re.IGNORECASE)
 """Words of what does not come with a movement, which is done all the same."""
@@ -184,11 +194,11 @@ class SequenceReader(Reader):
             return (*(several or [ReadMovement(way, action)]), _rest())
         written = self._clauses(bare, encoding, pooled)
         whole = list(parted(with_belongings(written)))
-        if len(whole) == 1 < len(written) and whole[0].name in BOUND_TO_HANDS:
+        if len(whole) == 1 < len(written) and (whole[0].name in BOUND_TO_HANDS or _is_doubtless(whole[0])):
             return (ReadMovement(bare.prompt, whole[0].name),)
         groups = in_order(whole)
         clauses = [clause for group in groups for clause in group]
-        if len(groups) < 2 or min(clause.probability for clause in clauses) < SURE:
+        if len(groups) < 2 or not _is_clear(clauses):
             return ()
         if _is_one_action([clause.name for clause in clauses], action) and not _stops_on_a_way(clauses):
             return _turn_and_rest(clauses)
@@ -297,6 +307,15 @@ def _rest() -> ReadMovement:
     return ReadMovement(phrase_in_third_person(load_vocabulary().need(STANDING).plain), STANDING, REST_S)
 
 
+def _is_clear(clauses: Sequence[ReadClause]) -> bool:
+    """Return True if no clause is in doubt, or two at least are in none at all."""
+    return min(clause.probability for clause in clauses) >= SURE or sum(map(_is_doubtless, clauses)) > 1
+
+
+def _is_doubtless(clause: ReadClause) -> bool:
+    return clause.probability >= PLAIN and clause.name not in (OUTSIDE, CONTEXT)
+
+
 def _is_one_action(names: Sequence[str], action: str | None) -> bool:
     """Return True if clauses with these names are one action: "stands and waves" of a prompt that is taken for one, and
     "walks ahead, then veers off", since who turns walks. "Stands idle, walks" is two if it is taken for standing."""
@@ -330,19 +349,24 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
 def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     """Yield movements that begin as the one before has ended: who sat down and waits sits, who stands up does so from
     there, and who runs and jumps over something leaps."""
-    before = down = None
+    before = down = climbed = None
     for movement in movements:
         action = movement.action
         if action == STANDING and before in HELD and not _STANDS.search(movement.text):
             action = HELD[before]
+        elif action in RISING and _WAKES.fullmatch(movement.text) and down in HELD:
+            action = HELD[down]
         elif action in RISING and down is not None:
             action = "get-up" if down in FLOOR else "stand-up"
         elif action in RISING and before is not None:
             action = STANDING
+        elif action == "climb-onto" and climbed and _GOES_ON.match(movement.text):
+            action = climbed
         elif action in JUMPS and before in RUNS and _ACROSS.search(movement.text):
             action = "leap"
         yield replace(movement, action=action)
         before = action
+        climbed = action if action in ("climb-stairs", "climb-ladder") else climbed
         if action in FLOOR | SEAT:
             down = action
         elif action in ON_FEET:

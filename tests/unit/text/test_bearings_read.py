@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from marey.generation.asked import action_of
 from marey.text.pipeline import TextPipeline
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_pipeline
@@ -94,6 +95,21 @@ def test_movements_keep_their_words_and_are_read_without_their_bearing(
     assert [each.prompt for each in found] == [text for text, _ in movements]
     for each, (_, read) in zip(found, movements, strict=True):
         assert read is None or each.rewritten == read
+
+
+@pytest.mark.parametrize(
+    ("prompt", "movements"),
+    [
+        ("he chops wood with an axe, five strokes", []),
+        ("a conductor leads the orchestra with large gestures", []),
+        ("he drinks water, wipes his brow with a sleeve and walks off", ["drink", "idle", "walk"]),
+    ],
+)
+def test_how_or_how_often_work_is_done_is_no_movement(reading: TextPipeline, prompt: str, movements: list[str]) -> None:
+    (features,) = reading.features([prompt])
+    assert [action_of(each) for each in features.movements] == movements
+    if not movements:
+        assert action_of(features) == "idle"
 
 
 def test_a_bundle_without_plain_actions_reads_prompts_as_they_are() -> None:

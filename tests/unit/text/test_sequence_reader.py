@@ -70,6 +70,11 @@ def test_it_knows_every_action_and_the_shipped_encoder() -> None:
         ("turn left, then walk four steps, then wave", ["turn", "walk", "wave"]),
         ("crawls to the tent, kneels and finally lies down without looking back", ["crawl", "kneel", "lie-down"]),
         ("kneels, then does not stand up", []),
+        ("a knight blocks a strike, steps back, then slashes with his sword", ["block", "walk-backward", "slash"]),
+        ("lies on his back asleep, wakes up, then waves", ["lie", "lie", "wave"]),
+        ("lies on his back asleep, wakes up, then gets up", ["lie", "get-up"]),
+        ("climbs a few stairs, waits, then climbs on", ["climb-stairs", STANDING, "climb-stairs"]),
+        ("bends down, picks up a key and walks off", ["pick-up", "walk"]),
         ("he kneels, then plays chess, then walks off", ["kneel", "kneel", "walk"]),
     ],
 )
