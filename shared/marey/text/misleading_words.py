@@ -236,6 +236,13 @@ _OVER_KNEES = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A fall over the knees, which is one movement."""
+_TO_KNEES = re.compile(
+    r"""\b(?P<fast>fall|drop|collaps|crumple|slump|crash|tumbl)?(?(fast)|(?:sink|go|get|come))(?P<end>e?s|e?d|ing|e)?
+    (?P<how>[ ]\w+ly)?(?:[ ](?:down|heavily|hard))?[ ](?:to|on|onto)
+    [ ](?:both[ ](?:of[ ])?)?(?:(?:his|her|their|its)[ ])?(?:two[ ])?knees\b(?![ ](?:and|or)[ ](?:hands|elbows))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that comes down onto its knees and stays there, of which models read a death, or one knee."""
 _KNEE = re.compile(
     r"(?P<joint>^|[,;+&]\s*|\b(?:and|then)\s+)(?:(?P<before>left|right) knee|knee (?P<side>left|right))"
     r"(?: strike)?(?=$|[.,;+&]| (?:and|then)\b)",
@@ -315,7 +322,8 @@ def without_misleading(prompt: str) -> str:
     on the way, and who "is kicked" is hit. Where the hands of a driver are is said of the wheel, and read as rising
     from the seat. The blow of who "is shot and falls" is part of the fall. A counterattack is a blow of the weapon.
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
-    leg to leg stands, and who falls over the knees falls once. A leg is laid over the other as the body sits.
+    leg to leg stands, who falls over the knees falls once, and who falls to the knees kneels. A leg is laid over the
+    other as the body sits.
     Who goes up the stairs and "back down" turns around at their end, and who hauls himself up a rope climbs it. A
     dancer who leaps does so from one foot to the other.
     """
@@ -331,11 +339,12 @@ def without_misleading(prompt: str) -> str:
     text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
+    text = _TO_KNEES.sub(_kneels, _OVER_KNEES.sub(_falls_over_knees, text))
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
     text = _ROLLS_FROM_THERE.sub(_rolls_onto, text)
-    text = _OVER_KNEES.sub(_falls_over_knees, _ROLLS_OVER.sub(_lies, text))
+    text = _ROLLS_OVER.sub(_lies, text)
     text = _SHIFTS.sub(r"\g<shifts>", _HURDLE.sub(_jumps_over, _KNEE.sub(_knee_strike, text)))
     return _HIT_LEG.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
 
@@ -447,6 +456,14 @@ def _falls_over_knees(found: re.Match[str]) -> str:
     """Return a fall in which the knees come down first."""
     side = "sideways" if "side" in found["how"] else ""
     return f"falls dead over the knees {(found['way'] or '').strip() or side or 'forward'}"
+
+
+def _kneels(found: re.Match[str]) -> str:
+    """Return a body that kneels down on both knees; one that falls does so quickly."""
+    end = (found["end"] or "").lower()
+    kneels = "kneeling" if end == "ing" else "kneels" if end.endswith("s") else "kneel"
+    how = found["how"] or (" quickly" if found["fast"] else "")
+    return f"{kneels} down{how} on both knees"
 
 
 def _jumps_over(found: re.Match[str]) -> str:

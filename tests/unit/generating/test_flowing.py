@@ -11,6 +11,7 @@ from marey.generation.postured import drawn_posture
 from marey.generation.row_postures import row_postures
 from marey.generation.shots.flowing import SPEED, flowing, without_rest
 from marey.motion.features import HUMANML3D_263
+from tests.support.bodies import Body, steady
 
 LAYOUT = HUMANML3D_263
 BESIDE = ("", "walks")
@@ -108,3 +109,38 @@ def test_who_is_bent_goes_down_from_there(own: str) -> None:
     assert upright is not None
     assert len(joined.before) < len(upright.before)
     assert joints_of(joined.before)[-1, 15, 1] < 1.2
+
+
+@pytest.mark.parametrize(
+    ("action", "said"), [("die", "trips and falls"), ("die", "faints"), ("roll", "rolls"), ("throw", "throws a stone")]
+)
+@pytest.mark.parametrize("speed", [1.2, 2.5])
+def test_a_way_goes_on_into_what_is_drawn_behind_it(action: str, said: str, speed: float) -> None:
+    way, after = LAYOUT.encode(Body(4.0, speed=steady(speed)).joints()), drawn(action, said)
+    joined = flowing(way, after, LAYOUT, onward=True)
+    assert joined is not None
+    joints = joints_of(joined.before, joined.after)
+    goes = np.linalg.norm(np.diff(joints[:, 0, [0, 2]], axis=0), axis=-1) * FPS
+    end = len(joined.before)
+    assert goes[10 : end + 2].min() > 0.6 * speed, "there is no halt before it"
+    slower = np.diff(goes[end - 4 : end + 30])
+    assert slower.max() < 0.8, "the speed does not jump"
+    assert joints[..., 1].min() > -0.1
+    if action == "die":
+        assert joints[end : end + 12, 0, 1].max() > 0.85, "the fall begins on the feet"
+
+
+def test_who_stands_does_not_go_on() -> None:
+    stands = LAYOUT.encode(Body(4.0).joints())
+    assert flowing(stands, drawn("die", "falls"), LAYOUT, onward=True) is None
+
+
+@pytest.mark.parametrize("said", ["gets hit in the stomach", "is punched in the belly"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_who_is_hit_bends_on(said: str, seed: int) -> None:
+    hit, bends = drawn("flinch", said, seed), drawn("bend-over", "doubles over", seed)
+    joined = flowing(hit, bends, LAYOUT, down=True)
+    assert joined is not None
+    head = joints_of(joined.before, joined.after)[:, 15, 1]
+    first = int(np.flatnonzero(head < head[0] - 0.2)[0])
+    assert head[first : int(head.argmin())].max() < head[0] - 0.15, "the body does not come upright in between"

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, PRONE, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, PLANK, PRONE, SEAT, SLIDE, UPRIGHT
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.posture import NO_POSTURE, RowPosture
-from marey.generation.postured import LONGEST_S, drawn_posture, gestures_s, on_posture
+from marey.generation.postured import LONGEST_S, drawn_posture, gestures_s, gone_on, on_posture
 from marey.motion.features import HUMANML3D_263, encode_all
 
 LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
 LIES = dict.fromkeys((BACK, FRONT, PRONE), 0.125)
-LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, FOURS: 0.47, CROUCH: 0.52, **LIES}
+LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, FOURS: 0.47, PLANK: 0.4, CROUCH: 0.52, **LIES}
 STANDS_M, NEAR_M = 0.93, 0.15
 
 
@@ -149,3 +149,19 @@ def test_a_posture_that_is_only_passed_is_left_soon(seed: int) -> None:
         int((joints_of(RowPosture("", BACK, end, seed=seed))[:, 15, 1] < 0.25).sum()) for end in (BACK, FLOOR)
     )
     assert passes < stays
+
+
+@pytest.mark.parametrize(("action", "leaves"), [("push-ups", PLANK), ("crawl", FOURS), ("sit-ups", BACK)])
+@pytest.mark.parametrize("end", ["", FRONT, CROUCH])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_movement_that_ends_low_goes_on_from_there(action: str, leaves: str, end: str, seed: int) -> None:
+    made = drawn_whole(LAYOUT, action, FineWish(prompt="", beside=("", "goes on")), seed, None)
+    assert made is not None
+    features = gone_on(made.features, LAYOUT, RowPosture(leaves=leaves, end=end, seed=seed))
+    assert np.array_equal(features[: len(made.features)], made.features)
+    joints = LAYOUT.decode(features)[len(made.features) - 2 :]
+    assert joints[-1, 0, 1] == pytest.approx(LOW.get(end, STANDS_M), abs=NEAR_M)
+    assert joints[..., 1].min() > -0.04
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35, "no joint leaps"
+    same = RowPosture(leaves=leaves, end=leaves, seed=seed)
+    assert gone_on(made.features, LAYOUT, same) is made.features

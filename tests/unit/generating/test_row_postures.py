@@ -69,7 +69,7 @@ def test_who_lies_sits_up_once_and_stays() -> None:
         ("upright", "upright", "upright"),
         ("upright", "", ""),
     ]
-    assert postures(("walk", "walks"), ("sit-ups", "does sit-ups")) == [("", "", "")] * 2
+    assert postures(("walk", "walks"), ("sit-ups", "does sit-ups")) == [("", "", ""), ("", "", "back")]
 
 
 def test_who_walks_backward_falls_on_the_back() -> None:
@@ -107,8 +107,8 @@ def test_who_is_in_a_posture_at_first_does_not_come_to_it() -> None:
 
 def test_who_crawled_lies_there() -> None:
     crawl, lie, rises = row_postures([("crawl", "crawls"), ("lie", "stays lying flat"), ("get-up", "gets up")], 1)
-    assert crawl == RowPosture(seed=1)
-    assert (lie.begin, lie.own, lie.end, lie.meets) == ("front", "front", "front", False)
+    assert crawl == RowPosture(end="fours", leaves="fours", seed=1)
+    assert (lie.begin, lie.own, lie.end, lie.meets) == ("fours", "front", "front", True)
     assert rises.meets
 
 
@@ -149,3 +149,52 @@ def test_who_is_low_goes_on_from_there(row: tuple[str, str], entry: str, low: tu
 @pytest.mark.parametrize("row", [("reach-up", "reaches up"), ("raise-arm", "raises a hand"), ("nod", "nods")])
 def test_arms_and_head_are_moved_on_the_back(row: tuple[str, str]) -> None:
     assert postures(("lie", "lies on his back"), row) == [("back", "back", "back")] * 2
+
+
+@pytest.mark.parametrize(
+    ("low", "posture"),
+    [
+        (("push-ups", "does push-ups"), "plank"),
+        (("crawl", "crawls"), "fours"),
+        (("crawl", "crawls on his belly"), "front"),
+        (("sit-ups", "does crunches"), "back"),
+    ],
+)
+def test_who_ends_low_goes_on_from_there(low: tuple[str, str], posture: str) -> None:
+    ends, up = row_postures([low, ("get-up", "gets up")], 1)
+    assert (ends.leaves, ends.end, ends.goes_on, ends.is_drawn) == (posture, posture, False, False)
+    assert (up.begin, up.own, up.meets, up.is_drawn) == (posture, "", True, True)
+    walks = row_postures([low, ("walk", "walks away")], 1)
+    assert (walks[0].goes_on, walks[0].end, walks[1].begin) == (True, "", "")
+    again = row_postures([low, ("push-ups", "does push-ups")], 1)
+    assert (again[0].end, again[1].meets) == ("plank", True)
+
+
+def test_a_fall_goes_on_to_what_follows() -> None:
+    falls, crawls = row_postures([("die", "trips and falls"), ("crawl", "crawls away")], 1)
+    assert (falls.own, falls.end, falls.goes_on, crawls.meets) == ("front", "fours", True, True)
+    assert not row_postures([("die", "trips and falls"), ("get-up", "gets up")], 1)[0].goes_on
+
+
+@pytest.mark.parametrize("said", ["wakes up", "she wakes", "awakens", "slowly wakes up", "opens her eyes"])
+def test_who_wakes_stays_where_the_body_lies(said: str) -> None:
+    lies, wakes, up = row_postures([("lie", "lies asleep"), ("get-up", said), ("sit-ups", "sits up")], 1)
+    assert (lies.own, wakes.begin, wakes.own, wakes.is_drawn) == ("back", "back", "back", True)
+    assert (up.begin, up.own) == ("back", "upright")
+    assert postures(("get-up", said), ("sit-ups", "sits up"))[0] == ("back", "back", "back")
+
+
+def test_who_wakes_and_gets_up_rises() -> None:
+    assert postures(("lie", "lies asleep"), ("get-up", "wakes and gets up"))[1] == ("back", "", "")
+
+
+@pytest.mark.parametrize("said", ["gets up in a crouch", "rises into a low crouch", "gets up crouching"])
+@pytest.mark.parametrize("low", [("crawl", "crawls"), ("lie-down", "lies down"), ("push-ups", "does push-ups")])
+def test_who_rises_to_a_crouch_stays_in_it_to_creep(low: tuple[str, str], said: str) -> None:
+    assert postures(low, ("get-up", said), ("sneak", "creeps on"))[1][1:] == ("crouch", "crouch")
+
+
+@pytest.mark.parametrize("low", [("crawl", "crawls"), ("push-ups", "does push-ups")])
+def test_who_is_on_the_hands_stands_up_to_use_them(low: tuple[str, str]) -> None:
+    assert postures(low, ("wave", "waves")) == [("", "", ""), ("", "", "")]
+    assert postures(low, ("idle", "pauses"))[1][0] != ""

@@ -18,7 +18,7 @@ from marey.generation.paced import SPEEDS
 from marey.generation.port import Request
 from marey.generation.posture import NO_POSTURE
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
-from marey.generation.shots.sequences import WAITS_S
+from marey.generation.shots.sequences import WAITS_S, as_timeline
 from marey.generation.shots.timelines import TimelineMotion
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.motion.edits.timeline_rows import cut_rows
@@ -307,3 +307,16 @@ def test_the_dead_do_not_walk(generator: Any, rows: list[tuple[str, str]], left:
     request = resolve_request(generator, Request(sequence_of(generator, *rows), 3))
     assert request.timeline is not None
     assert [row.text.said for row in request.timeline] == [said for _, said in rows[:left]]
+
+
+@pytest.mark.parametrize("said", ["stumbles", "trips over a root", "slips", "he loses his footing", "suddenly trips"])
+def test_a_trip_and_the_fall_behind_it_are_one(generator: Any, said: str) -> None:
+    width = generator.limits.text_width
+    words = ("a person runs", said, "falls on his face")
+    movements = [text_of(part, width) for part in words]
+    movements[0] = replace(movements[0], rewritten="a person runs")
+    movements[2] = replace(movements[2], rewritten="a person dies")
+    text = replace(text_of(f"a person runs, {said} and falls on his face", width), movements=tuple(movements))
+    rows = as_timeline(generator, Request(text, 1)).timeline
+    assert rows is not None
+    assert [row.text.prompt for row in rows] == ["a person runs", f"{said} and falls on his face"]

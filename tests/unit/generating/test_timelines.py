@@ -18,7 +18,14 @@ from marey.generation.candidates import DrawPlan, best_clips, draw_clips
 from marey.generation.export import finish
 from marey.generation.port import Limits, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
-from marey.generation.shots.timelines import even_parts, gaps_of, generate_timelines, plan_timeline, row_requests
+from marey.generation.shots.timelines import (
+    even_parts,
+    gaps_of,
+    generate_timelines,
+    is_onward,
+    plan_timeline,
+    row_requests,
+)
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.items.values import MAX_SEED
 from marey.registry import get_model, model_names, resolve
@@ -281,3 +288,20 @@ def test_each_row_needs_features(generator: Any) -> None:
     rows: Sequence[Any] = timeline_rows(read_timeline(WALK))
     with pytest.raises(InvalidInput, match="1 prompts were parsed, and the timeline has 3 rows"):
         timeline_request(rows, [text_of("walk", 8)], 0, None)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "goes_on"),
+    [
+        ("a person runs", "a person dies", True),
+        ("a person walks forward", "a person dies", True),
+        ("a person runs", "a person does a dive roll", True),
+        ("a person runs", "a person throws a stone", True),
+        ("a person walks forward", "a person throws a stone", False),
+        ("a person bows", "a person dies", False),
+        ("a person runs", "a person bows", False),
+    ],
+)
+def test_falls_rolls_and_throws_go_out_of_the_way_before_them(before: str, after: str, *, goes_on: bool) -> None:
+    one, other = (replace(text_of(words, 4), rewritten=words) for words in (before, after))
+    assert is_onward(one, other) is goes_on

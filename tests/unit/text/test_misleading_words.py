@@ -299,8 +299,8 @@ def test_who_lies_and_rolls_over_lies(prompt: str, read: str) -> None:
     [
         ("drops to the knees, then falls forward dead", "falls dead over the knees forward"),
         ("sinks to his knees and then falls on his side", "falls dead over the knees sideways"),
-        ("falls to his knees and weeps", "falls to his knees and weeps"),
-        ("drops to his knees and falls asleep", "drops to his knees and falls asleep"),
+        ("falls to his knees and weeps", "kneels down quickly on both knees and weeps"),
+        ("drops to his knees and falls asleep", "kneels down quickly on both knees and falls asleep"),
     ],
 )
 def test_a_fall_over_the_knees_is_one(prompt: str, read: str) -> None:
@@ -406,3 +406,24 @@ def test_a_number_of_spins_is_no_turn_to_face_back(prompt: str, read: str) -> No
 @pytest.mark.parametrize("prompt", ["sneak walk left", "sneak left", "crouch walk to the left"])
 def test_a_crouched_way_to_a_side_is_named_as_one(prompt: str) -> None:
     assert " sideways " in without_misleading(prompt)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("a woman falls to her knees", "a woman kneels down quickly on both knees"),
+        ("he slowly sinks down to his knees and prays", "he slowly kneels down on both knees and prays"),
+        ("the king collapsing onto his knees", "the king kneeling down quickly on both knees"),
+        ("she drops heavily to her knees, then looks up", "she kneels down heavily on both knees, then looks up"),
+        ("go down on both knees", "kneel down on both knees"),
+    ],
+)
+def test_who_falls_to_the_knees_kneels(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read
+
+
+@pytest.mark.parametrize(
+    "prompt", ["he drops to his knees and elbows", "she falls to one knee", "he goes onto his hands and knees"]
+)
+def test_other_ways_to_the_floor_stay(prompt: str) -> None:
+    assert without_misleading(prompt) == prompt

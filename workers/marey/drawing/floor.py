@@ -286,6 +286,14 @@ def lying_front(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[St
     return lying, down, (*up, (0.7 * pace, STAND))
 
 
+def planking(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the hands and toes, the steps to it from standing, and those back."""
+    pace = rng.uniform(0.85, 1.1)
+    way = _prone_way(rng, pace)
+    up = (way[1], (0.7 * pace, _HALF_KNEEL), (0.7 * pace, STAND))
+    return way[-1][1], tuple(way), up
+
+
 def aiming_prone(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
     """Return a posture on the front with the chest raised on the elbows and both hands at a gun ahead, the steps to it
     from one flat on the front whose hands are beside the chest, and those back; these go over that one."""

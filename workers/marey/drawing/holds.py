@@ -17,6 +17,7 @@ from marey.drawing.floor import (
     half_kneeling,
     lying_back,
     lying_front,
+    planking,
     rising_from_seat,
     seated_on_floor,
     slid,
@@ -29,11 +30,13 @@ from marey.drawing.sequels import Sequel, Step
 SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
 RIGHT_KNEE = "right-knee"
 CROUCH, BACK, FRONT, PRONE, SLIDE, FOURS = "crouch", "back", "front", "prone", "slide", "fours"
+PLANK = "plank"
 """Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
 on one, the left or the right; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on
-the seat behind the feet, after a slide; on hands and knees."""
+the seat behind the feet, after a slide; on hands and knees; on hands and toes."""
 SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE, RIGHT_KNEE, FOURS})
 LYING = frozenset({BACK, FRONT, PRONE})
+ON_HANDS = frozenset({FOURS, PLANK})
 BEGINS_S, STANDS_S = 0.3, 0.5
 """Seconds in which a body waits before it moves, in a posture and standing."""
 SLIDES_M, SLIDES_S = 2.4, 1.2
@@ -108,10 +111,20 @@ def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
         return (*_way(holds, begin, UPRIGHT), *_way(holds, UPRIGHT, end))
     if begin == FRONT and end == FOURS:
         return (*holds[FRONT].up[:2], (PASSES_S, holds[FOURS].low))
+    if begin == FRONT and end == PLANK:
+        return holds[FRONT].up[:3]
     if begin == FRONT:
-        return (*holds[FRONT].up[:-1], (PASSES_S, holds[end].low))
+        return (*holds[FRONT].up[:-1], *(holds[end].down if end in SITTING else ((PASSES_S, holds[end].low),)))
+    if {begin, end} == {PLANK, FOURS}:
+        return ((PASSES_S, holds[end].low),)
     if end == FRONT:
-        return holds[FRONT].down
+        return holds[FRONT].down[2:] if begin in ON_HANDS else holds[FRONT].down
+    if end == PLANK and begin != FRONT:
+        return holds[PLANK].down
+    if begin == PLANK:
+        return (*holds[PLANK].up[:-1], *(holds[end].down if end in SITTING else ((PASSES_S, holds[end].low),)))
+    if begin == FOURS and end == CROUCH:
+        return (*holds[FOURS].up[:-1], (PASSES_S, holds[CROUCH].low))
     if {begin, end} == {SEAT, FOURS}:  # over the feet
         return (*holds[begin].up[:-1], *holds[end].down)
     if {begin, end} & SITTING and {begin, end} & KNEELING:  # legs do not pass under the hips
@@ -160,4 +173,5 @@ _HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], 
     PRONE: aiming_prone,
     SLIDE: slid,
     FOURS: _on_fours,
+    PLANK: planking,
 }

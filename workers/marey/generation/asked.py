@@ -27,7 +27,7 @@ from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
-from marey.generation.postured import GOING_ON, drawn_posture, on_posture
+from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_posture
 from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
@@ -243,6 +243,8 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
     fine = wish.fine(request)
     held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
     drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
+    if drawn is not None and request.open:
+        drawn = replace(drawn, features=gone_on(drawn.features, generator.layout, request.held))
     if drawn is None or held or not any(request.beside):
         return drawn
     if not request.beside[0]:  # who stands before others does so for a moment

@@ -18,6 +18,7 @@ class RowPosture:
         apart: the row before ends otherwise than this one begins.
         falls: the movement comes to its posture by itself.
         fires: shots go off in the posture.
+        leaves: in which a movement ends that is drawn by itself; empty = on the feet, or in `own`.
         seed: of all rows, so that they meet in the same posture.
     """
 
@@ -29,6 +30,7 @@ class RowPosture:
     apart: bool = False
     falls: bool = False
     fires: bool = False
+    leaves: str = ""
     seed: int = 0
 
     @property
@@ -40,6 +42,17 @@ class RowPosture:
     def is_drawn(self) -> bool:
         """True if the whole movement is a change of posture, or a wait in one."""
         return bool(self.begin or self.own) and not (self.gesture or self.falls)
+
+    @property
+    def comes_to(self) -> str:
+        """Name of the posture in which the body is behind the movement, before it goes on to `end`."""
+        return self.own or self.leaves
+
+    @property
+    def goes_on(self) -> bool:
+        """True if a movement that is drawn by itself ends in another posture than the next one begins in."""
+        low = self.own if self.falls else self.leaves
+        return bool(low) and self.end != low
 
     @property
     def carries(self) -> bool:

@@ -36,6 +36,9 @@ LONGEST_S = 4.2
 """Seconds of a gesture that goes on and on, in a posture."""
 RESTS, ACTS = 12.0, 32.0
 """Degrees by which an arm is off its place at the beginning of a gesture, at which it acts in nothing and in full."""
+MEETS, LANDS_S = 8, 0.4
+"""Frames in which a movement passes into the next one that begins in the same posture, and seconds for which one that
+ends low stays so before it goes on."""
 PASSES_S = 0.12
 """Standard deviation of the filter by which an arm passes from the posture into the gesture, seconds."""
 BENDS = 40.0
@@ -106,6 +109,32 @@ def on_posture(
     solved = body.solved()
     solved[:, LEG_JOINTS] = joints[:, LEG_JOINTS]  # solved knees of who kneels go through the floor
     return encode_all(layout, solved)
+
+
+def gone_on(features: Float32, layout: FeatureLayout, held: RowPosture) -> Float32:
+    """Return features (T', D) of a movement that ends low, and of what leads to the posture in which the next begins.
+
+    Args:
+        features: (T, D) of the movement, drawn by itself.
+        layout: of the features, on the skeleton of HumanML3D.
+        held: postures of the movement.
+    """
+    if not held.goes_on:
+        return features
+    low = held.comes_to
+    after = _fitted(RowPosture(low, low, held.end, seed=held.seed), LANDS_S, None)
+    frames = np.concatenate([features, encode_all(layout, after)]).astype(np.float32)
+    pass_into(frames, len(features), MEETS)
+    return frames
+
+
+def pass_into(frames: Float32, start: int, count: int) -> None:
+    """Let features (T, D) pass from the last frame before `start` into those behind it, in so many frames; both are of
+    one posture."""
+    count = min(count, len(frames) - start)
+    if start and count > 0:
+        share = (np.arange(1, count + 1) / (count + 1))[:, None]
+        frames[start : start + count] = (1 - share) * frames[start - 1] + share * frames[start : start + count]
 
 
 def gestures_s(said: str) -> float:

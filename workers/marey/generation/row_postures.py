@@ -21,6 +21,8 @@ from marey.drawing.holds import (
     KNEE,
     KNEES,
     LYING,
+    ON_HANDS,
+    PLANK,
     PRONE,
     RIGHT_KNEE,
     SEAT,
@@ -66,8 +68,12 @@ LAIN = frozenset(
     {STANDING, "wave", "clap", "laugh", "shiver", "talk", "reach-up", "reach-forward", "raise-arm", "cheer", "nod"}
 )
 """Actions that are done on the back."""
-ENTRIES: Mapping[str, str] = {"crawl": FOURS, "sit-ups": BACK}
+ENTRIES: Mapping[str, str] = {"crawl": FOURS, "sit-ups": BACK, "push-ups": PLANK}
 """Postures in which movements begin that are drawn by themselves."""
+LEAVES: Mapping[str, str] = {"push-ups": PLANK, "crawl": FOURS, "sit-ups": BACK}
+"""Postures in which movements end that are drawn by themselves."""
+CREEPS = frozenset({"sneak"})
+"""Actions that begin crouched."""
 _UP = re.compile(
     r"\b(?:gets?|stands?|rises?|scrambles?|jumps?|springs?|clambers?|struggles?|climbs?|leaps?|pushes|straightens?"
     r"|picks? (?:him|her|them|it)sel\w+)\b.*\b(?:up|upright|feet)\b|\brises?\b|^\W*stands?\W*$"
@@ -78,9 +84,14 @@ _SLIDES = re.compile(
     r"|\bbaseball slide\b|\bslide tackle\w*"
 )
 _LIES = re.compile(r"\b(?:lying|lies|laying|in bed|wakes? up)\b")
+_WAKES = re.compile(r"\b(?:wak(?:es?|ing)|awak(?:es?|ens?|ening)|woke)\b|\bopens? (?:his|her|their) eyes\b")
+"""Words of who wakes: that alone moves no body that lies."""
+_STAYS_LOW = re.compile(r"\b(?:in|into|to) (?:a|an|his|her|their) (?:\w+ )?(?:crouch|squat)\b|\bcrouch(?:ed|ing)\b")
+"""Words of who rises as far as a crouch."""
 _BEING = re.compile(r"\b(?:sitting|seated|kneeling|crouch(?:ing|ed)|squatting|lying)\b(?! down)")
 """Words of who is in a posture, not of who comes to it."""
 _ONE_KNEE = re.compile(r"\bone knee\b|\ba knee\b|\bpropos\w+|\bknight\w*|\brifle|\bgun\b|\baim\w*|\bpistol|\bbow\b")
+_BACK = re.compile(r"\b(?:back|supine|face[ -]?up)\b")
 _GOES = re.compile(
     r"\b(?:walk|run|leave|exit|go|step|jump|march|dash|flee|rush|jog|climb|hop|danc|skip|move|turn|spin|kick|charg|escap"
     r"|return|approach|enter|crawl|roll|swim|fall|lie|kneel|crouch|squat)\w*\b"
@@ -101,12 +112,18 @@ def row_postures(rows: Sequence[Row], seed: int) -> list[RowPosture]:
         before = rows[number - 1] if number else None
         after = rows[number + 1] if number + 1 < len(rows) else None
         found.append(replace(_held(row, (before, after), begin), seed=seed))
-        begin = found[-1].own
+        begin = found[-1].comes_to
     last = RowPosture(begin=begin)
+    creeps = [*(row[0] in CREEPS for row in rows[1:]), False]
     return [
-        replace(held, end="" if after.apart else after.begin or after.enters)
-        for held, after in pairwise([*found, last])
+        replace(held, end=held.own if crept and held.own == CROUCH else _entered(after))
+        for crept, (held, after) in zip(creeps, pairwise([*found, last]), strict=True)
     ]
+
+
+def _entered(after: RowPosture) -> str:
+    """Return the posture in which a movement begins, so far as the one before has to come to it."""
+    return "" if after.apart else after.begin or after.enters
 
 
 def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPosture:
@@ -120,8 +137,10 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
     (action, said), (before, _) = row, beside
     own = _posture(row, beside, begin)
     if own:
-        crawled = before is not None and before[0] == "crawl"
-        there = crawled or (before is None and (action in THERE or _BEING.search(said) is not None))
+        crawled = own == PRONE and _crawls_low(before)
+        there = crawled or (
+            before is None and (action in THERE or _BEING.search(said) is not None or _only_wakes(said))
+        )
         return RowPosture(
             own if there else begin,
             own,
@@ -129,8 +148,11 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
             falls=action == "die" and not begin and not crawled,
             fires=action == "shoot",
         )
+    leaves = FRONT if _crawls_low(row) else LEAVES.get(action, "")
     if begin and not stays(row, begin) and action in ENTRIES:
-        return RowPosture(enters=FRONT if action == "crawl" and is_low_crawl(said) else ENTRIES[action])
+        return RowPosture(enters=FRONT if _crawls_low(row) else ENTRIES[action], leaves=leaves)
+    if leaves:
+        return RowPosture(leaves=leaves)
     if not begin or not stays(row, begin):
         return RowPosture(begin if begin and rises(row) else "")
     if action == STANDING:
@@ -148,15 +170,26 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
         return RIGHT_KNEE if side == RIGHT else KNEE if side or _ONE_KNEE.search(said) else KNEES
     if action == "die":
         return FRONT if falls_on_front(said, "" if before is None else before[1]) else BACK
+    if begin in LYING and _only_wakes(said):
+        return begin
+    if begin and rises(row) and _STAYS_LOW.search(said):
+        return CROUCH
     if action in AIMS and (begin in (FRONT, PRONE) or _crawls_low(before)):
         return PRONE
     if action in ("lie", "lie-down"):
-        return FRONT if ends_on_front(said) or (before is not None and before[0] == "crawl") else BACK
+        on_front = ends_on_front(said) or (begin in (FOURS, FRONT, PLANK) and not _BACK.search(said))
+        return FRONT if on_front else BACK
     if action == "squat" and after is not None and (rises(after) or after[0] in GESTURES):
         return CROUCH
     if _SITS_UP.search(said) and (action == "sit-ups" or not action) and begin in LYING:
         return UPRIGHT
-    if not action and _LIES.search(said) and after is not None and (_SITS_UP.search(after[1]) or rises(after)):
+    wakes = _only_wakes(said) and action in ("", *RISING)
+    if (
+        (wakes or (not action and _LIES.search(said)))
+        and not begin
+        and after is not None
+        and (_SITS_UP.search(after[1]) or rises(after))
+    ):
         return BACK
     return POSTURES.get(action, "")
 
@@ -164,6 +197,11 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
 def _crawls_low(row: Row | None) -> bool:
     """Return True if a movement is a crawl on the belly."""
     return row is not None and row[0] == "crawl" and is_low_crawl(row[1])
+
+
+def _only_wakes(said: str) -> bool:
+    """Return True if a movement is that of waking, and not of rising."""
+    return _WAKES.search(said) is not None and _UP.search(said) is None
 
 
 def is_as_alone(held: RowPosture, action: str) -> bool:
@@ -180,12 +218,12 @@ def is_as_alone(held: RowPosture, action: str) -> bool:
 def rises(row: Row) -> bool:
     """Return True if a movement is that of standing up."""
     action, said = row
-    return action in RISING or (action in ("", STANDING) and _UP.search(said) is not None)
+    return (action in RISING and not _only_wakes(said)) or (action in ("", STANDING) and _UP.search(said) is not None)
 
 
 def stays(row: Row, begin: str) -> bool:
     """Return True if a movement is done in the posture in which the body is."""
     action, said = row
-    if rises(row) or (begin in LYING and action not in (LAIN if begin == BACK else {STANDING})):
+    if rises(row) or (begin in LYING | ON_HANDS and action not in (LAIN if begin == BACK else {STANDING})):
         return False
     return action == STANDING or action in GESTURES or (not action and not _GOES.search(said))

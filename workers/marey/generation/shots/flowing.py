@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
 from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.filters import smooth
 from marey.motion.rotations import about, normalize, rotate
 from marey.posing.limbs import FPS, LEVEL
 from marey.posing.standing import ARMS, LEGS, StandingBody, eased
@@ -22,6 +23,8 @@ from marey.posing.standing import ARMS, LEGS, StandingBody, eased
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
 
+BENT_ON = "bent on"
+"""Name of the posture in which a body stays that is hit and does not come upright again, in the record of its row."""
 ACTS = 0.6
 """Share of its farthest way from rest behind which a movement comes back, and at which it is under way."""
 SLOW = 0.6
@@ -51,6 +54,16 @@ STEPS_S, METRES_S = 0.35, 0.8
 """Seconds of a way with steps, and more for each metre of the longest."""
 STANDS_M, ON_FLOOR_M = 0.6, 0.13
 """Metres of the pelvis of a body that stands at least, and of its lower ankle at most."""
+LEAD = 12
+"""Frames of a way that belong to the fall or roll behind it: it begins on the feet."""
+ONWARD, STRIDE, NEAR = 10, 14, 3
+"""Frames of the way out of a walk or run at most, frames near its end that are searched for its beginning, and those
+before a body goes down that are searched for its end."""
+GOES_M, GOING, SPEED_S = 0.5, 0.8, 0.1
+"""Metres a second of a body that goes, at least, the share of its median speed at which it still does, and the standard
+deviation of the filter of its speed, seconds."""
+FALLS_M, DOWN_M = 0.35, 0.27
+"""Metres by which a body that falls or rolls goes down, and by which it is down when it goes on out of a way."""
 WIDE = 110.0
 """Degrees by which an arm turns on that way that passes before the body."""
 HEAD = 15
@@ -80,6 +93,7 @@ def flowing(
     whole: tuple[bool, bool] = (False, False),
     entered: int = 0,
     down: bool = False,
+    onward: bool = False,
 ) -> JoinedRows | None:
     """Return two drawn movements that go on into each other; None if a body does not stand between them.
 
@@ -89,26 +103,42 @@ def flowing(
         layout: of the features.
         whole: nothing is left out of the first, and of the second.
         entered: frames at the beginning of the first in which it goes on from another one.
-        down: the body goes to the floor in the second out of the bent posture of the first.
+        down: the body goes to the floor, or bends on, in the second out of the bent posture of the first.
+        onward: the first is a way, out of whose speed the second goes on.
     """
     first, second = (layout.decode(each).astype(np.float64) for each in (before, after))
-    if not (_stands(first[-1]) and _stands(second[0])) or min(len(first), len(second)) < LEAST:
+    if not ((onward or _stands(first[-1])) and _stands(second[0])) or min(len(first), len(second)) < LEAST:
         return None
     if len(first) - entered < LEAST // 2:
         return None
     ends, begins = entered + _ends(first[entered:], whole=whole[0]), _begins(second, whole=whole[1])
     if down:
-        ends, begins = _bent(first), _lowered(second)
+        ends, begins = (_bent(first), _lowered(second)) if _falls(second) else (_bowed(first), _bending(second))
+    if onward:
+        ends, begins = _under_way(first), _lowered(second, DOWN_M)[-NEAR:] if _falls(second) else begins
+        if not len(ends):
+            return None
     apart = _apart(_at_feet(first)[ends], _at_feet(second)[begins])
     lost = (ends - ends[0])[:, None] + (begins[-1] - begins)[None]
     cost = np.sqrt((apart**2).mean(-1)) + TIME / FPS * lost
     one, other = np.unravel_index(int(cost.argmin()), cost.shape)
     end, begin = int(ends[one]), int(begins[other])
     count = _count(apart[one, other])
-    way = _way(first, second, end, begin, count)
-    joints = np.concatenate([first[:end], way, _beside(first[end], second, begin)[begin + 1 :]])
+    if down and not _falls(second):  # it is as bent all the way
+        begin = min(begin + count, int(_bending(second)[-1]))
+    second = _beside(first[end], second, begin)
+    if onward:
+        count = min(count, ONWARD) if _falls(second) else count
+        second = second + _ahead(first, second, end, begin, count)
+    way = _way(first, second, end, begin, count, onward=onward)
+    joints = np.concatenate([first[:end], way, second[begin + 1 :]])
     features = encode_all(layout, joints)
-    return JoinedRows(features[:end], features[end:], count)
+    border = end
+    if onward and _falls(second):
+        border = max(end - LEAD, LEAST // 2)
+    elif down and not _falls(second):  # who is hit is bent by it
+        border = end + count
+    return JoinedRows(features[:border], features[border:], max(count + end - border, 1))
 
 
 def without_rest(features: Float32, layout: FeatureLayout, *, first: bool, last: bool) -> Float32:
@@ -175,10 +205,50 @@ def _bent(joints: Array) -> NDArray[np.intp]:
     return np.flatnonzero(away >= HELD * away.max())[-1:]
 
 
-def _lowered(joints: Array) -> NDArray[np.intp]:
+def _lowered(joints: Array, metres: float = LOWERED_M) -> NDArray[np.intp]:
     """Return the frames in which a body begins to go down."""
-    begins = np.flatnonzero(joints[0, 0, 1] - joints[:, 0, 1] > LOWERED_M)
+    begins = np.flatnonzero(joints[0, 0, 1] - joints[:, 0, 1] > metres)
     return np.arange(1, max(int(begins[0]) if len(begins) else 1, 2))
+
+
+def _falls(joints: Array) -> bool:
+    """Return True if a body goes down to the floor."""
+    return bool((joints[0, 0, 1] - joints[:, 0, 1]).max() > FALLS_M)
+
+
+def _under_way(joints: Array) -> NDArray[np.intp]:
+    """Return frames near the end of a way in which a body goes at full speed, and some time on; none where it stands
+    still."""
+    speed = np.linalg.norm(_velocity(joints), axis=-1)
+    if np.median(speed) < GOES_M:
+        return np.zeros(0, np.intp)
+    last = int(np.flatnonzero(speed >= GOING * np.median(speed))[-1]) - ONWARD // 2
+    return np.arange(max(last - STRIDE, LEAST // 2), max(last, LEAST // 2 + 1))
+
+
+def _velocity(joints: Array) -> Array:
+    """Return the velocity (T, 3) of the pelvis over the floor, metres a second."""
+    return smooth(np.gradient(joints[:, 0] * LEVEL, axis=0) * FPS, SPEED_S * FPS)
+
+
+def _ahead(first: Array, second: Array, end: int, begin: int, count: int) -> Array:
+    """Return how far a movement is moved over the floor (3,), metres, so that the pelvis comes to where it begins at a
+    speed that changes evenly."""
+    goes, comes = _velocity(first)[end], _velocity(second)[begin]
+    there = first[end, 0] + (goes + comes) / 2 * (count - 1) / FPS
+    return (there - second[begin, 0]) * LEVEL
+
+
+def _bowed(joints: Array) -> NDArray[np.intp]:
+    """Return the last frame in which the head of a body is about as low as it comes."""
+    sunk = joints[-1, HEAD, 1] - joints[:, HEAD, 1]
+    return np.flatnonzero(sunk >= HELD * sunk.max())[-1:]
+
+
+def _bending(joints: Array) -> NDArray[np.intp]:
+    """Return the frames in which a body that stands comes to be as far from rest as it does."""
+    away = _away(joints, 0)
+    return np.arange(1, max(int((away >= HELD * away.max()).argmax()), 2))
 
 
 def _at_feet(joints: Array) -> Array:
@@ -207,13 +277,18 @@ def _beside(pose: Array, joints: Array, frame: int) -> Array:
     return rotate(about("Y", np.radians(degrees)), joints - here) + there
 
 
-def _way(first: Array, second: Array, end: int, begin: int, count: int) -> Array:
+def _way(first: Array, second: Array, end: int, begin: int, count: int, *, onward: bool) -> Array:
     """Return so many joints (count, 22, 3) of the way from frame `end` of one movement to frame `begin` of another:
-    both go on meanwhile."""
+    both go on meanwhile, and the second stands where it goes on; `onward`: from one speed to the other."""
     leaves = first[np.minimum(end + np.arange(count), len(first) - 1)]
-    comes = _beside(first[end], second, begin)[np.maximum(begin + 1 + np.arange(count) - count, 0)]
+    comes = second[np.maximum(begin + 1 + np.arange(count) - count, 0)]
     share = np.arange(1, count + 1) / (count + 1)
     way = (1 - eased(share))[:, None, None] * leaves + eased(share)[:, None, None] * comes
+    if onward:
+        time = np.arange(count)[:, None] / FPS
+        goes, comes_at = _velocity(first)[end], _velocity(second)[begin]
+        pelvis = first[end, 0] + goes * time + (comes_at - goes) * time**2 * FPS / (2 * (count - 1))
+        way += ((pelvis - way[:, 0]) * LEVEL)[:, None]
     steps = {side: float(np.linalg.norm((comes[-1, leg[2]] - leaves[0, leg[2]]) * LEVEL)) for side, leg in LEGS.items()}
     for number, side in enumerate(sorted(steps, key=lambda each: -steps[each])):
         _, _, ankle, toe = LEGS[side]

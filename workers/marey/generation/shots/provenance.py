@@ -10,6 +10,7 @@ from marey.generation.asked import action_of
 from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.row_postures import is_as_alone
+from marey.generation.shots.flowing import BENT_ON
 from marey.generation.shots.freezing import AS_BEFORE
 from marey.generation.shots.timelines import gaps_of, plan_timeline
 from marey.generation.timed import TimedText
@@ -96,7 +97,7 @@ def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> Motion
 def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, Any]]) -> PromptMatch:
     """Return the match of a row without the transition that it begins with: who stops first ends a step. Movements that
     are no action have none, nor has one whose rule describes a body that is in another posture before or after."""
-    if row.changes.get("posture") == AS_BEFORE:
+    if row.changes.get("posture") in (AS_BEFORE, BENT_ON):
         return PromptMatch()
     if names_movement(row.text.said) or not is_as_alone(row.held, action_of(row.text)):
         return PromptMatch()

@@ -49,6 +49,12 @@ _ON_SPOT = re.compile(
     r"|high five|twice|times|backwards?|onto|into|off|down|up)\b"
 )
 """Words of jumps that are none."""
+_TRIPS = re.compile(
+    r"\W*(?:(?:(?:a|the|this) )?\w+ )?(?:(?:then|suddenly) )*"
+    r"(?:trip(?:s|ping)|stumbl(?:es|ing)|slip(?:s|ping)|stagger(?:s|ing)|los(?:es|ing) \w+ (?:balance|footing))"
+    r"(?: (?!out\b|off\b|away\b|into\b|on (?:his|her|their)\b).*)?\W*"
+)
+"""Words of a body that loses its footing."""
 _DEAD = re.compile(r"\b(?:dead|dies|die|died|dying|death|killed|slain|lifeless(?:ly)?)\b")
 _LIVES = re.compile(
     r"\b(?:reviv\w*|resurrect\w*|reanimat\w*|respawn\w*|(?:to|back to) life|alive|zombies?|undead|ghosts?|spirits?"
@@ -163,16 +169,22 @@ def _leaping(movements: Sequence[TextFeatures]) -> tuple[TextFeatures, ...]:
 
 
 def _merged_falls(text: TextFeatures) -> tuple[TextFeatures, ...]:
-    """Return the movements of a text; a hit and the fall behind it are one: the body does not recover in between."""
+    """Return the movements of a text; a hit or a trip and the fall behind it are one: the body does not recover in
+    between."""
     found: list[TextFeatures] = []
     for movement in text.movements:
-        if found and action_of(movement) == "die" and action_of(found[-1]) == "flinch":
+        if found and action_of(movement) == "die" and _fells(found[-1]):
             found[-1] = replace(movement, prompt=f"{found[-1].prompt} and {movement.prompt}")
         elif found and action_of(movement) == "die":
             found.append(replace(movement, prompt=_with_words_before(text.prompt, found[-1].prompt, movement.prompt)))
         else:
             found.append(movement)
     return tuple(found)
+
+
+def _fells(movement: TextFeatures) -> bool:
+    """Return True if a movement is what makes a body fall."""
+    return action_of(movement) == "flinch" or _TRIPS.fullmatch(movement.said.lower()) is not None
 
 
 def _shared(frames: int, lengths: Sequence[int]) -> list[int]:

@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
 from marey.generation.asked import action_of, changes_of, generate_as_asked
+from marey.generation.footing import RUNS
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
-from marey.generation.shots.flowing import flowing, without_rest
+from marey.generation.postured import MEETS, pass_into
+from marey.generation.shots.flowing import BENT_ON, flowing, without_rest
 from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.levels import lifted, raised_rows
-from marey.generation.shots.raised_arms import RAISING, TURNING, kept_arms
+from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
@@ -43,8 +45,12 @@ stand up or to go down at this speed."""
 
 BENT, LOWER = frozenset({"bend-over"}), frozenset({KNEES, KNEE, FLOOR, BACK, FRONT, CROUCH, FOURS})
 """Actions from whose bent trunk a body goes on down, and the postures that it comes to."""
-MEETS = 8
-"""Frames in which a row passes into the next one that begins in the same posture."""
+
+
+STRUCK = frozenset({"flinch"})
+"""Actions of who is hit: that bends a body, which then bends on."""
+FALLING, THROWING = frozenset({"die", "roll"}), frozenset({"throw"})
+"""Drawn movements that go out of a walk or run, and out of a run alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,6 +336,7 @@ class _Timeline:
             ):
                 before.features, after.features = without_halt(before.features, after.features, layout)
         if layout.skeleton.name == HUMANML3D.name:
+            self._keep_guard(layout)
             self._flow(layout)
         later, times = 0.0, list[TimedText]()
         heights = [_pelvis_heights(row.features, layout) for row in self.rows]
@@ -356,6 +363,7 @@ class _Timeline:
         for before, after in pairwise(self.rows):
             if before.features is None or after.features is None or after.held.meets or after.held.apart:
                 continue
+            struck = "drawn" in before.changes and action_of(before.text) in STRUCK and action_of(after.text) in BENT
             if after.is_drawn and freezes(action_of(before.text), action_of(after.text), after.text.said.lower()):
                 held = frozen(before.features, len(after.features), layout)
                 if held is not None:
@@ -366,15 +374,35 @@ class _Timeline:
                 kept = kept_arms(before.features, after.features, layout) if after.open else None
                 if kept is not None:
                     before.features, after.features = kept.before, kept.after
-            elif before.is_drawn and after.is_drawn:
+            elif after.is_drawn and not before.is_drawn and is_onward(before.text, after.text):
+                joined = flowing(
+                    before.features, after.features, layout, whole=(False, not after.is_trimmed), onward=True
+                )
+                if joined is not None:
+                    before.features, after.features, after.entered = joined.before, joined.after, joined.entered
+            elif (before.is_drawn or struck) and after.is_drawn:
                 whole = not before.is_trimmed, not after.is_trimmed
-                down = action_of(before.text) in BENT and after.held.own in LOWER
+                down = struck or (action_of(before.text) in BENT and after.held.own in LOWER)
                 joined = flowing(
                     before.features, after.features, layout, whole=whole, entered=before.entered, down=down
                 )
                 if joined is not None:
                     after.changes = {**after.changes, **({"posture": AS_BEFORE} if down else {})}
+                    before.changes = {**before.changes, **({"posture": BENT_ON} if struck else {})}
                     before.features, after.features, after.entered = joined.before, joined.after, joined.entered
+
+    def _keep_guard(self, layout: FeatureLayout) -> None:
+        """Let fighters keep the guard up in the steps behind a blow or a block."""
+        for number, row in enumerate(self.rows):
+            before, after = self._row(number - 1), self._row(number + 1)
+            if before is None or before.features is None or row.features is None:
+                continue
+            if action_of(before.text) in FIGHTING and action_of(row.text) in STEPPING_ASIDE:
+                fights = after is not None and action_of(after.text) in FIGHTING
+                held = guarded(before.features, row.features, after.features if after and fights else None, layout)
+                if held is not None and before.is_drawn:
+                    before.features, row.features = held.before, held.after
+                    row.changes = {**row.changes, "posture": AS_BEFORE}
 
     def _row(self, number: int) -> _Row | None:
         """Return a row; None before the first and behind the last."""
@@ -413,7 +441,7 @@ class _Timeline:
             assert row.features is not None
             frames[row.part.start : row.part.end] = row.features
             if row.held.meets:
-                _passed_into(frames, row.part.start)
+                pass_into(frames, row.part.start, MEETS)
         for transition in self.transitions:
             frames = transition.write(frames)
         timeline = zip(self.timeline, self.rows, strict=True)
@@ -474,12 +502,10 @@ def _pelvis_heights(features: Float32 | None, layout: FeatureLayout) -> NDArray[
     return layout.decode(features)[:, 0, 1]
 
 
-def _passed_into(frames: Float32, start: int) -> None:
-    """Let features (T, D) pass from the last frame before `start` into those behind it; both are of one posture."""
-    count = min(MEETS, len(frames) - start)
-    if start and count > 0:
-        share = (np.arange(1, count + 1) / (count + 1))[:, None]
-        frames[start : start + count] = (1 - share) * frames[start - 1] + share * frames[start : start + count]
+def is_onward(before: TextFeatures, after: TextFeatures) -> bool:
+    """Return True if a drawn movement goes out of the speed of the way before it."""
+    action = action_of(after)
+    return is_way(before) and (action in FALLING or (action in THROWING and action_of(before) in RUNS))
 
 
 def _is_raised(text: TextFeatures) -> bool:
