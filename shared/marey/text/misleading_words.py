@@ -35,6 +35,8 @@ _TURNED_BACK = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A way behind a turn: "turns around and walks back"."""
+WAYS_TO_AND_FRO = 3
+"""Ways of who paces back and forth."""
 _STEPS = r"(?:stairs|steps|staircase|stairway|stairwell|flight(?:\ of\ (?:stairs|steps))?)"
 _DOWN_AGAIN = re.compile(
     rf"""(?P<up>\b(?:(?:climb|ascend|mount)(?:s|ed|ing)?|[a-z]+\ (?:\w+ly\ )?up)\ (?!down\b|and\b)
@@ -53,12 +55,22 @@ _UP_AND_DOWN = re.compile(
 )
 """The same in one breath: "runs up and down the stairs"."""
 _TO_AND_FRO = re.compile(
-    r"""\b(?:pace?|walk|strid?e?|march|wander|stroll)(?P<end>e?s|ing)?[ ]
+    r"""\b(?P<way>pac|walk|strid|stride|march|wander|stroll|run|runn|jog|jogg)(?P<end>es|s|ing|e)?[ ]
     (?:(?:nervous|anxious|impatient|restless|angr|slow|quick)\w*\ )?
-    (?:back\ and\ forth|to\ and\ fro|up\ and\ down(?!\ (?:the\ )?(?:stairs?|steps|hill)))""",
+    (?:back\ and\ forth|to\ and\ fro|up\ and\ down(?!\ (?:the\ )?(?:stairs?|steps|hill)))
+    (?:(?:\ (?:nervous|anxious|impatient|restless|angr|slow|quick)\w*)?
+    \ (?:for\ (?:a\ (?:while|long\ time|bit)|some\ time)|again\ and\ again|over\ and\ over|repeatedly
+    |(?:several|many|a\ few)\ times))?""",
     re.IGNORECASE | re.VERBOSE,
 )
 """A way with turns: "paces back and forth"."""
+_EXITS = re.compile(
+    r"""\b(?:exit|leave|head|go)(?P<end>e?s|ing)?(?:\ (?:the\ )?(?:stage|scene|screen|frame|off|away|out))*
+    (?:\ (?:to|towards?)\ (?:the|his|her|their)|\ stage|\ screen|(?<=exits)|(?<=heads)|(?<=exit)|(?<=head))
+    \ (?P<side>left|right)\b(?!\ (?:hand|arm|foot|leg|shoulder|side|elbow|fist))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A way to a side whose verb names no gait: "exits stage left"."""
 _STRUCK = re.compile(
     r"""\b(?P<is>is|are|gets?|got|getting|being)[ ](?P<how>\w+ly\ )?
     (?:stabbed|kicked|slashed|slapped|pushed|shoved|bitten|tackled|clubbed|headbutted|elbowed|kneed|whipped|smacked
@@ -340,6 +352,7 @@ def without_misleading(prompt: str) -> str:
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
     text = _TO_KNEES.sub(_kneels, _OVER_KNEES.sub(_falls_over_knees, text))
+    text = _EXITS.sub(_walks_off, text)
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
@@ -415,11 +428,20 @@ def _on_floor(found: re.Match[str]) -> str:
 
 def _with_turns(found: re.Match[str]) -> str:
     """Return a way to and fro, told as ways and turns."""
-    end = found["end"] or ""
+    end, way = (found["end"] or "").removesuffix("e"), found["way"].lower()
+    way = "jog" if way.startswith("jog") else "run" if way.startswith("run") else "walk"
     if end.endswith("ing"):
-        return "walking forward, turning around and walking forward"
-    walks, turns = ("walks", "turns around") if end else ("walk", "turn around")
-    return f"{walks} forward, {turns}, {walks} forward, {turns} and {walks} forward"
+        goes, turns = f"{way}{way[-1] if way != 'walk' else ''}ing forward", "turning around"
+        return ", ".join([goes, *[f"{turns} and {goes}"] * (WAYS_TO_AND_FRO - 1)])
+    goes, turns = (f"{way}s forward", "turns around") if end else (f"{way} forward", "turn around")
+    between = f", {turns}, {goes}" * (WAYS_TO_AND_FRO - 2)
+    return f"{goes}{between}, {turns} and {goes}"
+
+
+def _walks_off(found: re.Match[str]) -> str:
+    """Return a way to a side as a walk."""
+    end = (found["end"] or "").lower()
+    return f"walk{'ing' if end == 'ing' else 's' if end else ''} off to the {found['side']}"
 
 
 def _with_turn(found: re.Match[str]) -> str:

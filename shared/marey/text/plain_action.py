@@ -13,6 +13,7 @@ from functools import lru_cache
 from marey.text.clause_normalization import DEFAULT_SUBJECT
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.bearings import DRAWN_AS, DRAWN_ON
+from marey.vocabulary.courses import STRAIGHT, WAYS, dribbles_ahead, stated_course, without_course
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
@@ -27,12 +28,15 @@ TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
 NODDING = "nod"
 """Read in "shakes his head"."""
+DRIBBLING = "dribble"
+"""Of it models know the stance alone."""
 ALONE = frozenset({STANDING, NODDING})
 """Actions of which models read the plain words alone, where they are read surely: of "a bored watchman stands at his
 post" they made a walk."""
 PLAINER = {"walk": (re.compile(r"\bfast\b"), "quickly")}
 """Words of actions that models read as those of another: of eight motions of "walks fast" three run."""
 _WITH_LOAD = re.compile(r" (?:with|carrying) a load\b")
+_RUNS = re.compile(r"\b(?:run|jog|sprint|dash|rac)\w*\b", re.IGNORECASE)
 _NOD = re.compile(r"\bnod", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z]+")
 
@@ -70,7 +74,8 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
     a subject gets one (`with_subject`), words that mislead are replaced (`PLAINER`), and those that have the head turn,
-    or ask for a bearing that fits the action, are left out: both are drawn.
+    or ask for a bearing that fits the action, are left out: both are drawn. So are the words of a way to a side, in a
+    circle or in a zigzag, to which the motion of a plain way is bent.
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -86,6 +91,12 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
         action = STANDING
     if action in DRAWN_ON and any(each.bearing.load for each in borne.stated):
         action, bare = "walk", _WITH_LOAD.sub("", bare)  # the arms are drawn
+    course = stated_course(prompt, action)
+    if action == DRIBBLING and dribbles_ahead(prompt):
+        return load_vocabulary().need("run" if _RUNS.search(prompt) else "walk").plain_words  # the hand is drawn
+    if course is not None and course.kind != STRAIGHT:
+        way = action if action in WAYS else "run" if _RUNS.search(prompt) else "walk"
+        action, bare = way, without_course(bare, way)  # the way is bent
     plain = load_vocabulary().need(action).plain_words
     if not bare or action in DRAWN_AS or (surely and action in ALONE):
         return plain

@@ -29,6 +29,10 @@ _BARE = re.compile(
 )
 _CIRCLES = re.compile(r"\b(?:semi-?)?circles?\b|\bin a (?:ring|loop)\b|\barc\b")
 
+_LIMBS = re.compile(
+    r"\b(?:left|right)[ -](?:arm|hand|palm|fist|wrist|elbow|shoulder|leg|foot|knee|ankle|hip|ear|eye|thigh|shin)s?\b"
+)
+"""Words of sides that are no ways."""
 _IN_PLACE = re.compile(
     r"\b(?:in place|on the spot|on (?:his|her|their|its|the|one) (?:heels?|spot)|pivot\w*|stationary|standing|stands?"
     r"|(?:where|as) (?:he|she|they|it) stands?|about[ -](?:face|turn))\b"
@@ -86,7 +90,7 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
     if not is_way and usual is None:
         return None
     found = set(table.angles(text))
-    if is_way and not found and not table.turning.intersection(_WORDS.findall(text)):
+    if is_way and not found and not table.turning.intersection(_WORDS.findall(_LIMBS.sub(" ", text))):
         return Turn()
     if len(found) > 1:
         return None

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from marey.generation import asked
-from marey.generation.asked import AskedMotion, changes_of, generate_as_asked
+from marey.generation.asked import AskedMotion, _Wish, changes_of, generate_as_asked, is_winding
 from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
@@ -267,8 +267,21 @@ def test_a_turn_to_the_other_side_is_mirrored_first() -> None:
 
 def test_ways_are_straight_unless_their_prompt_says_otherwise() -> None:
     curved = walker(6.0, turn=50.0)
-    assert make(curved, ask("a man walks to work")).changes["turn"]["shown"] == pytest.approx(15, abs=5)
+    assert make(curved, ask("a man walks to work")).changes["turn"]["shown"] == pytest.approx(0, abs=5)
     assert isinstance(make(curved, ask("a man wanders around")), RawMotion)
+
+
+def test_a_circle_has_the_time_to_close() -> None:
+    wish = _Wish.of(ask("a man walks in a wide circle"))
+    limits = Limits(16, 196, 20.0, 8, keeps=4)
+    short = replace(ask("a man walks in a wide circle"), frames=60, open=True)
+    assert (wish.for_network(short, limits).frames or 0) > 150
+    assert wish.for_network(replace(short, open=False), limits).frames == 60
+
+
+def test_a_way_is_read_with_its_course() -> None:
+    assert is_winding(ask("a man walks off to the left").text)
+    assert not is_winding(ask("a man walks with his left arm up").text)
 
 
 @pytest.mark.parametrize(("prompt", "action"), [("a man nods twice", "nod"), ("she shivers", "shiver")])

@@ -17,7 +17,9 @@ from marey.generation.export import finish
 from marey.generation.paced import SPEEDS
 from marey.generation.port import Request
 from marey.generation.posture import NO_POSTURE
+from marey.generation.shots import timelines
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
+from marey.generation.shots.headings import heading_change, with_whole_turns
 from marey.generation.shots.sequences import WAITS_S, as_timeline
 from marey.generation.shots.timelines import TimelineMotion
 from marey.items.timeline import read_timeline, timeline_rows
@@ -320,3 +322,23 @@ def test_a_trip_and_the_fall_behind_it_are_one(generator: Any, said: str) -> Non
     rows = as_timeline(generator, Request(text, 1)).timeline
     assert rows is not None
     assert [row.text.prompt for row in rows] == ["a person runs", f"{said} and falls on his face"]
+
+
+@pytest.mark.parametrize("before", [("walk", "walks"), ("wave", "waves")])
+def test_turns_between_movements_lose_nothing_to_transitions(
+    drawing: Any, monkeypatch: pytest.MonkeyPatch, before: tuple[str, str]
+) -> None:
+    asked = list[float]()
+
+    def whole(features: Any, layout: Any, turns: Any) -> Any:
+        asked.extend(turn.degrees for turn in turns)
+        return with_whole_turns(features, layout, turns)
+
+    monkeypatch.setattr(timelines, "with_whole_turns", whole)
+    said = before, ("turn-around", "turns around"), ("bow", "bows")
+    (made,) = generate_any(drawing, [resolve_request(drawing, Request(sequence_of(drawing, *said), 3))])
+    assert isinstance(made, TimelineMotion)
+    (degrees,) = asked
+    assert abs(degrees) == pytest.approx(180, abs=4)
+    if before[0] == "wave":
+        assert heading_change(made.features, drawing.layout) == pytest.approx(degrees, abs=8)

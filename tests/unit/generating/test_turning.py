@@ -123,7 +123,8 @@ def test_turns_of_ways_are_left_to_networks(action: str, prompt: str) -> None:
 
 
 def test_a_turn_behind_a_way_goes_on_from_it() -> None:
-    assert features_of("turn", "turns left", beside=("walks forward", "")) is None
+    assert features_of("turn", "turns left", beside=("walks forward", "")) is not None
+    assert features_of("turn", "walks and turns left") is None
     assert features_of("turn", "turns left", beside=("sits down", "")) is not None
     assert features_of("turn", "turns left on the spot", beside=("kneels", "walks away")) is not None
 
@@ -169,3 +170,9 @@ def test_a_pirouette_is_on_the_ball_of_one_foot(prompt: str, seed: int) -> None:
     stood = joints[fast, TOES[foot]]
     assert np.ptp(stood, axis=0).max() < 0.03, "the ball of the foot stays"
     assert (joints[fast, ANKLES[foot], 1] > joints[0, ANKLES[foot], 1] + 0.02).mean() > 0.9
+
+
+@pytest.mark.parametrize("after", ["runs", "sprints away", "dashes off"])
+def test_a_turn_before_a_run_is_quick(after: str) -> None:
+    quick, usual = (len(drawn("turn-around", "turns around", beside=("", each))) for each in (after, "walks"))
+    assert quick <= usual - 5

@@ -64,7 +64,14 @@ def test_who_returns_walks_ahead(prompt: str, read: str) -> None:
             "a man walks forward, turns around, walks forward, turns around and walks forward",
         ),
         ("pace up and down", "walk forward, turn around, walk forward, turn around and walk forward"),
-        ("a father pacing to and fro", "a father walking forward, turning around and walking forward"),
+        (
+            "a father pacing to and fro",
+            "a father walking forward, turning around and walking forward, turning around and walking forward",
+        ),
+        (
+            "she jogs back and forth for a while",
+            "she jogs forward, turns around, jogs forward, turns around and jogs forward",
+        ),
         ("walks up and down the hill", "walks up and down the hill"),
         ("rocks back and forth", "rocks back and forth"),
     ],
@@ -427,3 +434,15 @@ def test_who_falls_to_the_knees_kneels(prompt: str, read: str) -> None:
 )
 def test_other_ways_to_the_floor_stay(prompt: str) -> None:
     assert without_misleading(prompt) == prompt
+
+
+@pytest.mark.parametrize(
+    ("prompt", "read"),
+    [
+        ("a singer exits stage left", "a singer walks off to the left"),
+        ("the host leaves to the right", "the host walks off to the right"),
+        ("he leaves his left shoe", "he leaves his left shoe"),
+    ],
+)
+def test_who_leaves_to_a_side_walks(prompt: str, read: str) -> None:
+    assert without_misleading(prompt) == read

@@ -138,3 +138,16 @@ def test_prompts_that_are_read_one_by_one_are_encoded_together(
     for prompt in prompts:
         watched.features([prompt])
     assert not any(prompt in texts for texts in asked[1:] for prompt in prompts)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "action", "read"),
+    [
+        ("he jogs in a zigzag", "run", "a person runs, he jogs"),
+        ("a woman strolls off to the left", "turn", "a person walks forward, a woman strolls"),
+        ("she circles the fountain", "turn", "a person walks forward"),
+        ("a boy dribbles a ball while jogging ahead", "dribble", "a person runs"),
+    ],
+)
+def test_ways_are_read_without_their_course(prompt: str, action: str, read: str) -> None:
+    assert with_plain_action(prompt, action) == read

@@ -170,6 +170,8 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
         ("stands holding a box", "stands", ["box-carried"]),
         ("picks up a box and carries it away", "picks up a box and walks with a load", ["box-carried"]),
         ("carries a sack of rice over his shoulder", "walks with a load", ["sack-carried"]),
+        ("a maid walks along with a platter held high in her left hand", "a maid walks along", ["tray-raised"]),
+        ("a butler carries a tray above his shoulder", "a butler walks with a load", ["tray-raised"]),
         ("a waiter carries a tray of drinks to the table", "a waiter walks with a load to the table", ["tray-carried"]),
         ("she holds a baby in her arms", "", ["baby-held"]),
         ("answers a phone call, talks, and hangs up", "", ["phone-call"]),

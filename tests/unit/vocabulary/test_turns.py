@@ -39,7 +39,7 @@ def test_stated_degrees(prompt: str, action: str, degrees: float | None) -> None
         ("veer slightly right", "turn", (45, 60)),
         ("make a sharp left", "turn", (80, 110)),
         ("she turns around to see who is behind her", "turn-around", (175, 185)),
-        ("turns to the left", "turn-around", (75, 105)),
+        ("turns to the left", "turn-around", (85, 95)),
         ("pivots", "turn-around", (80, 190)),
         ("changes direction", "turn", (60, 120)),
         ("a man runs for the bus", "run", (0, STRAIGHT)),

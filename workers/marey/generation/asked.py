@@ -31,6 +31,7 @@ from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_postu
 from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
+from marey.generation.steered import frames_of_circle, steered_features
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.timed import CUT, cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -50,6 +51,9 @@ from marey.selector.rules import RULES
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
+from marey.vocabulary.courses import CIRCLE, WayCourse, dribbles_ahead, stated_course
+from marey.vocabulary.courses import STRAIGHT as STRAIGHT_ON
+from marey.vocabulary.courses import WAYS as STEERED
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
 from marey.vocabulary.scope import STANDING
@@ -71,6 +75,7 @@ class AskedMotion:
             movement is drawn on what the network made or in its place (`marey.generation.fine`, `drawn_whole`);
             `repetitions`, how often the network `made` and the prompt `asked` for the action; `turn`, degrees from
             the first frame to the last, positive to the left, as the network `made` them and as they are `shown`;
+            `course`, to which a way was bent (`marey.generation.steered`);
             `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
@@ -91,6 +96,7 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
 COUNTABLE = frozenset({*REPETITIONS, *AGAIN, *(COUNTED.keys() - FINE.keys())})
 """Actions that are done as often as a prompt asks: their number is found in a motion, or they are drawn so often."""
 SPINNING = "spin"
+DRIBBLING = "dribble"
 ENDS_TURNED = frozenset({ON_THE_SPOT, SPINNING})
 """Actions that end where the body has turned as far as is asked for."""
 ALIKE = frozenset({"idle", "nod", "flinch"})
@@ -107,11 +113,13 @@ class _Wish:
         limb: that acts, on one side; empty = either.
         count: repetitions; None = any number.
         turn: how far the body turns; None = as it comes.
+        course: on which it goes; None = as it comes.
         pace: at which it is done.
         gaze: where the head turns.
         joined: a transition replaces the first frames.
         drawn_side: of the movement that is drawn, where it is not simply the limb that acts (`drawn_sides`); empty =
             either, or that of the limb.
+        seed: of the motion.
     """
 
     steps: tuple[Step, ...] | None = None
@@ -123,6 +131,8 @@ class _Wish:
     gaze: tuple[Glance, ...] = ()
     joined: bool = False
     drawn_side: str = ""
+    course: WayCourse | None = None
+    seed: int = 0
 
     @classmethod
     def of(cls, request: Request) -> _Wish:
@@ -143,9 +153,11 @@ class _Wish:
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
         if action == SPINNING and count is not None:
             turn = Turn(count * WHOLE, count * WHOLE)
+        course = stated_course(without_gaze(prompt), action) if count is None else None
         own = drawn_side(prompt, action)
         limb = limb_of(prompt, action) if own is None else None
-        return cls(steps, action, limb, count, turn, pace, gaze, bool(request.beside[0]), own or "")
+        joined = bool(request.beside[0])
+        return cls(steps, action, limb, count, turn, pace, gaze, joined, own or "", course, request.seed)
 
     @property
     def side(self) -> str:
@@ -172,6 +184,8 @@ class _Wish:
     def _for_length(self, request: Request, limits: Limits) -> Request:
         if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
             return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
+        if self.course is not None and self.course.kind == CIRCLE and (request.open or request.frames is None):
+            return replace(request, frames=frames_of_circle(self.course, self.action, limits))
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
@@ -180,6 +194,12 @@ class _Wish:
 def action_of(text: TextFeatures) -> str:
     """Return the id of the only action that a text asks for; empty if there are several or none."""
     return _action_of(text, wanted_of(text.actions or (text.rewritten,)))
+
+
+def is_winding(text: TextFeatures) -> bool:
+    """Return True if a text asks for a way off to a side, in a circle or in a zigzag."""
+    course = stated_course(without_gaze(text.said), action_of(text))
+    return course is not None and course.kind != STRAIGHT_ON
 
 
 def _action_of(text: TextFeatures, steps: Sequence[Step] | None) -> str:
@@ -308,7 +328,7 @@ def _as_asked(
     elif layout.skeleton.name == HUMANML3D.name:
         drawn = _drawn(features, layout, wish, request)
         if drawn is not None:
-            features, changes["drawn"] = drawn, wish.action
+            features, changes["drawn"] = drawn, wish.action if wish.action in FINE else DRIBBLING
     if layout.skeleton.name == HUMANML3D.name:
         for change in (_as_often, _turned, _on_floor, _ended) if whole is None or not whole.exact else ():
             if len(features) >= SHORTEST:
@@ -347,6 +367,8 @@ def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: in
 
 def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
     """Return the motion of a network with what is drawn of its action; None if it stays."""
+    if wish.action in STEERED and request.drawing and dribbles_ahead(request.text.said):
+        return drawn_features(features, layout, DRIBBLING, wish.fine(request), request.seed)
     if wish.action not in FINE or not request.drawing or _shows(features, layout, wish, request):
         return None
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
@@ -372,10 +394,18 @@ def _turned(
     features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion with the turn that is asked for, behind what a transition replaces of it."""
-    if wish.turn is None:
+    if wish.turn is None and wish.course is None:
         return features
     lost = cut_of(len(features)) if wish.joined else 0
     replaced, features = features[:lost], features[lost:]
+    if wish.course is not None:
+        steered = steered_features(features, layout, wish.course, wish.seed)
+        if steered is None:
+            return np.concatenate([replaced, features])
+        changes["turn"] = {"made": round(_turn(features, layout)), "shown": round(_turn(steered, layout))}
+        changes["course"] = wish.course.kind
+        return np.concatenate([replaced, steered])
+    assert wish.turn is not None
     first = ended_turn(features, layout, wish.turn) if fixed is None and wish.action in ENDS_TURNED else None
     enough = features if first is None else first
     bent = turned_features(enough, layout, wish.turn, wish.side)

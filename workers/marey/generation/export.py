@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from marey.generation.asked import changes_of
+from marey.generation.asked import changes_of, is_winding
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
 from marey.generation.named import names_movement
@@ -127,4 +127,5 @@ def _match(clip: MotionClip, request: Request) -> PromptMatch:
     """
     if request.recording is not None or names_movement(request.text.said):
         return PromptMatch()
-    return match_of(clip, request.text.actions or (request.text.rewritten,), request.scope)
+    sentences, winds = request.text.actions or (request.text.rewritten,), is_winding(request.text)
+    return match_of(clip, sentences, request.scope, winds=winds)

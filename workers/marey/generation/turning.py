@@ -32,6 +32,8 @@ STANDS_S = 1.0, 1.3
 _ROUNDED = 30.0
 """Degrees of which a turn of stated extent is a multiple."""
 _STANDS_FIRST = re.compile(r"\b(?:stand\w*|waits?|waiting)\b[^.;]*(?:\bthen\b|\bbefore\b|\band\b|,)")
+_RUNS = re.compile(r"\b(?:run|sprint|dash|rac|charg|bolt|flee)(?:s|es|e|ing|ning)?\b")
+"""Words of what a quick turn goes before."""
 _CLOCKWISE = re.compile(r"\b(?:(counter|anti)[ -]?)?clockwise\b")
 _NAMED = re.compile(r"\b(left|right)\b(?![ -](?:foot|feet|leg|heel|toes?|hand|arm|fist|knee|shoulder|away|there)\b)")
 _WHILE_GOING = re.compile(
@@ -56,18 +58,17 @@ def turn_asked_for(wish: FineWish, rng: random.Random, seconds: float | None) ->
 
 
 def turn_in_place(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
-    """Return the turn of a prompt that speaks of no way; None if the body goes somewhere as it turns, or before."""
+    """Return the turn of a prompt that speaks of no way; None if the body goes somewhere as it turns."""
     del seconds
-    if not turns_in_place(wish.prompt) or (wish.beside[0] and not turns_in_place(wish.beside[0])):
+    if not turns_in_place(wish.prompt):
         return None
     return _turn(wish, rng, "turn")
 
 
 def _turn(wish: FineWish, rng: random.Random, action: str) -> Gesture:
     degrees = _degrees(without_gaze(wish.prompt), action, rng)
-    return turn_on_spot(
-        rng, SIGN[turned_side(wish, rng)] * degrees, pace=stated_pace(wish.prompt), waits=waits_of(wish, rng)
-    )
+    pace = stated_pace(wish.prompt) or ("fast" if _RUNS.search(wish.beside[1].lower()) else "")
+    return turn_on_spot(rng, SIGN[turned_side(wish, rng)] * degrees, pace=pace, waits=waits_of(wish, rng))
 
 
 def _degrees(prompt: str, action: str, rng: random.Random) -> float:

@@ -51,6 +51,7 @@ class WantedAction:
         degrees: of an action of `EXACT`, where the words say how far; None: as in its definition.
         count: how often, of an action that `REPETITIONS` has; None: any number.
         in_place: of a turn whose words speak of no way: one on the spot shows it, too.
+        winds: of a gait whose words speak of a way that is not straight.
     """
 
     action: str
@@ -58,6 +59,7 @@ class WantedAction:
     degrees: float | None = None
     count: int | None = None
     in_place: bool = False
+    winds: bool = False
 
 
 Step = tuple[WantedAction, ...]
@@ -182,6 +184,7 @@ def _grade(motion: Motion, step: Step) -> float:
 
 
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
+    rules = {**rules, **WHILE_TURNING} if wanted.winds else rules
     rule = rules[wanted.action] if wanted.degrees is None else EXACT[wanted.action](wanted.degrees)
     if wanted.in_place:
         on_way, on_spot = rule, turn_standing if wanted.degrees is None else EXACT[ON_THE_SPOT](wanted.degrees)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ def match_of(
     scope: Mapping[str, Any] | None = None,
     *,
     frames: slice = EVERY,
+    winds: bool = False,
 ) -> PromptMatch:
     """Match a clip with its prompt, by its words or else by its meaning.
 
@@ -38,8 +40,12 @@ def match_of(
         sentences: as of `wanted_of`.
         scope: as of `wanted_by_meaning`.
         frames: those that show the prompt.
+        winds: the prompt asks for a way that is not straight.
     """
-    return match_steps(clip, wanted_of(sentences) or wanted_by_meaning(scope), frames=frames)
+    steps = wanted_of(sentences) or wanted_by_meaning(scope)
+    if winds and steps:
+        steps = tuple(tuple(replace(wanted, winds=True) for wanted in step) for step in steps)
+    return match_steps(clip, steps, frames=frames)
 
 
 def match_steps(clip: MotionClip, steps: Sequence[Step] | None, *, frames: slice = EVERY) -> PromptMatch:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from marey.generation.asked import action_of
+from marey.generation.asked import action_of, is_winding
 from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.row_postures import is_as_alone
@@ -103,7 +103,8 @@ def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, 
         return PromptMatch()
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
     frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))
-    return match_of(clip, row.text.actions or (row.text.rewritten,), row.scope, frames=frames)
+    sentences, winds = row.text.actions or (row.text.rewritten,), is_winding(row.text)
+    return match_of(clip, sentences, row.scope, frames=frames, winds=winds)
 
 
 def least_match(clip: MotionClip) -> PromptMatch:

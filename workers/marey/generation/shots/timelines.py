@@ -27,6 +27,7 @@ from marey.generation.postured import MEETS, pass_into
 from marey.generation.shots.flowing import BENT_ON, flowing, without_rest
 from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
+from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
 from marey.generation.shots.levels import lifted, raised_rows
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
@@ -149,7 +150,7 @@ def generate_timelines(
         if timeline.is_sequence and not timeline.dropped:
             timeline.lift(generator.layout)
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions(generator.layout)])
-    return [timeline.motion() for timeline in timelines]
+    return [timeline.motion(generator.layout) for timeline in timelines]
 
 
 def row_requests(request: Request, limits: Limits) -> list[Request]:
@@ -207,6 +208,7 @@ class _Row(_Strand):
         self.base = 0.0
         self.changes: Mapping[str, Any] = {}
         self.entered = 0
+        self.turn = 0.0
 
     @property
     def is_drawn(self) -> bool:
@@ -356,10 +358,14 @@ class _Timeline:
 
     def _flow(self, layout: FeatureLayout) -> None:
         """Let drawn movements go on into each other, and leave out their rest beside others."""
+        for row in self.rows:
+            if row.features is not None and row.is_drawn and action_of(row.text) in TURNING:
+                row.turn = heading_change(row.features, layout)
         for number, row in enumerate(self.rows):
             if row.features is not None and row.is_trimmed:
                 beside = [each and not each.is_drawn for each in (self._row(number - 1), self._row(number + 1))]
-                row.features = without_rest(row.features, layout, first=bool(beside[0]), last=bool(beside[1]))
+                first = bool(beside[0]) and not row.turn  # a transition replaces its rest, and no part of the turn
+                row.features = without_rest(row.features, layout, first=first, last=bool(beside[1]))
         for before, after in pairwise(self.rows):
             if before.features is None or after.features is None or after.held.meets or after.held.apart:
                 continue
@@ -430,7 +436,24 @@ class _Timeline:
             ]
         return self.transitions
 
-    def motion(self) -> TimelineMotion | None:
+    def _turns(self) -> list[JoinedTurn]:
+        """Return the turns between movements that are joined."""
+        found = list[JoinedTurn]()
+        for number, row in enumerate(self.rows):
+            if row.turn:
+                before, after = self._row(number - 1), self._row(number + 1)
+                begin = row.part.start if before is None else before.part.end
+                end = row.part.end if after is None else self._joined_at(number + 1)
+                follows = after is not None and is_way(after.text)
+                found.append(JoinedTurn(0 if before is None else before.part.end, begin, end, row.turn, follows))
+        return found
+
+    def _joined_at(self, number: int) -> int:
+        """Return the frame at which the transition to a row ends."""
+        row = self.rows[number]
+        return row.part.start + row.entered if row.entered else self.plan.transitions[number - 1].end
+
+    def motion(self, layout: FeatureLayout) -> TimelineMotion | None:
         """Put rows and transitions together; None if the timeline was dropped."""
         if self.dropped:
             return None
@@ -444,6 +467,8 @@ class _Timeline:
                 pass_into(frames, row.part.start, MEETS)
         for transition in self.transitions:
             frames = transition.write(frames)
+        if self.open and (turns := self._turns()):
+            frames = with_whole_turns(frames, layout, turns)
         timeline = zip(self.timeline, self.rows, strict=True)
         changed = tuple(replace(timed, changes=row.changes) for timed, row in timeline)
         return TimelineMotion(frames.astype(np.float32), changed)
