@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from marey.vocabulary.bearings import Side, StatedBearing, bearing_macros, bearing_words, each_once
+from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.inflection import gerund, third_person, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -330,26 +331,47 @@ def _found(prompt: str) -> tuple[_Words, ...]:
 def _matches(text: str) -> Iterator[_Words]:
     for name, kind, pattern in _patterns():
         for match in pattern.finditer(text):
-            whole = kind in ("adjectives", "beings", "people")
-            stated = StatedBearing(name, _side(match[0]), whole, match[0])
-            if kind in ("gaits", "loads"):
-                yield from _gait(text, match, stated, _LOAD if kind == "loads" else "")
-            elif kind in ("beings", "people"):
-                yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
-            elif kind == "read":
-                yield _Words(*match.span(), stated, match[0])
-            elif kind == "by":
-                yield _Words(*match.span(_DOES), replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
-            elif kind == "beside":
-                if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
-                    yield _Words(*match.span(), stated)
-            elif kind == "how" or _is_subject(text[: match.start()]):
-                hand = _WITH_HAND.match(text, match.end()) if not stated.side and stated.bearing.gesture else None
-                over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
-                if hand is None:
-                    yield _Words(match.start(), match.end() if over is None else over.end(), stated)
-                else:
-                    yield _Words(match.start(), hand.end(), replace(stated, side=_side(hand[0])))
+            yield from (_counted(text, each) for each in _words_of(text, name, kind, match))
+
+
+def _counted(text: str, found: _Words) -> _Words:
+    """Return words with the number of strokes that they or those beside them name, which are left out with them."""
+    bearing = found.stated.bearing
+    if not (bearing.gesture or bearing.work or bearing.gait == "stomp") or bearing.moves or found.instead:
+        return found
+    number = stated_strokes(text[found.start : found.end])
+    if number is not None:
+        return replace(found, stated=replace(found.stated, times=number))
+    if behind := strokes_behind(text, found.end):
+        return replace(found, end=behind.end, stated=replace(found.stated, times=behind.number))
+    before = strokes_before(text[: found.start])
+    if before is None:
+        return found
+    return replace(found, start=before[1], stated=replace(found.stated, times=before[0]))
+
+
+def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator[_Words]:
+    """Yield the words of a bearing, as one match of a pattern of its kind has them."""
+    whole = kind in ("adjectives", "beings", "people")
+    stated = StatedBearing(name, _side(match[0]), whole, match[0])
+    if kind in ("gaits", "loads"):
+        yield from _gait(text, match, stated, _LOAD if kind == "loads" else "")
+    elif kind in ("beings", "people"):
+        yield from _being(text, match, stated, _PERSON if kind == "beings" else match[0])
+    elif kind == "read":
+        yield _Words(*match.span(), stated, match[0])
+    elif kind == "by":
+        yield _Words(*match.span(_DOES), replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
+    elif kind == "beside":
+        if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
+            yield _Words(*match.span(), stated)
+    elif kind == "how" or _is_subject(text[: match.start()]):
+        hand = _WITH_HAND.match(text, match.end()) if not stated.side and stated.bearing.gesture else None
+        over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
+        if hand is None:
+            yield _Words(match.start(), match.end() if over is None else over.end(), stated)
+        else:
+            yield _Words(match.start(), hand.end(), replace(stated, side=_side(hand[0])))
 
 
 def _is_beside(text: str, words: str) -> bool:

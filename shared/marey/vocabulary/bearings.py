@@ -39,6 +39,13 @@ ARMS_HELD = frozenset({"jump", "jump-forward", "hop", "squat", "crouch", "balanc
 """Actions beside which arms can be held, and nothing else of a bearing be drawn."""
 ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "sneak"})
 """Actions in which trunk and head are free."""
+MOVES_ON_FEET = ARMS_BUSY | frozenset(
+    {"aim", "arm-circles", "bend-over", "block", "bow", "cast-spell", "cheer", "crouch", "dance", "dribble"}
+    | {"fight-stance", "hop", "jump", "jump-forward", "jump-turn", "karate", "kick", "kick-ball", "pick-up", "punch"}
+    | {"push", "reach-forward", "reach-up", "shiver", "shoot", "shoot-basket", "slash", "spin", "squat", "stab"}
+    | {"throw", "twist", "wash", "climb-stairs"}
+)
+"""Actions of a body on its feet in whose trunk and head a mood shows."""
 Shown = Literal["body", "upper", "trunk", ""]
 """Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
 _BRINGS = re.compile(
@@ -47,6 +54,11 @@ _BRINGS = re.compile(
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
+LEAST_STROKES_HZ = 1.1
+"""Strokes a second from which on a number counts these, and not how often the whole gesture is made."""
+RETURNS_S, ALIKE = 0.45, 0.06
+"""Seconds in which a body returns to the first key for the next round, and metres or degrees up to which the last key
+is like the first one."""
 WORDS = ("how", "by", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 
@@ -106,6 +118,7 @@ class Bearing:
         load: something is carried in it.
         work: something that is done ("saws a plank"), not a way to do something else.
         moves: it is a movement of the whole body (`marey.generation.named`), made in place of a body that stands.
+        mood: it shows in trunk and head beside whatever the arms do.
         across: the arm that acts is not on the side that the words name: "rubs his left shoulder".
         also: actions beside which all of it is drawn, though the body is not upright in them, or its arms not free.
         arms: by `left` and `right`, those that it moves.
@@ -134,6 +147,7 @@ class Bearing:
     load: bool = False
     work: bool = False
     moves: bool = False
+    mood: bool = False
     across: bool = False
     also: tuple[str, ...] = ()
     keys: Keys | None = None
@@ -143,6 +157,28 @@ class Bearing:
     def lasts(self) -> bool:
         """True if it goes on in the movements after its own."""
         return not (self.gesture or self.work)
+
+    @property
+    def stroke_hz(self) -> float:
+        """Strokes a second of the hand that moves to and fro fastest; 0 if it makes none, or slow ones."""
+        fastest = max((pose.hz for pose in self.arms.values()), default=0.0)
+        return fastest if fastest >= LEAST_STROKES_HZ and self.keys is None else 0.0
+
+    @property
+    def returns_s(self) -> float:
+        """Seconds from the last key back to the first; 0 where they are alike."""
+        if self.keys is None:
+            return 0.0
+        ways = [pose.path for pose in self.arms.values() if pose.path]
+        ways += [[(each,) for each in way] for way in (self.keys.trunk, self.keys.twist) if way]
+        far = [max(abs(a - b) for a, b in zip(way[0], way[-1], strict=True)) for way in ways]
+        return RETURNS_S if any(each > ALIKE for each in far) else 0.0
+
+    def strokes_s(self, number: int) -> float:
+        """Return the seconds of a number of strokes, or rounds through the keys; 0 if it has neither."""
+        if self.keys is not None:
+            return number * self.keys.times[-1] + (number - 1) * self.returns_s
+        return number / self.stroke_hz if self.stroke_hz else 0.0
 
     @property
     def is_manner(self) -> bool:
@@ -159,18 +195,25 @@ class StatedBearing:
         side: the one that the prompt names, of the arm that acts or the leg that hurts; empty if it names none.
         whole: it is said of the person, and holds for all that the person does.
         words: that ask for it.
+        times: strokes that the prompt asks for, or how often the gesture is made; None = it names no number.
     """
 
     name: str
     side: Side = ""
     whole: bool = False
     words: str = field(default="", compare=False)
+    times: int | None = None
 
     @property
     def acts(self) -> Side:
         """The side of the arm that acts; empty if the words name none."""
         other: dict[Side, Side] = {"left": "right", "right": "left"}
         return other.get(self.side, "") if self.bearing.across else self.side
+
+    @property
+    def is_done(self) -> bool:
+        """True if it is begun and ended in its movement: a gesture, or work of a number of strokes."""
+        return self.bearing.gesture or (self.bearing.work and self.times is not None and self.bearing.strokes_s(1) > 0)
 
     @property
     def first(self) -> str:
@@ -203,6 +246,8 @@ class StatedBearing:
         if action in UPRIGHT or action in bearing.also:
             return "body"
         leans = bearing.trunk or bearing.head
+        if bearing.mood and action in MOVES_ON_FEET:
+            return "trunk"
         if action in ARMS_FREE:
             return "upper" if leans or bearing.arms or bearing.shrug else ""
         if action in ARMS_HELD:
@@ -217,7 +262,13 @@ def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:
     for each in stated:
         known = found.get(each.name, each)
         words = f"{known.words} {each.words}" if each.ends and not known.ends else known.words
-        found[each.name] = replace(known, side=known.side or each.side, whole=known.whole or each.whole, words=words)
+        found[each.name] = replace(
+            known,
+            side=known.side or each.side,
+            whole=known.whole or each.whole,
+            words=words,
+            times=known.times or each.times,
+        )
     return tuple(found.values())
 
 

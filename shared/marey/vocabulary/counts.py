@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Set
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -38,6 +39,21 @@ _TIMES = re.compile(
     r"(?:times|time|occasions?|reps?|repetitions?|x|×)\b(?! as\b| (?:the )?(?:speed|pace|tempo|normal)\b)"
 )
 _BY = re.compile(rf"(?:\bx|×) ?(?P<by>\d{{1,2}})\b|\b(?:reps|times|count): ?{_NUMBER}\b")
+_STROKE = (
+    "times?|x|×|reps?|repetitions?|(?:[a-z]+ )?(?:strokes?|blows?|hits?|knocks?|swings?|taps?|beats?|stamps?|stomps?"
+    "|pats?|raps?|rounds?|chops?|cuts?|slaps?|pulls?|thrusts?|circles?|sweeps?|snaps?|shakes?)"
+)
+_STROKES = re.compile(
+    rf"(?P<adverb>\b(?:twice|thrice|once)\b)(?! (?:as|the|more|again)\b)"
+    rf"|{_NUMBER} ?(?:(?:more|whole|separate) )?(?:{_STROKE})\b(?! as\b)|(?:\bx|×) ?(?P<by>\d{{1,2}})\b"
+)
+_CLAUSE = re.compile(
+    r"(?: (?!and\b|then\b|while\b|before\b|after\b|as\b)[\w'×-]+){0,4}(?:,? (?:for |exactly |just )?[\w×]+ ?[\w×]+\b)?"
+)
+"""Words behind what is done that may name a number of strokes: those of its clause, and a number behind a comma."""
+_GIVEN = re.compile(
+    rf"(?:^|\b(?:gives?|makes?|does|do|giving|making|doing|delivers?|lands?) ){_NUMBER} (?:(?!times )[a-z]+ )?$"
+)
 _ADVERBS = {"twice": 2, "thrice": 3}
 _ADVERB = re.compile(r"\b(?:twice|thrice)\b(?! (?:as|the)\b)")
 _ONCE = re.compile(
@@ -93,6 +109,66 @@ def stated_number(words: str) -> int | None:
     found = re.search(rf"{_NUMBER}\b", words)
     value = next(_of_times(words), None) or (None if found is None else _value(found["number"]))
     return value if value is not None and 0 < value <= MOST else None
+
+
+@dataclass(frozen=True)
+class StatedStrokes:
+    """A number of strokes that words name.
+
+    Attributes:
+        number: 1 to `MOST`.
+        end: of the words, in characters of the text.
+    """
+
+    number: int
+    end: int
+
+
+def stated_strokes(words: str) -> int | None:
+    """Return how many strokes words name for what is done over and over: three of "knocks three times", "4x", "two
+    blows"; None = no number, or several.
+
+    Args:
+        words: in lower case.
+    """
+    found = {each.number for each in _strokes_in(words)}
+    return found.pop() if len(found) == 1 else None
+
+
+def strokes_behind(text: str, at: int) -> StatedStrokes | None:
+    """Return the number of strokes that is named right behind what is done, or behind up to four words more of the same
+    clause; None = none.
+
+    Args:
+        text: in lower case.
+        at: where the words of what is done end, in characters.
+    """
+    clause = _CLAUSE.match(text, at)
+    end = at if clause is None else clause.end()
+    for each in _strokes_in(text[at:end]):
+        return replace(each, end=at + each.end)
+    return None
+
+
+def strokes_before(text: str) -> tuple[int, int] | None:
+    """Return the number of strokes that is named right before them as a noun, "three" of "gives three", and where its
+    words begin, in characters; None = none.
+
+    Args:
+        text: before the noun, in lower case.
+    """
+    found = _GIVEN.search(text)
+    return None if found is None else (_value(found["number"]), found.start())
+
+
+def _strokes_in(words: str) -> Iterator[StatedStrokes]:
+    """Yield the numbers of strokes in their order."""
+    for match in _STROKES.finditer(words):
+        number = _ADVERBS.get(match["adverb"] or "") or (
+            1 if match["adverb"] else _value(match["number"] or match["by"])
+        )
+        if 0 < number <= MOST:
+            yield StatedStrokes(number, match.end())
 
 
 def _of_times(text: str) -> Iterator[int]:

@@ -12,6 +12,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.held_poses import without_held_pose
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -83,7 +84,7 @@ def stated_length(prompt: str) -> StatedLength:
     five. "walks, then waves for three seconds" states that of a part, and so does "walks for two seconds, waves and
     sits down": a length behind the first of several clauses is its own.
     """
-    text = " ".join(prompt.lower().split())
+    text = " ".join(without_held_pose(prompt).lower().split())
     found = [match for match in _LENGTH.finditer(text) if not _is_moment(text, match)]
     if not found:
         return StatedLength()

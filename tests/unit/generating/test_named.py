@@ -15,6 +15,7 @@ from marey.vocabulary.bearings import load_bearings
 
 LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
+NECK = 12
 SEEDS = range(3)
 PELVIS, HEAD, ANKLES, TOES, SHOULDERS, WRISTS = 0, 15, [7, 8], [10, 11], [16, 17], [20, 21]
 
@@ -290,3 +291,29 @@ def test_who_rows_pulls_with_legs_trunk_and_arms() -> None:
     near = np.linalg.norm(joints[:, WRISTS] - joints[:, SHOULDERS], axis=-1).mean(1)
     assert near[int(away.argmin())] < near[int(away.argmax())] - 0.12
     assert np.ptp(joints[:, ANKLES], axis=0).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("prompt", "axis", "sign"),
+    [
+        ("a drunk sailor staggers to the left", 0, 1.0),
+        ("she reels to her right side", 0, -1.0),
+        ("a dizzy man staggers forward a few steps", 2, 1.0),
+        ("he lurches drunkenly backwards", 2, -1.0),
+        ("a dazed boxer reels and nearly falls", 2, 1.0),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_stagger_goes_its_way_on_crooked_steps_and_ends_upright(
+    prompt: str, axis: int, sign: float, seed: int
+) -> None:
+    joints = drawn(prompt, seed=seed)
+    assert 1.7 < sign * (joints[-1, PELVIS, axis] - joints[0, PELVIS, axis]) < 3.6
+    assert abs(joints[-1, PELVIS, 2 - axis] - joints[0, PELVIS, 2 - axis]) < 0.5
+    sways = joints[:, NECK, 0] - joints[:, PELVIS, 0]
+    assert np.ptp(sways) > 0.12
+    assert joints[..., 1].min() > -0.03
+    assert joints[:, TOES, 1].min(axis=1).max() < 0.05  # never off the floor
+    assert np.linalg.norm(joints[:, 4] - joints[:, 5], axis=1).min() > 0.05
+    assert joints[-1, PELVIS, 1] > 0.9
+    assert ("nearly" in prompt) == (joints[:, PELVIS, 1].min() < 0.84)

@@ -28,6 +28,43 @@ DRAWN = {**DRAWN_AS, **DRAWN_ON}
 
 
 @pytest.mark.parametrize(
+    ("prompt", "action", "name"),
+    [
+        ("a woman waves gloomily", "wave", "sad"),
+        ("he claps cheerfully", "clap", "happy"),
+        ("she bows timidly", "bow", "scared"),
+        ("he kicks furiously", "kick", "angry"),
+        ("the champion nods proudly", "nod", "proud"),
+    ],
+)
+def test_moods_show_in_the_trunk_of_who_moves_the_arms(prompt: str, action: str, name: str) -> None:
+    (stated,) = stated_bearings(prompt)
+    assert stated.name == name
+    assert stated.shown_in(action) == "trunk"
+    assert not stated.shown_in("roll")
+
+
+@pytest.mark.parametrize(
+    ("prompt", "left", "name", "times"),
+    [
+        ("he raps, then knocks on the gate four times", "he raps", "knock", 4),
+        ("a man knocks 4x on the window", "", "knock", 4),
+        ("a woman gives two loud knocks on the door", "", "knock", 2),
+        ("hammers a long nail twice", "", "hammering", 2),
+        ("he saws the plank with ten strokes", "", "sawing", 10),
+        ("sweeps the yard, six strokes", "", "sweeping", 6),
+        ("he stomps twice", "", "stomping", 2),
+        ("knocks on the door and jumps twice", "jumps twice", "knock", None),
+        ("knocks loudly", "", "knock", None),
+    ],
+)
+def test_numbers_of_strokes_are_read_with_what_they_count(prompt: str, left: str, name: str, times: int | None) -> None:
+    bare = BarePrompt.of(prompt)
+    assert bare.text == left
+    assert [(each.name, each.times) for each in bare.stated] == [(name, times)]
+
+
+@pytest.mark.parametrize(
     ("prompt", "left", "names"),
     [
         ("an old man walks slowly", "a man walks slowly", ["old"]),

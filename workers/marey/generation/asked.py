@@ -27,6 +27,7 @@ from marey.generation.gazing import GAZE
 from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
+from marey.generation.pose_holds import HOLDING, with_held_pose
 from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_posture
 from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
@@ -56,6 +57,7 @@ from marey.vocabulary.courses import STRAIGHT as STRAIGHT_ON
 from marey.vocabulary.courses import WAYS as STEERED
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
+from marey.vocabulary.held_poses import held_pose
 from marey.vocabulary.scope import STANDING
 from marey.vocabulary.turns import WHOLE, Turn, stated_spins, stated_turn
 
@@ -81,7 +83,8 @@ class AskedMotion:
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
             its end came after the action; `footed`, true where a run was held back by the slide of its
             feet; `begun`, how many seconds of its beginning were left out, in which a run stood; `posture`, in which a
-            gesture is done (`marey.generation.postured`), or `as before`, that in which the movement before has ended.
+            gesture is done (`marey.generation.postured`), or `as before`, that in which the movement before has ended;
+            `pose_held`, seconds for which the words have its pose held.
     """
 
     features: Float32 = field(repr=False)
@@ -261,7 +264,8 @@ def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole
         return DrawnWhole(drawn, exact=True)
     frames = (request if wish.action in AT_PACE else wish.for_network(request, generator.limits)).frames
     fine = wish.fine(request)
-    held = fine.fixed or bool(stated_bearings(request.text.said))  # what is drawn on it needs the time
+    borne = any(not each.bearing.mood for each in stated_bearings(request.text.said))
+    held = fine.fixed or borne  # what is drawn on it needs the time
     drawn = drawn_whole(generator.layout, wish.action, fine, request.seed, frames if held else None)
     if drawn is not None and request.open:
         drawn = replace(drawn, features=gone_on(drawn.features, generator.layout, request.held))
@@ -335,6 +339,9 @@ def _as_asked(
                 features = change(features, layout, wish, fixed, changes)
     if whole is None or not whole.exact or wish.action not in AT_PACE:
         features = _retimed(features, layout, wish, fixed, changes, whole)
+    held = held_pose(request.text.said) if whole is not None and fixed is None and wish.action in HOLDING else None
+    if held is not None and len(features) >= SHORTEST:
+        features, changes["pose_held"] = with_held_pose(features, layout, held), held
     changed = changes or made is None or len(features) != len(made.features)
     return AskedMotion(features, changes) if changed else made
 

@@ -9,8 +9,10 @@ place by two-bone inverse kinematics, as in the made clips of the training data.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,8 @@ from numpy.typing import NDArray
 from marey.checks.kinematics import smooth
 from marey.drawing.holds import LYING
 from marey.generation.asked import action_of
-from marey.generation.gaits import GAITS
+from marey.generation.done import AGAIN_HELD, BEGINS_S, FALL, PACES, raised_s
+from marey.generation.gaits import GAITS, STAMP_S, stomping
 from marey.generation.hits import hit_part
 from marey.generation.port import MotionFeatures, Request
 from marey.generation.timed import TimedText
@@ -45,6 +48,7 @@ Float32 = NDArray[np.float32]
 
 _ACTS = {**DRAWN_AS, **DRAWN_ON}
 _LEG_JOINTS = [joint for leg in LEGS.values() for joint in leg]
+_ONE_FOOT = re.compile(r"\bfoot\b")
 BEARING = "bearing"
 """Key of a manifest, and of the record of a row of a timeline."""
 PASSES_S = 0.25
@@ -53,8 +57,8 @@ BROUGHT_S = 0.8
 """Seconds before arms are brought to their place, and after they have left it."""
 SWING_S = 0.5
 """The same of the filter that leaves an arm's way and takes out its swing."""
-BEGINS_S, LATEST_S, FALL = 0.4, 1.1, 1.15
-"""Seconds before a gesture, at least and at most, and how many times as long as it rises it takes to come down."""
+LATEST_S = 1.1
+"""Seconds before a gesture at most."""
 UPPER_STEPS = 0.02
 """Metres a frame by which the feet pass each other in a walk that rolls in full."""
 MOVES_FIRST, LATE = frozenset({"sit-down", "stand-up", "sit-floor", "kneel"}), 0.5
@@ -63,6 +67,17 @@ SEATED_SHARE = 0.7
 """Share of the lean of a standing trunk that one has that does not lean from the hips."""
 KEYED_S = 0.06
 """Standard deviation of the filter of ways through keys, seconds: they pass without a halt."""
+FOLDS = 1.8
+"""By how much an arm folds before it makes strokes: a hand that reaches past its place looks like one more knock."""
+AHEAD = ("shoulder", "chest")
+"""Places that hands are measured from which they come to from below."""
+GOLDEN = 0.618
+"""Share of the bounds of paces by which they differ from seed to seed."""
+LEAST = 2
+"""Strokes of a gesture of which no number is stated, at least."""
+EDGE_S, THERE = 0.15, 0.86
+"""Seconds before and after a gesture at least, and the share of the seconds in which a hand comes to its place from
+which on it makes strokes."""
 SHORTEST = 10
 """Frames of the shortest motion on which anything is drawn."""
 
@@ -92,17 +107,24 @@ class BorneSpan:
 
     @property
     def gestures(self) -> list[StatedBearing]:
-        """Those that are done once."""
-        return [each for each in self.stated if each.bearing.gesture]
+        """Those that are begun and ended in it."""
+        return [each for each in self.stated if each.is_done]
 
 
 @dataclass(frozen=True)
 class _Ways:
-    """How much of a bearing there is, 0 to 1 (T,): on trunk and head, on the arms, and on hips and legs."""
+    """How much of a bearing there is, 0 to 1 (T,): on trunk and head, on the arms, and on hips and legs.
+
+    Attributes:
+        done: seconds (T,) of its strokes or keys that are done at each frame; None = it goes on and on.
+        times: rounds through its keys.
+    """
 
     trunk: Array
     arms: Array
     legs: Array
+    done: Array | None = None
+    times: int = 1
 
 
 def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
@@ -198,7 +220,11 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
     for span in spans:
         rng = np.random.default_rng([span.seed, span.begin])
         for gait, side in _gaits_of(span).items():
-            joints = GAITS[gait](joints, layout, span.begin, span.end, side, rng)
+            times = next((each.times for each in span.stated if each.bearing.gait == gait), None)
+            draw = partial(stomping, times=times) if gait == "stomp" else GAITS[gait]
+            if times is not None and not side and any(_ONE_FOOT.search(each.words) for each in span.stated):
+                side = str(rng.choice(list(LEGS)))
+            joints = draw(joints, layout, span.begin, span.end, side, rng)
     body = StandingBody(joints)
     for stated, ways, rng in _drawn(spans, len(features), layout.fps):
         _Drawing(body, stated, ways, layout.fps, rng).draw()
@@ -225,11 +251,13 @@ def _drawn(
     for name in sorted(names, key=list(load_bearings()).index):
         having = [(span, each) for span in spans for each in span.stated if each.name == name]
         rng = np.random.default_rng([having[0][0].seed, having[0][0].begin, len(name)])
-        if names[name].bearing.gesture:
-            for span, each in having:
-                way = _once(span, each, frames, fps, rng)
+        for span, each in having:
+            if each.is_done:
+                way, done = _once(span, each, frames, fps, rng)
                 legs = way if each.shown_in(span.action) == "body" else np.zeros(frames)
-                yield each, _Ways(way, way, legs), rng
+                yield each, _Ways(way, way, legs, done, each.times or 1), rng
+        having = [(span, each) for span, each in having if not each.is_done]
+        if not having:
             continue
         held = {"body": np.zeros(frames), "upper": np.zeros(frames), "trunk": np.zeros(frames)}
         for span, each in having:
@@ -239,7 +267,7 @@ def _drawn(
             np.clip(smooth(mask, PASSES_S, fps), 0.0, 1.0)
             for mask in (held["body"], held["body"] + held["upper"], held["body"] + held["upper"] + held["trunk"])
         )
-        yield names[name], _Ways(trunk, arms, legs), rng
+        yield having[-1][1], _Ways(trunk, arms, legs), rng
 
 
 def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: bool) -> tuple[int, int]:
@@ -252,25 +280,50 @@ def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: boo
         begin += round(LATE * frames)
     elif stated.is_brought and not goes_on:
         begin += min(moment, frames // 2)
+    if stated.times is not None and stated.bearing.gait == "stomp":
+        begin, end = begin + round(BEGINS_S * fps), end - round((BEGINS_S + PASSES_S) * fps)
+        end = max(min(end, begin + round((stated.times * STAMP_S + BEGINS_S) * fps)), begin + 1)
     if stated.ends:
         end -= min(moment + round(PASSES_S * fps), frames // 4)
     return begin, end
 
 
-def _once(span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: np.random.Generator) -> Array:
-    """Return how much of a gesture there is, 0 to 1 (T,): it is made in its share of the span, of one who sits down or
-    stands up at the end of it."""
+def _once(
+    span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return how much of a gesture there is, 0 to 1 (T,), and the seconds (T,) of its strokes or keys that are done: it
+    is made in its share of the span, of one who sits down or stands up at the end of it.
+
+    Strokes are as many as are stated, and whole ones otherwise. Of gestures without strokes the number says how often
+    they are made.
+    """
     bearing, at, count = stated.bearing, span.gestures.index(stated), len(span.gestures)
     first = span.begin + (LATE * (span.end - span.begin) if span.action in MOVES_FIRST else 0.0)
     begin, end = (first + (span.end - first) * share / count for share in (at, at + 1))
-    seconds, rise, hold = (end - begin) / fps, bearing.raise_s, rng.uniform(*bearing.hold_s)
-    fall = bearing.fall_s or FALL * rise
-    fast = min(1.0, seconds / (rise + fall + 0.6 * hold))
+    seconds, rise, hold = (end - begin) / fps, raised_s(bearing), rng.uniform(*bearing.hold_s)
+    fall, pace = bearing.fall_s or FALL * rise, PACES[0] + (PACES[1] - PACES[0]) * (GOLDEN * span.seed % 1.0)
+    again = stated.times if stated.times is not None and not bearing.strokes_s(1) else 1
+    through = bearing.strokes_s(stated.times or (1 if bearing.keys else max(round(hold * bearing.stroke_hz), LEAST)))
+    if through:
+        hold = through / pace if stated.times or not bearing.keys else max(hold, through / pace)
+        room = max(seconds - rise - fall - 2 * EDGE_S, 0.3 * hold)
+        hold, pace = min(hold, room), pace * max(hold / room, 1.0)
+    elif again > 1:
+        hold *= AGAIN_HELD
+        fast = min(1.0, (seconds - 2 * EDGE_S) / (again * (rise + hold + fall)))
+        rise, hold, fall = rise * fast, hold * fast, fall * fast
+        once, start = rise + hold + fall, max((seconds - again * (rise + hold + fall)) / 2, 0.0)
+        ways = [envelope(frames, begin / fps + start + number * once, rise, hold, fall) for number in range(again)]
+        return np.max(ways, axis=0), np.maximum(np.arange(frames) / fps - begin / fps - start - rise, 0.0)
+    fast = min(1.0, seconds / (rise + fall + (hold if through else 0.6 * hold)))
     rise, fall = rise * fast, fall * fast
-    hold = min(hold, max(seconds - rise - fall - 2 * BEGINS_S, 0.5 * hold * fast))
+    if not through:
+        hold = min(hold, max(seconds - rise - fall - 2 * BEGINS_S, 0.5 * hold * fast))
     left = (seconds - rise - fall - hold) / 2
     start = max(min(rng.uniform(BEGINS_S, LATEST_S), left), 0.0)
-    return envelope(frames, begin / fps + start, rise, hold, fall)
+    start += begin / fps
+    since = np.maximum(np.arange(frames) / fps - start - THERE * rise, 0.0)
+    return envelope(frames, start, rise, hold, fall), np.minimum(pace * since, through) if through else since
 
 
 class _Drawing:
@@ -282,11 +335,12 @@ class _Drawing:
         self._body, self._ways, self._rng = body, ways, rng
         self._bearing: Bearing = stated.bearing
         self._arms = arms_of(stated)
+        self._done, self._times = ways.done, ways.times
         self._is_exchanged = stated.acts == LEFT and len(self._arms) == len(ARMS)
         self._time = np.arange(len(ways.trunk)) / fps
         self._fps = fps
         self._pace = float(rng.uniform(0.92, 1.08))
-        self._size, self._begins = float(rng.uniform(0.9, 1.1)), 0.0 if self._bearing.gesture else rng.uniform(0, 0.6)
+        self._size, self._begins = float(rng.uniform(0.9, 1.1)), 0.0 if ways.done is not None else rng.uniform(0, 0.6)
 
     def draw(self) -> None:
         """Draw it: trunk first, arms last."""
@@ -350,7 +404,7 @@ class _Drawing:
         body, (_, shoulder, elbow, wrist) = self._body, ARMS[side]
         if pose.at:
             place = self._place(side, pose.at)
-            swung = np.sin(2 * np.pi * pose.hz * self._since() + self._begins)[:, None]
+            swung = self._strokes(pose.hz)[:, None]
             hand = self._keyed(pose.path) if pose.path else np.array(pose.hand)
             target = body.from_shoulder(side, place) + hand + swung * np.array(pose.shake)
             upper, fore = body.reach(side, target, pose.elbow)
@@ -361,23 +415,30 @@ class _Drawing:
                 else body.local(normalize(body.joints[:, b] - body.joints[:, a]), side)
                 for wanted, a, b in ((pose.upper, shoulder, elbow), (pose.fore, elbow, wrist))
             )
-        body.move_arm(side, pose.share * self._ways.arms, upper, fore, lag=0.0, straight=not self._bearing.gesture)
+        folds = FOLDS if self._done is not None and pose.at in AHEAD and self._bearing.stroke_hz else 1.0
+        straight = not self._bearing.gesture or folds > 1.0
+        body.move_arm(side, pose.share * self._ways.arms, upper, fore, lag=0.0, straight=straight, folds=folds)
 
     def _keyed(self, values: Sequence[float] | Sequence[Vector]) -> Array:
         """Return numbers (T,), or points (T, 3), that are `values` at the times of the keys; 0 if there are none."""
         frames = len(self._time)
         if not values or self._bearing.keys is None:
             return np.zeros(frames)
-        times, since = self._bearing.keys.times, self._pace * self._since()
-        at = np.minimum(since, times[-1]) if self._bearing.gesture else (since + self._begins) % times[-1]
-        return smooth(way_through(at, times, values), KEYED_S, self._fps)
+        times = self._bearing.keys.times
+        if self._done is None:
+            at = (self._pace * self._time + self._begins) % times[-1]
+            return smooth(way_through(at, times, values), KEYED_S, self._fps)
+        again = times[-1] + self._bearing.returns_s
+        rounds = [number * again + np.array(times) for number in range(self._times)]
+        points = np.concatenate([np.asarray(values, np.float64)] * self._times)
+        return smooth(way_through(self._done, np.concatenate(rounds), points), KEYED_S, self._fps)
 
-    def _since(self) -> Array:
-        """Return seconds (T,): of a gesture since the hand came to its place, else since the beginning."""
-        if not self._bearing.gesture:
-            return self._time
-        there = self._ways.arms > 0.95 * self._ways.arms.max()
-        return np.maximum(self._time - self._time[int(there.argmax())], 0.0)
+    def _strokes(self, hz: float) -> Array:
+        """Return an oscillation (T,) between -1 and 1: of a gesture from its least on, where it ends too if it makes
+        whole strokes, so that each of them is one way there and back."""
+        if self._done is None:
+            return np.sin(2 * np.pi * hz * self._time + self._begins)
+        return -np.cos(2 * np.pi * hz * self._done)
 
     def _place(self, side: str, at: str) -> Array:
         """Return the point (T, 3) that a hand's place is measured from."""

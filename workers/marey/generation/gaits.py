@@ -158,16 +158,31 @@ def skipping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: s
     return _knees_lifted(joints, lifts, KNEE_SKIPS, HOPS)
 
 
-def stomping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+def stomping(
+    joints: Array,
+    layout: FeatureLayout,
+    begin: int,
+    end: int,
+    side: str,
+    rng: np.random.Generator,
+    *,
+    times: int | None = None,
+) -> Array:
     """Return joints (T, 22, 3) of a walk that stomps in the frames `begin` to `end`, or of a body that stands and
-    stamps with its feet in turn, or that of the `side`; see `limping`."""
+    stamps with its feet in turn, or that of the `side`, over and over or a number of `times`; see `limping`."""
     fps, inside = layout.fps, _inside(len(joints), begin, end, layout.fps)
     goes = np.clip(smooth((_speed(joints, fps) > STILL).astype(float), 0.15, fps), 0.0, 1.0)
     lifts = {each: goes * lift for each, lift in _lifts(joints, fps, inside).items()}
-    rounds = np.arange(len(joints)) / fps / STAMP_S + rng.uniform()
+    rounds, stamps = np.arange(len(joints)) / fps / STAMP_S + rng.uniform(), inside
+    if times is not None:
+        room = (end - begin) / fps
+        each_s = min(STAMP_S, (room - 0.3) / times)
+        first = begin / fps + min(rng.uniform(0.4, 0.8), max(room - times * each_s - 0.1, 0.1))
+        rounds = (np.arange(len(joints)) / fps - first) / each_s
+        stamps = ((rounds >= 0.0) & (rounds < times)).astype(float)
     for each in [side] if side in LEGS else LEGS:
         its = (rounds.astype(int) % 2 == list(LEGS).index(each)) | (side in LEGS)
-        lifts[each] = lifts[each] + (1.0 - goes) * inside * its * np.sin(np.pi * np.minimum(rounds % 1.0 / 0.6, 1.0))
+        lifts[each] = lifts[each] + (1.0 - goes) * stamps * its * np.sin(np.pi * np.minimum(rounds % 1.0 / 0.6, 1.0))
     body = StandingBody(_knees_lifted(joints, lifts, KNEE_STOMPS, 0.0))
     falls = np.maximum(*(-np.gradient(lift) * fps * STOMP_FALLS_S for lift in lifts.values()))
     body.shift(-STOMPS * inside * np.clip(smooth(falls, 0.05, fps), 0.0, 1.0))

@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 from marey.generation.asked import action_of
-from marey.generation.bearing import BEGINS_S, FALL, fitting
+from marey.generation.bearing import fitting
+from marey.generation.done import BEGINS_S, done_s
 from marey.generation.port import Generator, Request
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.bearings import Bearing
 
 WORK_S = 5.0
 """Seconds of work at least, two rounds of the longest, and of what has an end, such as a phone call."""
@@ -35,11 +35,5 @@ def _least(text: TextFeatures) -> float:
     if not (stated := stated_bearings(text.said)):
         return 0.0  # most prompts: their action need not be read
     done = fitting(stated, action_of(text))
-    gestures = [_seconds(each.bearing) for each in done if each.bearing.gesture]
-    return max([sum(gestures), *(WORK_S for each in done if each.bearing.work or each.ends)])
-
-
-def _seconds(gesture: Bearing) -> float:
-    """Return the seconds of a gesture, with a moment before and after it."""
-    rounds = gesture.keys.times[-1] if gesture.keys else sum(gesture.hold_s) / 2
-    return gesture.raise_s + rounds + (gesture.fall_s or FALL * gesture.raise_s) + 2 * BEGINS_S
+    gestures = [seconds + 2 * BEGINS_S for each in done if (seconds := done_s(each))]
+    return max([sum(gestures), *(WORK_S for each in done if (each.bearing.work and not each.is_done) or each.ends)])

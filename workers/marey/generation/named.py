@@ -19,6 +19,7 @@ from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
 from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
+from marey.drawing.staggers import stagger
 from marey.drawing.stumbles import stumble
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
@@ -33,6 +34,8 @@ LUNGE_S = 1.9
 """Seconds of one of several lunges."""
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
 _REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
+_BACK = re.compile(r"\bback(?:wards?)?\b")
+_NEARLY = re.compile(r"\b(?:almost|nearly)\b")
 _SIDES = {"l": "left", "r": "right"}
 _SIDE_LETTER = re.compile(r"\bknee(?: \w+)? ([lr])$")
 _RISES = re.compile(
@@ -96,6 +99,12 @@ def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds
 def _stumble(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del stated, wish, seconds
     return stumble(rng)
+
+
+def _stagger(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    back = "back" if _BACK.search(stated.words) else ""
+    return stagger(rng, stated.side or back, nearly_falls=bool(_NEARLY.search(stated.words)))
 
 
 def _side_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -172,6 +181,7 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "knee-strike": _knee_strike,
     "moonwalk": _moonwalk,
     "stumble": _stumble,
+    "stagger": _stagger,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,
     "tennis-serve": _tennis_serve,

@@ -27,6 +27,15 @@ DRAWN_SPEEDS: Mapping[str, float] = {"slow": 0.52, "fast": 1.5}
 slow one has to differ from the slowest of these."""
 PACED_SPEEDS: Mapping[str, float] = {"slow": 0.7, "fast": 1.3}
 """The same of movements of kinds that are at the pace already."""
+MOOD_SPEEDS: Mapping[str, float] = {
+    "sad": 0.78,
+    "tired": 0.74,
+    "proud": 0.92,
+    "scared": 1.08,
+    "happy": 1.12,
+    "angry": 1.25,
+}
+"""The same of movements that are drawn, by the mood of the body; the pace that a prompt names takes its place."""
 LONGEST_S = 8.0
 """Seconds beyond which no drawn movement is slowed down by more than others."""
 FALLING = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn", "cartwheel", "flip", "die"})
@@ -40,7 +49,7 @@ class WaySpeeds:
     Attributes:
         slow: of a slow one, at most.
         fast: of a fast one, at least.
-        least: of one whose prompt does not say; 0 = any.
+        least, most: of one whose prompt does not say; 0 = any.
         played: bounds of how many times as fast it is played: beyond them the steps are not those of a body that falls
             from foot to foot.
     """
@@ -49,11 +58,12 @@ class WaySpeeds:
     fast: float
     least: float
     played: tuple[float, float]
+    most: float = 0.0
 
 
 WAY_SPEEDS: Mapping[str, WaySpeeds] = {
     "walk": WaySpeeds(0.8, 1.5, 0.0, (0.65, 1.45)),
-    "walk-backward": WaySpeeds(0.6, 1.2, 0.0, (0.6, 1.45)),
+    "walk-backward": WaySpeeds(0.6, 1.6, 0.9, (0.45, 1.5), most=1.05),
     "run": WaySpeeds(2.4, 3.8, 2.2, (0.75, 1.35)),
     "sprint": WaySpeeds(4.2, 5.0, 4.4, (0.8, 1.35)),
 }
@@ -68,16 +78,21 @@ class AskedPace:
     Attributes:
         pace: empty if it does not say.
         action: id of the only action.
+        mood: id of the bearing that is one; empty = none.
     """
 
     pace: Pace = ""
     action: str = ""
+    mood: str = ""
 
     @classmethod
     def of(cls, prompt: str, action: str) -> AskedPace:
         """Read the pace of a prompt; none of actions that have their own."""
         has_own = action in FALLING or (action in WAYS and action not in WAY_SPEEDS)
-        return cls("" if has_own else stated_pace(prompt) or _pace_of_bearing(prompt, action), action)
+        if has_own:
+            return cls("", action)
+        moods = [each.name for each in stated_bearings(prompt) if each.bearing.mood]
+        return cls(stated_pace(prompt) or _pace_of_bearing(prompt, action), action, next(iter(moods), ""))
 
     @property
     def of_way(self) -> bool:
@@ -103,8 +118,9 @@ class AskedPace:
         """
         if self.of_way:
             return 1.0
-        speed = (PACED_SPEEDS if at_pace else DRAWN_SPEEDS).get(self.pace, 1.0)
-        return max(speed, min(self.share, seconds / LONGEST_S)) if speed < 1.0 else speed
+        usual = MOOD_SPEEDS.get(self.mood, 1.0)
+        speed = (PACED_SPEEDS if at_pace else DRAWN_SPEEDS).get(self.pace, usual)
+        return max(speed, min(self.share if self.pace else 1.0, seconds / LONGEST_S)) if speed < 1.0 else speed
 
     def of_motion(self, features: Float32, layout: FeatureLayout) -> float:
         """Return how many times as fast a motion (T, D) in the layout's own units is played."""
@@ -115,7 +131,8 @@ class AskedPace:
         speeds_of = WAY_SPEEDS[self.action]
         wanted = {"slow": min(speed, speeds_of.slow), "fast": max(speed, speeds_of.fast)}
         low, high = speeds_of.played
-        return min(max(wanted.get(self.pace, max(speed, speeds_of.least)) / speed, low), high) if speed else 1.0
+        usual = min(max(speed, speeds_of.least), speeds_of.most or np.inf)
+        return min(max(wanted.get(self.pace, usual) / speed, low), high) if speed else 1.0
 
 
 def _pace_of_bearing(prompt: str, action: str) -> Pace:

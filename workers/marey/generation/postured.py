@@ -15,6 +15,7 @@ from marey.checks.kinematics import smooth
 from marey.drawing.holds import BACK, FRONT, PRONE, SLIDE, SLIDES_M, SLIDES_S, passing
 from marey.drawing.passing import pose
 from marey.drawing.shots import prone_shots
+from marey.generation.done import done_s
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import retimed
 from marey.motion.features import FeatureLayout, encode_all
@@ -139,13 +140,9 @@ def pass_into(frames: Float32, start: int, count: int) -> None:
 
 def gestures_s(said: str) -> float:
     """Return the seconds that gestures take at least that are drawn on a body, one after the other, and work."""
-    bearings = [each.bearing for each in stated_bearings(said)]
-    gestures = [
-        2.1 * each.raise_s + (each.keys.times[-1] if each.keys else each.hold_s[0]) + EDGE_S
-        for each in bearings
-        if each.gesture
-    ]
-    return max([sum(gestures), *(WORK_S for each in bearings if each.work)])
+    stated = stated_bearings(said)
+    gestures = [seconds + EDGE_S for each in stated if (seconds := done_s(each))]
+    return max([sum(gestures), *(WORK_S for each in stated if each.bearing.work)])
 
 
 def _fitted(held: RowPosture, seconds: float, frames: int | None) -> Array:

@@ -13,6 +13,7 @@ from marey.drawing.gesture import BOTH, SIDES, Gesture
 from marey.drawing.raises import FRONT, SIDE, Raise, raise_to
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.held_poses import stated_hold
 from marey.vocabulary.lengths import stated_length
 
 _LOWERS = re.compile(
@@ -101,7 +102,8 @@ def stated_raise(wish: FineWish, rng: random.Random, seconds: float | None) -> G
     if height == "surrender":
         return raise_to(rng, Raise(BOTH, "head", SIDE, keeps=not lowers))
     kept = _KEEPS.search(up)
-    hold = stated_length(up[kept.start() :]).seconds if kept else None
+    said = up[kept.start() :] if kept else ""
+    hold = stated_length(said).seconds or stated_hold(said)
     return raise_to(rng, Raise(side, height, way, wish.count or 1, bool(kept and not lowers), hold))
 
 

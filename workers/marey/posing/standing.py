@@ -101,7 +101,17 @@ class StandingBody:
         pivot = self.joints[:, joint : joint + 1]
         self.joints[:, moved] = pivot + rotate(turned[:, None], self.joints[:, moved] - pivot)
 
-    def move_arm(self, side: str, way: Array, upper: Array, fore: Array, lag: float, *, straight: bool = False) -> None:
+    def move_arm(
+        self,
+        side: str,
+        way: Array,
+        upper: Array,
+        fore: Array,
+        lag: float,
+        *,
+        straight: bool = False,
+        folds: float = 1.0,
+    ) -> None:
         """Move an arm from its current direction to another and back.
 
         Args:
@@ -109,14 +119,21 @@ class StandingBody:
             way: (T,) progress of the movement, 0 to 1.
             upper, fore: (T, 3) or (3,) directions of upper arm and forearm at 1, in the body's frame.
             lag: seconds by which the forearm follows the upper arm.
+            folds: more than 1: the elbow bends before the upper arm rises, and stretches after it has come down, so
+                that the hand reaches no farther than its place on the way.
             straight: go there the shortest way instead of past the front of the body with a bent elbow.
         """
         collar, shoulder, elbow, wrist = ARMS[side]
         later = np.interp(np.arange(len(way)) - lag * FPS, np.arange(len(way)), way)
         bones = []
         for (a, b), weight, target, via in (
-            ((shoulder, elbow), way, upper, direction(*_VIA["upper"])),
-            ((elbow, wrist), np.minimum(later, 1.0), fore, direction(*_VIA["fore"])),
+            (
+                (shoulder, elbow),
+                np.clip(way, 0.0, 1.0) ** folds if folds > 1.0 else way,
+                upper,
+                direction(*_VIA["upper"]),
+            ),
+            ((elbow, wrist), 1.0 - (1.0 - np.minimum(later, 1.0)) ** folds, fore, direction(*_VIA["fore"])),
         ):
             here = self.local(normalize(self.joints[:, b] - self.joints[:, a]), side)
             w = weight[:, None]

@@ -1,0 +1,45 @@
+"""Poses that are held for as long as the words say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marey.generation.drawn_whole import drawn_whole
+from marey.generation.fine_wish import FineWish
+from marey.generation.pose_holds import with_held_pose
+from marey.motion.features import HUMANML3D_263
+from marey.vocabulary.held_poses import held_pose
+from marey.vocabulary.lengths import stated_length
+
+LAYOUT = HUMANML3D_263
+
+
+@pytest.mark.parametrize(
+    ("prompt", "seconds"),
+    [
+        ("he squats and holds it for two seconds", 2.0),
+        ("she bows, holding the pose for 3 seconds", 3.0),
+        ("reaches up and holds the stretch for a moment", 1.5),
+        ("raises both arms and keeps the position", 1.5),
+        ("he holds the bow in his left hand", None),
+        ("squats for two seconds", None),
+    ],
+)
+def test_words_say_how_long_a_pose_is_held(prompt: str, seconds: float | None) -> None:
+    assert held_pose(prompt) == seconds
+    assert (stated_length(prompt).seconds is None) == ("squats for" not in prompt)
+
+
+@pytest.mark.parametrize("action", ["squat", "bow", "reach-up"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_held_pose_lasts_and_the_rest_stays(action: str, seed: int) -> None:
+    made = drawn_whole(LAYOUT, action, FineWish(None, "", action, False, ("", "")), seed, None)
+    assert made is not None
+    held = with_held_pose(made.features, LAYOUT, 3.0)
+    joints, before = (LAYOUT.decode(each).astype(np.float64) for each in (held, made.features))
+    far = np.linalg.norm(joints - joints[:1], axis=-1).mean(axis=1)
+    near = np.linalg.norm(joints - joints[far.argmax()], axis=-1).mean(axis=1) < 0.15 * far.max()
+    assert 2.8 * LAYOUT.fps < near.sum() < 5.0 * LAYOUT.fps
+    assert np.abs(joints[-1] - joints[0] - (before[-1] - before[0])).max() < 0.05
+    assert np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).max() * LAYOUT.fps**2 < 160

@@ -1,0 +1,43 @@
+"""Poses that are held as long as the words say, where a drawn movement is farthest from how it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import smooth
+from marey.motion.features import FeatureLayout, encode_all
+
+Float32 = NDArray[np.float32]
+
+HOLDING = frozenset(
+    {"squat", "bow", "bend-over", "raise-arm", "reach-up", "reach-forward", "pick-up", "crouch", "balance"}
+)
+"""Actions with a pose that can be held."""
+NEAR = 0.15
+"""Share of the way to the farthest pose by which one differs from it and is as good."""
+EASES_S = 0.06
+"""Standard deviation of the filter by which a body comes to the pose and leaves it, seconds."""
+
+
+def with_held_pose(features: Float32, layout: FeatureLayout, seconds: float) -> Float32:
+    """Return a motion (T', D) that stays in its farthest pose for so many seconds; as it is if it does so already.
+
+    Args:
+        features: (T, D), in the layout's own units.
+        layout: of them, on the skeleton of HumanML3D.
+        seconds: for which the pose is held.
+    """
+    joints = layout.decode(features).astype(np.float64)
+    away = np.linalg.norm(joints - joints[:1], axis=-1).mean(axis=1)
+    at = int(away.argmax())
+    alike = np.linalg.norm(joints - joints[at], axis=-1).mean(axis=1) < NEAR * away[at]
+    more = round(seconds * layout.fps) - int(alike.sum())
+    if more <= 0:
+        return features
+    index = np.concatenate([np.arange(at), np.full(more, at), np.arange(at, len(joints))]).astype(float)
+    index[1:-1] = smooth(index, EASES_S, layout.fps)[1:-1]
+    low = np.clip(np.floor(index).astype(int), 0, len(joints) - 1)
+    share = np.clip(index - low, 0.0, 1.0)[:, None, None]
+    high = np.minimum(low + 1, len(joints) - 1)
+    return encode_all(layout, (1 - share) * joints[low] + share * joints[high])
