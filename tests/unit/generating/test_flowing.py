@@ -9,8 +9,11 @@ from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.postured import drawn_posture
 from marey.generation.row_postures import row_postures
-from marey.generation.shots.flowing import SPEED, flowing, without_rest
+from marey.generation.shots.flowing import SPEED, flowing, flowing_as_shown, without_rest
 from marey.motion.features import HUMANML3D_263
+from marey.quality.record import SHOWN
+from marey.selector.motion import Motion
+from marey.selector.rules import RULES
 from tests.support.bodies import Body, steady
 
 LAYOUT = HUMANML3D_263
@@ -144,3 +147,21 @@ def test_who_is_hit_bends_on(said: str, seed: int) -> None:
     head = joints_of(joined.before, joined.after)[:, 15, 1]
     first = int(np.flatnonzero(head < head[0] - 0.2)[0])
     assert head[first : int(head.argmin())].max() < head[0] - 0.15, "the body does not come upright in between"
+
+
+def test_what_is_left_out_leaves_the_actions_to_be_seen() -> None:
+    hidden = 0
+    for seed in range(6):
+        rows = {action: drawn(action, said, seed) for action, said in (("aim", "aims a rifle"), ("shoot", "fires"))}
+        aims, fires = rows["aim"], rows["shoot"]
+        joined, kept = flowing(aims, fires, LAYOUT), flowing_as_shown(aims, fires, LAYOUT, ("aim", "shoot"))
+        assert joined is not None
+        if kept is None:
+            continue
+        assert all(shows(each, action) for each, action in zip((kept.before, kept.after), rows, strict=True))
+        hidden += not all(shows(each, action) for each, action in zip((joined.before, joined.after), rows, strict=True))
+    assert hidden
+
+
+def shows(features: np.ndarray, action: str) -> bool:
+    return RULES[action](Motion(LAYOUT.decode(features), FPS), "") >= SHOWN

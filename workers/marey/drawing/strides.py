@@ -13,7 +13,7 @@ from marey.posing.standing import StandingBody, eased
 
 _PACES = {"slow": (0.8, 0.9), "": (0.52, 0.58), "fast": (0.4, 0.44)}
 """Seconds from one stride to the next, by pace."""
-_AHEAD, _BACK = (0.46, 0.54), (0.34, 0.4)
+_AHEAD, _BACK = (0.56, 0.64), (0.44, 0.5)
 """Metres of a stride ahead, and of one back."""
 _SWINGS = 0.88
 """Share of the time to the next stride in which a foot is in the air."""

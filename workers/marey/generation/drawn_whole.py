@@ -45,8 +45,9 @@ SECONDS: Mapping[str, tuple[float, float]] = {
     "punch": (3.5, 5.0),
 }
 """Seconds of a body that moves on and on, where nothing is said of them; others bring their own."""
-BRIEF_S = (2.0, 2.6)
-"""The same of a body that does other things before or after."""
+BRIEF_S: Mapping[str, tuple[float, float]] = {"dribble": (3.0, 3.8)}
+SHORT_S = (2.0, 2.6)
+"""The same of a body that does other things before or after: of some actions, and of all others."""
 ROUNDS_S: Mapping[str, tuple[float, float]] = {"dodge": (2.1, 1.2), "nod": (0.75, 1.0)}
 """Seconds of each of a stated number, and beside them."""
 TRIES = 40
@@ -117,7 +118,7 @@ def _frames(action: str, wish: FineWish, rng: np.random.Generator) -> int:
         return round((wish.count * once + before) * FPS)
     if action not in SECONDS:
         return SHORTEST
-    return round(float(rng.uniform(*(BRIEF_S if any(wish.beside) else SECONDS[action]))) * FPS)
+    return round(float(rng.uniform(*(BRIEF_S.get(action, SHORT_S) if any(wish.beside) else SECONDS[action]))) * FPS)
 
 
 ALONE: Mapping[str, Callable[[FineWish], bool]] = {

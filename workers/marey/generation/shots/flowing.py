@@ -19,6 +19,9 @@ from marey.motion.filters import smooth
 from marey.motion.rotations import about, normalize, rotate
 from marey.posing.limbs import FPS, LEVEL
 from marey.posing.standing import ARMS, LEGS, StandingBody, eased
+from marey.quality.record import SHOWN
+from marey.selector.motion import SHORTEST, Motion
+from marey.selector.rules import RULES
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -141,8 +144,43 @@ def flowing(
     return JoinedRows(features[:border], features[border:], max(count + end - border, 1))
 
 
-def without_rest(features: Float32, layout: FeatureLayout, *, first: bool, last: bool) -> Float32:
-    """Return features (T', D) of a drawn movement without the rest before it, behind it, or both."""
+def flowing_as_shown(
+    before: Float32,
+    after: Float32,
+    layout: FeatureLayout,
+    actions: tuple[str, str],
+    *,
+    whole: tuple[bool, bool] = (False, False),
+    entered: int = 0,
+) -> JoinedRows | None:
+    """Return two drawn movements that go on into each other as `flowing` does, and still show their actions: of one
+    that would not, nothing is left out. None if they cannot.
+
+    Args:
+        before, after, layout, whole, entered: as of `flowing`.
+        actions: their ids in the vocabulary; empty = none that is known.
+    """
+    first, second = whole
+    for tried in dict.fromkeys([(first, second), (first, True), (True, second), (True, True)]):
+        joined = flowing(before, after, layout, whole=tried, entered=entered)
+        if joined is None:
+            return None
+        rows = ((before, joined.before, actions[0]), (after, joined.after, actions[1]))
+        if all(_shows(cut, layout, action) or not _shows(made, layout, action) for made, cut, action in rows):
+            return joined
+    return None
+
+
+def _shows(features: Float32, layout: FeatureLayout, action: str) -> bool:
+    """Return True if features show an action by its rule, or it has none."""
+    if action not in RULES:
+        return True
+    return len(features) >= SHORTEST and RULES[action](Motion(layout.decode(features), layout.fps), "") >= SHOWN
+
+
+def without_rest(features: Float32, layout: FeatureLayout, action: str = "", *, first: bool, last: bool) -> Float32:
+    """Return features (T', D) of a drawn movement without the rest before it, behind it, or both, unless its action
+    would not show then."""
     joints = layout.decode(features).astype(np.float64)
     if not (_stands(joints[0]) and _stands(joints[-1])):
         return features
@@ -151,7 +189,9 @@ def without_rest(features: Float32, layout: FeatureLayout, *, first: bool, last:
         begin = min(max(moved[0] - rest, 0), round(MOST_S * FPS))
     if last and (moved := _moves(joints, -1)):
         end = max(min(moved[-1] + 1 + rest, end), end - round(MOST_S * FPS))
-    return features[begin:end] if end - begin >= LEAST else features
+    cut = features[begin:end]
+    keeps = _shows(cut, layout, action) or not _shows(features, layout, action)
+    return cut if end - begin >= LEAST and keeps else features
 
 
 def _stands(pose: Array) -> bool:

@@ -24,7 +24,7 @@ from marey.generation.footing import RUNS
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.postured import MEETS, pass_into
-from marey.generation.shots.flowing import BENT_ON, flowing, without_rest
+from marey.generation.shots.flowing import BENT_ON, flowing, flowing_as_shown, without_rest
 from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
@@ -365,7 +365,8 @@ class _Timeline:
             if row.features is not None and row.is_trimmed:
                 beside = [each and not each.is_drawn for each in (self._row(number - 1), self._row(number + 1))]
                 first = bool(beside[0]) and not row.turn  # a transition replaces its rest, and no part of the turn
-                row.features = without_rest(row.features, layout, first=first, last=bool(beside[1]))
+                action = action_of(row.text)
+                row.features = without_rest(row.features, layout, action, first=first, last=bool(beside[1]))
         for before, after in pairwise(self.rows):
             if before.features is None or after.features is None or after.held.meets or after.held.apart:
                 continue
@@ -389,9 +390,11 @@ class _Timeline:
             elif (before.is_drawn or struck) and after.is_drawn:
                 whole = not before.is_trimmed, not after.is_trimmed
                 down = struck or (action_of(before.text) in BENT and after.held.own in LOWER)
-                joined = flowing(
-                    before.features, after.features, layout, whole=whole, entered=before.entered, down=down
-                )
+                pair, actions = (before.features, after.features), (action_of(before.text), action_of(after.text))
+                if down:
+                    joined = flowing(*pair, layout, whole=whole, entered=before.entered, down=True)
+                else:
+                    joined = flowing_as_shown(*pair, layout, actions, whole=whole, entered=before.entered)
                 if joined is not None:
                     after.changes = {**after.changes, **({"posture": AS_BEFORE} if down else {})}
                     before.changes = {**before.changes, **({"posture": BENT_ON} if struck else {})}
