@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import heading
+from marey.generation.timed import CUT
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth
 from marey.motion.rotations import about, normalize, rotate
@@ -186,7 +187,7 @@ def without_rest(features: Float32, layout: FeatureLayout, action: str = "", *, 
         return features
     begin, end, rest = 0, len(joints), round(REST_S * FPS)
     if first and (moved := _moves(joints, 0)):
-        begin = min(max(moved[0] - rest, 0), round(MOST_S * FPS))
+        begin = min(max(moved[0] - max(rest, CUT), 0), round(MOST_S * FPS))  # a transition replaces as much
     if last and (moved := _moves(joints, -1)):
         end = max(min(moved[-1] + 1 + rest, end), end - round(MOST_S * FPS))
     cut = features[begin:end]
