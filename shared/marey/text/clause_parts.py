@@ -71,11 +71,11 @@ def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:
     begin = 0
     for sign in _SIGN.finditer(text):
         left, right = text[begin : sign.start()], text[sign.end() :]
+        if not _begins_with_verb(right) and (sign["and"] or not (_is_short_name(right) and _COMMAND.match(left))):
+            continue  # before the names are looked for, which takes longer
         action = only_named(left) or ""
         after = only_named(_first(right)) or only_named(_CLAUSE.split(right)[0]) or ""
         if not action or not after or action == after:
-            continue
-        if not _begins_with_verb(right) and (sign["and"] or not (_is_short_name(right) and _COMMAND.match(left))):
             continue
         if action in SERIES and "then" not in sign[0].lower():
             continue

@@ -295,10 +295,14 @@ def drawing_of(generator: Generator[S], settings: S) -> bool:
     return bool(generator.describe_settings(settings).get(DRAWING, True))
 
 
+def draws_bearings(generator: Generator[Any], request: Request) -> bool:
+    """Return True if bearings are drawn on the motion of a request."""
+    return generator.bundle.manifest.draws_bearings and request.drawing
+
+
 def draws(generator: Generator[Any], request: Request) -> bool:
     """Return True if the motion of a request may be drawn, as those that its generator learned from."""
-    known = generator.bundle.manifest.draws_bearings and generator.layout.skeleton.name == HUMANML3D.name
-    return known and request.drawing
+    return draws_bearings(generator, request) and generator.layout.skeleton.name == HUMANML3D.name
 
 
 def _as_asked(

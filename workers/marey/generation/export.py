@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from marey.generation.asked import changes_of, is_winding
+from marey.generation.asked import changes_of, draws_bearings, is_winding
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
 from marey.generation.named import names_movement
@@ -78,8 +78,7 @@ def finish(
     if isinstance(generated, TimelineMotion):
         request = replace(request, timeline=generated.timeline)
     layout, features = generator.layout, generated.features
-    drawn = generator.bundle.manifest.draws_bearings and request.drawing
-    spans = borne_spans(request, layout.fps, len(features)) if drawn else []
+    spans = borne_spans(request, layout.fps, len(features)) if draws_bearings(generator, request) else []
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
     manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)
     finished = partial(finish_motion, layout=layout, body=body, fps=fps, clean=clean, manifest=manifest)

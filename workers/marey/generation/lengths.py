@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from marey.generation.asked import action_of
+from marey.generation.asked import action_of, draws_bearings
 from marey.generation.bearing import fitting
 from marey.generation.done import BEGINS_S, done_s
 from marey.generation.port import Generator, Request
@@ -23,8 +23,7 @@ def resolved_length(generator: Generator[Any], request: Request) -> Request:
         InvalidInput: as `Limits.check`.
     """
     resolved = generator.resolve_length(request)
-    drawn = generator.bundle.manifest.draws_bearings and request.drawing
-    if request.frames is not None or resolved.frames is None or not drawn:
+    if request.frames is not None or resolved.frames is None or not draws_bearings(generator, request):
         return resolved
     limits = generator.limits
     return replace(resolved, frames=limits.within(max(resolved.frames, round(_least(request.text) * limits.fps))))

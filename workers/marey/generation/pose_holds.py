@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.motion.features import FeatureLayout, encode_all
+from marey.posing.standing import poses_at
 
 Float32 = NDArray[np.float32]
 
@@ -37,7 +38,4 @@ def with_held_pose(features: Float32, layout: FeatureLayout, seconds: float) -> 
         return features
     index = np.concatenate([np.arange(at), np.full(more, at), np.arange(at, len(joints))]).astype(float)
     index[1:-1] = smooth(index, EASES_S, layout.fps)[1:-1]
-    low = np.clip(np.floor(index).astype(int), 0, len(joints) - 1)
-    share = np.clip(index - low, 0.0, 1.0)[:, None, None]
-    high = np.minimum(low + 1, len(joints) - 1)
-    return encode_all(layout, (1 - share) * joints[low] + share * joints[high])
+    return encode_all(layout, poses_at(joints, index))

@@ -26,7 +26,7 @@ from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.generation.holding import climb, drives, hangs
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, way_through
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, poses_at
 from marey.posing.still import standing_still
 from marey.vocabulary.turns import stated_turn
 
@@ -340,7 +340,4 @@ def _joined(gestures: Sequence[Gesture], frames: int | None, rng: random.Random)
 
 def retimed(joints: Array, frames: int) -> Array:
     """Return as many frames at another pace."""
-    at = np.linspace(0.0, len(joints) - 1.0, frames)
-    return way_through(at, np.arange(float(len(joints))), joints.reshape(len(joints), -1)).reshape(
-        frames, *joints.shape[1:]
-    )
+    return poses_at(joints, np.linspace(0.0, len(joints) - 1.0, frames))

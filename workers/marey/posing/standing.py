@@ -311,6 +311,12 @@ def way_through(
     return np.stack([np.interp(t, times, each) for each in through.T], axis=-1)
 
 
+def poses_at(joints: Array, frames: Array) -> Array:
+    """Return joints (N, J, 3) at frames (N,), which may lie between those of joints (T, J, 3); ends are held."""
+    flat = joints.reshape(len(joints), -1)
+    return way_through(frames, np.arange(float(len(joints))), flat).reshape(-1, *joints.shape[1:])
+
+
 def tremble(frames: int, rate: float, phase: float) -> Array:
     """Oscillation (frames,) between -1 and 1 of about `rate` per second, unsteady in pace and strength.
 

@@ -15,7 +15,7 @@ from marey.generation.shots.flowing import JoinedRows
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEGS, StandingBody, way_through
+from marey.posing.standing import LEGS, StandingBody, poses_at
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -74,10 +74,7 @@ def frozen(before: Float32, frames: int, layout: FeatureLayout) -> JoinedRows | 
     time = np.arange(frames + 1)
     # twice the time for half of the frames: from full speed to rest
     at = begin + np.where(time < slows, time - time**2 / (2 * slows), slows / 2)
-    held = way_through(at, np.arange(float(len(joints))), joints.reshape(len(joints), -1)).reshape(
-        -1, *joints.shape[1:]
-    )
-    body = StandingBody(held)
+    body = StandingBody(poses_at(joints, at))
     rests = np.clip((time - slows) / FPS, 0.0, 1.0)
     body.shift(-BREATHS_M * rests * (1 - np.cos(2 * np.pi * BREATHS_HZ * (time - slows) / FPS)))
     features = encode_all(layout, np.concatenate([joints[:begin], body.solved()[:frames]]))
