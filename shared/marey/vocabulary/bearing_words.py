@@ -18,7 +18,8 @@ _WALK, _LOAD = "walk", " with a load"
 _PERSON = "person"
 _ALL = r"a|an|the|my|his|her|this|that|one|some"
 _VERY = r"(?:(?:very|really|so|rather|quite|extremely|slightly|somewhat|too|visibly|clearly|obviously) )*"
-_BE = r"(?:(?:who|that|which) )?(?:is|are|was|were|looks?|feels?|seems?|being|looking|feeling) "
+_SEEMS = r"(?:look|feel|seem|appear)(?:s|ed|ing)?"
+_BE = rf"(?:(?:who|that|which) )?(?:is|are|was|were|being|{_SEEMS}(?: to be)?) "
 _JOINT = re.compile(
     r"(?:^|(?<=\W))(?:(?:and|then|while|as|but|first|who|that|with)\s+)*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$",
     re.IGNORECASE,
@@ -42,6 +43,8 @@ _AT_ONCE_AFTER = re.compile(r"^\W*(?:while|as|whilst|during|when|seated|sitting)
 _UNTIDY = tuple(
     re.compile(pattern)
     for pattern in (
+        r"[\s,;]*\b(?:(?:and|but|while|who|that) )?(?:(?:he|she|they|it) )?"
+        rf"{_SEEMS}(?: (?:to be|like|very|really|so|quite|rather|a (?:bit|little)))*\s*(?=[,.;!?]|$)",
         r"\s+(?=[\s,.;!?])",
         r",\s*(?=[,.;])",
         r"^[\s,;.]+(?:and\s+)?",
@@ -49,7 +52,8 @@ _UNTIDY = tuple(
         r"(?<=\b[Aa])n(?= [^aeiouAEIOU])",
     )
 )
-"""Spaces and commas that stand twice or at the ends, words that join nothing, and "an" before a consonant."""
+"""Verbs of what is seen in a body without what is seen, spaces and commas that stand twice or at the ends, words that
+join nothing, and "an" before a consonant."""
 _SUBJECT = re.compile(rf"\b(?:(?:{_ALL}) (?:(?!(?:{_ALL}) )[\w,-]+ ){{0,4}}|who )$")
 _NO_ACTION = frozenset(
     [

@@ -33,6 +33,28 @@ _LIMBS = re.compile(
     r"\b(?:left|right)[ -](?:arm|hand|palm|fist|wrist|elbow|shoulder|leg|foot|knee|ankle|hip|ear|eye|thigh|shin)s?\b"
 )
 """Words of sides that are no ways."""
+_OWN = r"(?:(?:his|her|their|its|the|one's|both)\ )?"
+_NO_TURN = re.compile(
+    rf"""
+    \b(?:at|with|in|keep\w*|hold\w*|maintain\w*|set\w*|pick\w*\ up|quicken\w*|slow\w*|same)\ (?:\w+\ ){{0,4}}?pace\b
+    |\bpaced\b
+    |\b(?:along|down|on|up|through|across|over|follow\w*)\ (?:an?|the|this|that)
+        \ (?:(?!wind|curv|twist|circ|round|bend)[\w-]+\ ){{0,3}}?(?:path|trail|track)\b
+    |\b(?:straight|upright|bent|stiff|stooped|hunched|curved|arched|rounded|tall|aching|sore|bad)\ back\b
+    |\bback\ (?:is\ |held\ |kept\ )?(?:very\ )?(?:straight|upright|bent|stooped|hunched|tall|rounded|arched)\b
+    |\b(?:his|her|their|its|the|one's)\ back\b
+    |\b(?:lean|arch|hold|pull|throw|tilt|tip|roll)\w*\ (?:\w+\ ){{0,3}}?back\b
+    |\bshoulders?\ (?:\w+\ )?(?:back|rounded)\b
+    |\b(?:look|glanc|peer|star)\w*\ (?:\w+\ )?(?:back|around|about|round)\b
+    |\bone\ (?:\w+\ ){{0,2}}(?:in\ front\ of|after|before|behind)\ the\ other\b
+    |\bswing\w*\ {_OWN}(?:arms?|hips?|elbows?)\b
+    |\b(?:arms?|hips?|hands?|elbows?)\ (?:\w+\ )?swing\w*\b
+    |\bturn\w*\ {_OWN}head\b
+    |\bin\ one\ direction\b
+    """,
+    re.VERBOSE,
+)
+"""Words that speak of a turn elsewhere: of a pace, a plain path, the back, the arms."""
 _IN_PLACE = re.compile(
     r"\b(?:in place|on the spot|on (?:his|her|their|its|the|one) (?:heels?|spot)|pivot\w*|stationary|standing|stands?"
     r"|(?:where|as) (?:he|she|they|it) stands?|about[ -](?:face|turn))\b"
@@ -90,7 +112,11 @@ def stated_turn(prompt: str, action: str) -> Turn | None:
     if not is_way and usual is None:
         return None
     found = set(table.angles(text))
-    if is_way and not found and not table.turning.intersection(_WORDS.findall(_LIMBS.sub(" ", text))):
+    if (
+        is_way
+        and not found
+        and not table.turning.intersection(_WORDS.findall(_NO_TURN.sub(" ", _LIMBS.sub(" ", text))))
+    ):
         return Turn()
     if len(found) > 1:
         return None

@@ -45,6 +45,19 @@ def test_moods_show_in_the_trunk_of_who_moves_the_arms(prompt: str, action: str,
 
 
 @pytest.mark.parametrize(
+    ("prompt", "left"),
+    [
+        ("he is jogging and looks exhausted", "he is jogging"),
+        ("the woman is walking and appears to be drunk", "the woman is walking"),
+        ("he jogs, looking exhausted", "he jogs"),
+        ("the man who seems tired sits down", "the man sits down"),
+    ],
+)
+def test_verbs_of_seeming_go_with_what_they_say(prompt: str, left: str) -> None:
+    assert BarePrompt.of(prompt).text == left
+
+
+@pytest.mark.parametrize(
     ("prompt", "left", "name", "times"),
     [
         ("he raps, then knocks on the gate four times", "he raps", "knock", 4),

@@ -12,6 +12,11 @@ from marey.vocabulary.courses import ASIDE, CIRCLE, STRAIGHT, ZIGZAG, dribbles_a
     [
         ("a man walks to work", "walk", STRAIGHT, ""),
         ("she walks with her left arm up", "walk", STRAIGHT, ""),
+        ("a courier runs at a steady pace", "run", STRAIGHT, ""),
+        ("she runs along a forest trail", "run", STRAIGHT, ""),
+        ("he strides with his shoulders back", "walk", STRAIGHT, ""),
+        ("walks with a straight back, swinging both arms", "walk", STRAIGHT, ""),
+        ("walks, one foot in front of the other", "walk", STRAIGHT, ""),
         ("she jogs off to the right", "run", ASIDE, "right"),
         ("a knight walks away slowly to his left", "turn", ASIDE, "left"),
         ("the girl runs left", "run", ASIDE, "left"),
@@ -41,6 +46,9 @@ def test_ways_have_courses(prompt: str, action: str, kind: str, side: str) -> No
         ("moves left", "sidestep"),
         ("turns left", "turn"),
         ("wanders around", "walk"),
+        ("he paces back and forth", "walk"),
+        ("she walks back", "walk"),
+        ("runs along a winding path", "run"),
     ],
 )
 def test_other_ways_come_as_they_do(prompt: str, action: str) -> None:
