@@ -8,10 +8,8 @@ machines by it. Ratios of processor time stand there too, for machines that are 
 from __future__ import annotations
 
 import os
-import resource
 import sys
 import tempfile
-import time
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.harness import measure, table
+from benchmarks.harness import matrix_products, measure, peak_mib, processor_seconds, table
 from marey.generation.port import Request
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.generate import Generator, SamplingSettings
@@ -36,10 +34,10 @@ def main() -> None:
     torch.set_num_threads(THREADS)
     with tempfile.TemporaryDirectory() as folder:
         bundle = random_bundle(Path(folder) / "random-paper", "paper")
-        before = _peak_mib()
+        before = peak_mib()
         fast = Generator.load(bundle, device="cpu", threads=THREADS)
         fast.generate(requests(32))
-        print(f"peak memory with batch 32: {_peak_mib():.0f} MiB (before loading: {before:.0f} MiB)\n")
+        print(f"peak memory with batch 32: {peak_mib():.0f} MiB (before loading: {before:.0f} MiB)\n")
         slow = Generator.load(bundle, device="cpu", threads=THREADS, dtype=torch.float32)
     peer = momask()
     plain = SamplingSettings(skip_idle=False, trim_slots=False)
@@ -55,12 +53,16 @@ def main() -> None:
         baseline = "momask-codes" if peer is not None else "hgm3, float32, no savings"
         timings = measure(runs, repeats=9, seconds=90)
         rates = ", ".join(f"{t.name} {batch / t.median:.2f}" for t in timings)
-        used = ", ".join(f"{name} {_processor_seconds(run) / batch:.3f}" for name, run in runs.items())
-        note = f"Motions/s: {rates}. Processor seconds a motion: {used}. {_matrices()}"
+        used = ", ".join(f"{name} {processor_seconds(run) / batch:.3f}" for name, run in runs.items())
+        float32, bfloat16 = matrix_products()
+        note = (
+            f"Motions/s: {rates}. Processor seconds a motion: {used}. "
+            f"Matrix products now: float32 {float32:.0f}, bfloat16 {bfloat16:.0f} GFLOP/s."
+        )
         print(table(f"batch {batch}", timings, baseline=baseline, note=note))
 
 
-def requests(batch: int) -> list[Request]:
+def requests(batch: int, width: int = 512) -> list[Request]:
     """Prompts with two actions and four specifics, as a sentence of a dozen words gives."""
     nodes = [Node(0, "motion", "-", ())]
     nodes += [Node(1 + a, "action", "-", ()) for a in range(2)] + [Node(3 + s, "specific", "-", ()) for s in range(4)]
@@ -68,7 +70,7 @@ def requests(batch: int) -> list[Request]:
     edges += [Edge(1 + s % 2, 3 + s, "ARG0", "ARG0") for s in range(4)]
     graph = SemanticGraph("-", ("-",), tuple(nodes), tuple(edges))
     rng = np.random.default_rng(0)
-    vectors = rng.normal(size=(batch, len(nodes), 512)).astype(np.float16)
+    vectors = rng.normal(size=(batch, len(nodes), width)).astype(np.float16)
     return [Request(TextFeatures("-", "-", graph, v), seed, FRAMES) for seed, v in enumerate(vectors)]
 
 
@@ -106,30 +108,6 @@ def momask() -> Callable[[int], object] | None:
         return vq.forward_decoder(residual.generate(tokens, captions, lengths, temperature=1, cond_scale=5))
 
     return run
-
-
-def _processor_seconds(run: Callable[[], object]) -> float:
-    """Processor time of one call, all threads: hardly changed by what else runs on the machine."""
-    start = time.process_time()
-    run()
-    return time.process_time() - start
-
-
-def _matrices() -> str:
-    """GFLOP/s of a large matrix product now."""
-    found = []
-    for dtype in (torch.float32, torch.bfloat16):
-        a, b = torch.randn(2048, 1024, dtype=dtype), torch.randn(1024, 1024, dtype=dtype)
-        a @ b
-        start = time.perf_counter()
-        for _ in range(10):
-            a @ b
-        found.append(10 * 2 * 2048 * 1024 * 1024 / (time.perf_counter() - start) / 1e9)
-    return f"Matrix products now: float32 {found[0]:.0f}, bfloat16 {found[1]:.0f} GFLOP/s."
-
-
-def _peak_mib() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 if __name__ == "__main__":

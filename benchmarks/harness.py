@@ -7,6 +7,7 @@ time. A benchmark is a file `bench_NAME.py` with a `main()`; `python -m benchmar
 from __future__ import annotations
 
 import platform
+import resource
 import statistics
 import time
 from collections.abc import Callable, Mapping
@@ -77,6 +78,33 @@ def has_cuda() -> bool:
         return False
     print(f"{torch.cuda.get_device_name()}, torch {torch.__version__}, CUDA {torch.version.cuda}\n")
     return True
+
+
+def matrix_products() -> tuple[float, float]:
+    """GFLOP/s of a large matrix product now, float32 and bfloat16, on torch's threads: what a machine could give."""
+    import torch
+
+    found = []
+    for dtype in (torch.float32, torch.bfloat16):
+        a, b = torch.randn(2048, 1024).to(dtype), torch.randn(1024, 1024).to(dtype)
+        a @ b
+        start = time.perf_counter()
+        for _ in range(10):
+            a @ b
+        found.append(10 * 2 * 2048 * 1024 * 1024 / (time.perf_counter() - start) / 1e9)
+    return found[0], found[1]
+
+
+def processor_seconds(run: Callable[[], object]) -> float:
+    """Processor time of one call, all threads: hardly changed by what else runs on the machine."""
+    start = time.process_time()
+    run()
+    return time.process_time() - start
+
+
+def peak_mib() -> float:
+    """Most memory that this process has had, MiB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _unit(seconds: float) -> str:

@@ -42,6 +42,7 @@ class Ragged:
 
     taken: Tensor  # (R,) places of the rows among B · S
     spread: Tensor  # (3 · B · H · P,) chunks of queries, keys and values among those of (R, 3, H)
+    alone: Tensor  # (B · H · P,) chunks of one of these among those of (R, H)
     collect: Tensor  # (R, H) chunks of the rows among those of (B, H, P)
     bias: Tensor  # (B · H, 1, P) added to scores
     heads: int
@@ -60,12 +61,13 @@ class Ragged:
         row[rows // size, rows % size] = torch.arange(len(rows))
         part, head = torch.arange(3).view(3, 1, 1, 1), torch.arange(heads).view(1, 1, heads, 1)
         spread = (row[None, :, None] * 3 + part) * heads + head  # (3, B, H, P)
+        alone = row[:, None] * heads + head[0]  # (B, H, P)
         sequence, place = taken[:, None] // size, taken[:, None] % size
         collect = (sequence * heads + torch.arange(heads)) * places + place
         exists = torch.zeros(batch, places, dtype=torch.bool)
         exists[:, :size] = valid
         bias = key_bias(exists, dtype)[:, None, None].expand(-1, heads, -1, -1).reshape(-1, 1, places)
-        return cls(taken, spread.flatten(), collect, bias, heads, size, places)
+        return cls(taken, spread.flatten(), alone.flatten(), collect, bias, heads, size, places)
 
     def first(self, rows: int) -> tuple[Tensor, Tensor]:
         """Return the layout's first `rows` places of each sequence.
@@ -88,6 +90,18 @@ class Ragged:
         chunks = qkv.view(len(qkv) * 3 * self.heads, -1).index_select(0, self.spread)
         query, key, value = chunks.view(3, len(self.bias), self.places, -1).unbind()
         return query, key, value
+
+    def among(self, other: Ragged) -> Tensor:
+        """Return where the rows (R,) of this layout are among those of another one of the same sequences, which has
+        them all."""
+        place = torch.zeros(len(self.bias) // self.heads * self.size, dtype=torch.long)
+        place[other.taken] = torch.arange(len(other.taken))
+        return place[self.taken]
+
+    def queries(self, query: Tensor) -> Tensor:
+        """Spread (R, H · D) to (B · H, P, D)."""
+        chunks = query.view(len(query) * self.heads, -1).index_select(0, self.alone)
+        return chunks.view(len(self.bias), self.places, -1)
 
     def rows(self, mixed: Tensor, kept: Tensor | None = None) -> Tensor:
         """Collect (B · H, P, D) to (R, H · D), or to the rows `kept`."""

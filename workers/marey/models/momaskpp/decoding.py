@@ -101,7 +101,7 @@ def _pass(
     config: InferenceConfig,
 ) -> Tensor:
     """One pass: predict the masked tokens, keep all but the `masked_left` (B,) least confident. (B, S) -> (B, S)."""
-    masked = (tokens == model.mask_token) & valid
+    masked = (tokens == model.mask_token) & valid  # (B, S), M of them
     logits = model(
         tokens.repeat(2, 1),
         positions,
@@ -109,16 +109,16 @@ def _pass(
         torch.cat([items.words, items.null]),
         items.present.repeat(2, 1),
         config.guidance,
-    )  # (B, S, K)
-    noise = uniform(items.seeds, TOKEN_STREAM, step, positions)
-    drawn = sample_top_k(logits, noise, temperature=config.temperature, share=config.top_k)  # (B, S)
+        masked.repeat(2, 1),
+    )  # (M, K)
+    noise = uniform(items.seeds, TOKEN_STREAM, step, positions)[masked]
+    drawn = sample_top_k(logits, noise, temperature=config.temperature, share=config.top_k)  # (M,)
     # Confidence = the guided softmax itself, before temperature and top-k; tokens of earlier passes stay.
-    confidence = (logits.gather(-1, drawn[..., None]).squeeze(-1) - logits.logsumexp(-1)).masked_fill(
-        ~masked, torch.inf
-    )
+    sure = logits.gather(-1, drawn[:, None]).squeeze(-1) - logits.logsumexp(-1)
+    confidence = sure.new_full(masked.shape, torch.inf).masked_scatter_(masked, sure)
     order = confidence.argsort(dim=1, stable=True)  # least confident first; ties go to the earlier position
     rank = torch.empty_like(order).scatter_(
         1, order, torch.arange(order.shape[1], device=order.device).expand_as(order)
     )
-    filled = torch.where(masked, drawn, tokens)
+    filled = tokens.masked_scatter(masked, drawn)
     return filled.masked_fill(rank < masked_left[:, None], model.mask_token)

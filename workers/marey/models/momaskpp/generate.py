@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.core.errors import InvalidBundle, InvalidInput
+from marey.core.errors import InvalidBundle
 from marey.generation.base import Draw, GeneratedMotion, GroupedGenerator, Sampling
 from marey.generation.groups import RowWatcher
 from marey.generation.kept import bridged, whole_tokens
@@ -52,12 +52,13 @@ class Generator(GroupedGenerator[SamplingSettings, GeneratedMotion]):
         networks: ScaleNetworks,
         reader: WordReader,
         device: torch.device,
+        dtype: torch.dtype,
         batch_threads: BatchThreads,
     ) -> None:
         limits = Limits(
             config.min_frames, config.max_frames, config.fps, config.text.width, keeps=config.tokenizer.frames_per_token
         )
-        super().__init__(bundle, limits, config.inference, networks.tokenizer, device, torch.float32, batch_threads)
+        super().__init__(bundle, limits, config.inference, networks.tokenizer, device, dtype, batch_threads)
         self.config = config
         self.networks = networks
         self.reader = reader
@@ -73,16 +74,15 @@ class Generator(GroupedGenerator[SamplingSettings, GeneratedMotion]):
             bundle: a verified bundle, or its name or path.
             device: `auto`, `cpu`, `cuda`, `cuda:N`.
             threads: of torch; 0 leaves torch's own choice.
-            dtype: float32 alone: published weights are compared in it.
+            dtype: of the transformer's matrices; None = bfloat16 where the device multiplies it fast, else float32, in
+                which published weights are compared.
 
         Raises:
             InvalidBundle: of another model, damaged, or made with another text encoder than is installed.
-            InvalidInput: unknown device, or another dtype.
+            InvalidInput: unknown device.
             NotFound: the encoder is not installed.
         """
-        if dtype not in (None, torch.float32):
-            raise InvalidInput(f"runs in float32, not {dtype}", where="dtype")
-        return super().load(bundle, device=device, threads=threads, dtype=torch.float32)
+        return super().load(bundle, device=device, threads=threads, dtype=dtype)
 
     @classmethod
     def _of(cls, bundle: Bundle, device: torch.device, dtype: torch.dtype) -> Self:
@@ -92,8 +92,10 @@ class Generator(GroupedGenerator[SamplingSettings, GeneratedMotion]):
             raise InvalidBundle("names no text encoder", where=str(bundle.path))
         networks.to(device)
         batch_threads = BatchThreads.on(device)
-        networks.masked.prepare_inference(batch_threads)
-        return cls(bundle, config, networks, WordReader(spec, config.text.max_words), device, batch_threads)
+        networks.masked.prepare_inference(dtype, batch_threads)
+        if dtype != torch.float32:
+            networks.tokenizer.decoder.prepare_inference(dtype)
+        return cls(bundle, config, networks, WordReader(spec, config.text.max_words), device, dtype, batch_threads)
 
     def _drawing(
         self, requests: Sequence[Request], frames: Sequence[int], settings: SamplingSettings

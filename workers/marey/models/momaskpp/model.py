@@ -91,6 +91,7 @@ class ScaleTransformer(nn.Module):
         self.words = WordTokens(config.text, c.width)
         self.embedding = nn.Embedding(codes + 2, c.embedding)
         self.project = nn.Linear(c.embedding, c.width)
+        self.projected: Tensor | None = None  # (K + 2, w) for inference: each token's embedding, projected once
         self.register_buffer("positions", sinusoidal_positions(Scales.of(config).size, c.width), persistent=False)
         self.transformer: Transformer | CrossTransformer
         if c.conditioning == "cross-attention":
@@ -105,13 +106,12 @@ class ScaleTransformer(nn.Module):
         self.codes = nn.Linear(c.width, codes)
         initialize(self)
 
-    def prepare_inference(self, batch_threads: BatchThreads = CALLING_THREAD) -> None:
-        """Pack the matrices for inference on a CPU: a sequence's bits do not depend on the others of its batch."""
-        if isinstance(self.transformer, CrossTransformer):
-            self.transformer.prepare_inference(batch_threads)
-        else:
-            self.transformer.prepare_inference(torch.float32, batch_threads)
-        self.dense, self.gelu = packed_gelu(self.dense, self.gelu, torch.float32)
+    def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
+        """Prepare for inference: matrices of the transformer in `dtype`, sequences shared among `batch_threads`. On a
+        CPU they are packed: a sequence's bits do not depend on the others of its batch."""
+        self.transformer.prepare_inference(dtype, batch_threads)
+        self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
+        self.projected = self.project(self.embedding.weight).detach()
         pack_linears(self)
 
     def forward(
@@ -122,8 +122,11 @@ class ScaleTransformer(nn.Module):
         words: Tensor,
         present: Tensor,
         guidance: float | None = None,
+        wanted: Tensor | None = None,
     ) -> Tensor:
         """Logits (B, S, K), float32; with `guidance` (B / 2, S, K), the first half with condition, the second without.
+
+        With `wanted`, only those of M tokens (M, K), one after another.
 
         Args:
             tokens: (B, S) codes, `mask_token`, or any value where not `valid`.
@@ -132,14 +135,17 @@ class ScaleTransformer(nn.Module):
             words: (B, L, w) from `words`.
             present: (B, L) bool, words that exist.
             guidance: scale of classifier-free guidance.
+            wanted: (B, S) bool, valid tokens, the same ones in both halves.
         """
         tokens = tokens.masked_fill(~valid, self.pad_token)
-        x = self.project(self.embedding(tokens)) + self.positions[positions]
+        embedded = self.project(self.embedding(tokens)) if self.projected is None else self.projected[tokens]
+        x = embedded + self.positions[positions]
         if isinstance(self.transformer, CrossTransformer):
-            hidden = self.transformer(x, valid, words, present)
+            hidden = self.transformer(x, valid, words, present, wanted)
         else:
             both = torch.cat([x, words], 1)
             hidden = self.transformer(both, torch.cat([valid, present], 1), tokens.shape[1])
+            hidden = hidden if wanted is None else hidden[wanted]
         hidden = self.norm(self.gelu(self.dense(hidden)))
         if guidance is not None:  # before the last matrix, which is linear: the same logits for half of its work
             with_condition, without = hidden.chunk(2)

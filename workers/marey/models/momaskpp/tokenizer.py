@@ -103,17 +103,25 @@ class Decoder(nn.Module):
         self.up = nn.ModuleList(nn.Conv1d(width, width, 3, padding=1) for _ in range(config.stages))
         self.smooth = nn.Conv1d(width, width, 3, padding=1)
         self.out_proj = nn.Conv1d(width, features, 3, padding=1)
+        self.dtype = torch.float32
+
+    def prepare_inference(self, dtype: torch.dtype) -> None:
+        """Cast the stages to `dtype` for inference; the last two convolutions stay, so that no frame is rounded."""
+        for stages in (self.residuals, self.attention, self.up):
+            stages.to(dtype)
+        self.dtype = dtype
 
     def forward(self, x: Tensor, lengths: Tensor) -> Tensor:
         """`lengths` (B,) tokens."""
         mask = _mask(lengths, x, leaky=self.leaky)
-        x = masked(F.relu(self.in_proj(x)), mask)
+        x, mask = masked(F.relu(self.in_proj(x)), mask).to(self.dtype), None if mask is None else mask.to(self.dtype)
         for residuals, up, attention in zip(self.residuals, self.up, self.attention, strict=True):
             x = residuals(x, mask).repeat_interleave(2, dim=-1)  # nearest: (B, C, 2 T)
             lengths = lengths * 2
             mask = _mask(lengths, x, leaky=self.leaky)
             x = masked(up(x), mask)
             x = attention(x, frame_mask(lengths, x.shape[2]), mask)
+        x, mask = x.float(), None if mask is None else mask.float()
         x = masked(F.relu(self.smooth(x)), mask)
         return masked(self.out_proj(x), mask)
 
