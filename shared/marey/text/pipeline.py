@@ -24,6 +24,7 @@ from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
 from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
+from marey.text.in_place_words import with_plain_gait_in_place
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
@@ -35,6 +36,7 @@ from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
+from marey.text.winding_ways import with_plain_zigzag
 from marey.text.words import EDGE_PUNCTUATION
 from marey.vocabulary.take_names import as_words
 
@@ -45,6 +47,11 @@ log = logging.getLogger(__name__)
 
 TOGETHER = 64
 """Prompts whose texts are encoded together."""
+
+
+def _in_plain_words(prompt: str) -> str:
+    """Return a prompt with plain words of ways that wind and of gaits in place."""
+    return with_plain_gait_in_place(with_plain_zigzag(prompt))
 
 
 class TextPipeline:
@@ -238,7 +245,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_misleading(with_elided(as_words(text))) for text in texts]
+        texts = [without_misleading(_in_plain_words(with_elided(as_words(text)))) for text in texts]
         encoded = self._texts_to_read
         if encoded is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]

@@ -1,16 +1,20 @@
-"""Where the ways of a prompt go: straight ahead, off to a side, in a circle, or in a zigzag."""
+"""Where the ways of a prompt go: straight ahead, off to a side, in a circle, an eight, or a zigzag."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 
+from marey.vocabulary.distances import stated_across
+from marey.vocabulary.in_place import goes_in_place
 from marey.vocabulary.turns import WHOLE, Turn, stated_turn
 
-STRAIGHT, ASIDE, CIRCLE, ZIGZAG = "straight", "aside", "circle", "zigzag"
+STRAIGHT, ASIDE, CIRCLE, EIGHT, ZIGZAG = "straight", "aside", "circle", "eight", "zigzag"
 QUARTER = 90.0
 SIZES = {"tight": (1.0, 1.4), "": (1.6, 2.4), "wide": (3.0, 3.6)}
 """Metres across a circle, by its size."""
+LEAST_ACROSS, MOST_ACROSS = 0.8, 12.0
+"""Metres of circles whose size is read."""
 
 WAYS = frozenset({"walk", "run", "sprint"})
 """Actions that are bent to a course."""
@@ -32,7 +36,14 @@ _OTHERWISE = re.compile(
     r"|while looking|around|path|track|side to side)\w*\b"
 )
 """Words of ways to a side that are told in another manner."""
-_ZIGZAG = re.compile(r"\b(?:zig[ -]?zag\w*|slalom\w*|weav\w+ (?:left and right|from side to side|through|between))\b")
+_ZIGZAG = re.compile(
+    r"\b(?:zig[ -]?zag\w*|slalom\w*|serpentine|s[ -](?:shaped?|curves?|pattern|bends)"
+    r"|(?:weav|swerv|snak)\w+ (?:left and right|from side to side|through|between|around|in and out))\b"
+)
+_EIGHT = re.compile(
+    r"\bfigures?[ -](?:of[ -])?(?:an )?(?:eights?|8s?)\b|\b(?:infinity (?:sign|symbol|shape|loop|pattern)|lemniscate)\b"
+    r"|\bin an (?:8|eight)\b"
+)
 _CIRCLE = re.compile(r"\bcircl(?:e|es|ing)\b|\bin a (?:\w+ )?(?:ring|loop)\b")
 _NO_CIRCLE = re.compile(
     r"\b(?:semi|half|quarter|three)[ -]?(?:of a |a )?(?:circle|\w+ circle)|\barms?\b|\bhips?\b"
@@ -45,7 +56,8 @@ _IN_CIRCLES = re.compile(r"\bin (?:\w+ )?circles\b|\bcircles? (?:on the spot|in 
 _SHAPE = re.compile(
     r"\s*\b(?:in|on|along|around|round)\ (?:(?:a|an|the|one|full|whole|complete|wide|big|large|huge|broad|great|small"
     r"|little|tight|narrow|tiny|long|clockwise|counterclockwise|anticlockwise)\ )*"
-    r"(?:circle|ring|loop|zig[ -]?zags?|slalom)\b"
+    r"(?:circle|ring|loop|zig[ -]?zags?|slalom|figures?[ -](?:of[ -])?(?:eights?|8s?)|eight|8|infinity\ \w+|serpentine"
+    r"|s[ -](?:shape|curve|pattern))\b"
     r"(?:\ (?:pattern|path|line|motion|course|fashion|manner))?(?:\ to\ (?:the|his|her|their)\ (?:left|right))?"
     r"(?:\ (?:counter-?|anti-?)?clockwise)?",
     re.VERBOSE | re.IGNORECASE,
@@ -67,7 +79,7 @@ class WayCourse:
     """The course of a way.
 
     Attributes:
-        kind: `STRAIGHT`, `ASIDE`, `CIRCLE` or `ZIGZAG`.
+        kind: `STRAIGHT`, `ASIDE`, `CIRCLE`, `EIGHT` or `ZIGZAG`.
         side: `left` or `right`, to which it turns; empty = either.
         across: least and most metres across a circle.
     """
@@ -84,14 +96,21 @@ def stated_course(prompt: str, action: str) -> WayCourse | None:
         prompt: of one action, as a user typed it.
         action: its id.
     """
+    if goes_in_place(prompt, action):
+        return None
     text = " ".join(prompt.lower().replace("’", "'").split())
     sides = set(re.findall(r"\b(left|right)(?:wards?)?\b", text))
     side = next(iter(sides)) if len(sides) == 1 else ""
     turn = stated_turn(text, action)
     goes = action in WAYS or (action in _CIRCLING and _ON_WAY.search(text))
+    if action in WAYS and _EIGHT.search(text):
+        return WayCourse(EIGHT, side)
     if goes and _CIRCLE.search(text) and not _NO_CIRCLE.search(text) and not _IN_CIRCLES.search(text):
         counter = re.search(r"\b(?:(counter|anti)[ -]?)?clockwise\b", text)
         side = ("left" if counter[1] else "right") if counter else side
+        across = stated_across(text)
+        if across is not None and LEAST_ACROSS <= across <= MOST_ACROSS:
+            return WayCourse(CIRCLE, side, (0.95 * across, 1.05 * across))
         size = "wide" if _WIDE.search(text) else "tight" if _TIGHT.search(text) else ""
         whole = turn is None or (turn.is_exact and turn.least == WHOLE)
         return WayCourse(CIRCLE, side, SIZES[size]) if whole else None

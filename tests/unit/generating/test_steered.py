@@ -13,7 +13,7 @@ from marey.motion.feet import find_contacts, skate
 from marey.motion.skeleton import HUMANML3D
 from marey.selector.matching import WantedAction, match
 from marey.selector.motion import Motion
-from marey.vocabulary.courses import ASIDE, CIRCLE, SIZES, STRAIGHT, ZIGZAG, WayCourse
+from marey.vocabulary.courses import ASIDE, CIRCLE, EIGHT, SIZES, STRAIGHT, ZIGZAG, WayCourse
 from tests.support.bodies import Body, walker
 
 LAYOUT = HUMANML3D_263
@@ -55,6 +55,19 @@ def test_circles_close_and_have_their_size(size: str) -> None:
     low, high = SIZES[size]
     assert 0.8 * low < np.ptp(joints[:, 0, [0, 2]], axis=0).mean() < 1.2 * high
     assert directions(joints)[-1] < -270
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1), ("right", -1)])
+def test_eights_are_two_circles(side: str, sign: int) -> None:
+    joints = steered(WayCourse(EIGHT, side), 8.0)
+    assert np.linalg.norm((joints[-1, 0] - joints[0, 0])[[0, 2]]) < 0.3
+    turns = sign * directions(joints)
+    assert turns.max() > 250
+    assert abs(turns[-1]) < 60
+    half = len(joints) // 2
+    sides = [float(np.median(sign * part[:, 0, 0])) for part in (joints[10 : half - 10], joints[half + 10 : -10])]
+    assert sides[0] > 0.2 > -0.2 > sides[1]
+    assert skate(joints, find_contacts(joints, HUMANML3D, 20.0), HUMANML3D, 20.0) < 0.08
 
 
 def test_zigzags_go_to_both_sides_in_turn() -> None:

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from marey.vocabulary.courses import ASIDE, CIRCLE, STRAIGHT, ZIGZAG, dribbles_ahead, stated_course, without_course
+from marey.vocabulary.courses import (
+    ASIDE,
+    CIRCLE,
+    EIGHT,
+    SIZES,
+    STRAIGHT,
+    ZIGZAG,
+    dribbles_ahead,
+    stated_course,
+    without_course,
+)
 
 
 @pytest.mark.parametrize(
@@ -24,6 +34,11 @@ from marey.vocabulary.courses import ASIDE, CIRCLE, STRAIGHT, ZIGZAG, dribbles_a
         ("he walks in a big circle clockwise", "walk", CIRCLE, "right"),
         ("a dog walker circles the fountain", "turn", CIRCLE, ""),
         ("a spy runs in a zig-zag pattern", "run", ZIGZAG, ""),
+        ("the deer girl runs a serpentine course", "run", ZIGZAG, ""),
+        ("a waiter walks, weaving around the chairs", "walk", ZIGZAG, ""),
+        ("an ice skater walks in a figure of eight", "walk", EIGHT, ""),
+        ("jogs figure eights around two trees", "run", EIGHT, ""),
+        ("a lion tamer walks in the shape of an infinity symbol", "walk", EIGHT, ""),
     ],
 )
 def test_ways_have_courses(prompt: str, action: str, kind: str, side: str) -> None:
@@ -62,11 +77,35 @@ def test_wide_circles_are_larger() -> None:
 
 
 @pytest.mark.parametrize(
+    ("prompt", "across"),
+    [
+        ("a priest walks a circle of 1.5 m radius", 3.0),
+        ("walks in a circle with a diameter of three metres", 3.0),
+        ("runs in a circle five yards across", 4.57),
+        ("walks one lap in a 2-metre circle", 2.0),
+        ("walks in a circle, radius about 1 m", 2.0),
+    ],
+)
+def test_circles_have_the_size_that_is_named(prompt: str, across: float) -> None:
+    course = stated_course(prompt, "walk")
+    assert course is not None
+    assert sum(course.across) / 2 == pytest.approx(across, abs=0.02)
+
+
+@pytest.mark.parametrize("prompt", ["walks in a circle at 2 m/s", "walks in a circle for 3 minutes"])
+def test_other_numbers_are_no_size_of_a_circle(prompt: str) -> None:
+    course = stated_course(prompt, "walk")
+    assert course is not None
+    assert course.across == SIZES[""]
+
+
+@pytest.mark.parametrize(
     ("prompt", "action", "left"),
     [
         ("he jogs in a zigzag", "run", "he jogs"),
         ("she jogs off to the right", "run", "she jogs"),
         ("Walks in a large circle clockwise", "walk", "Walks"),
+        ("she walks in a figure eight", "walk", "she walks"),
         ("zigzags through the trees", "run", ""),
         ("a man walks to work", "walk", "a man walks to work"),
     ],

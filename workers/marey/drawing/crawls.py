@@ -37,13 +37,16 @@ def on_fours(rng: random.Random) -> Posture:
     )
 
 
-def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None = None) -> Gesture:
+def crawl(
+    rng: random.Random, *, back: bool | None = None, seconds: float | None = None, metres: float | None = None
+) -> Gesture:
     """The hand of one side and the knee of the other move together, then the other two.
 
     Args:
         rng: decides everything that is not given.
         back: backward.
         seconds: for about how long.
+        metres: how far; None = as far as it comes.
     """
     tempo = rng.choice(["slow", "", "", "quick"])
     period = rng.uniform(*_PACES[tempo])
@@ -52,6 +55,7 @@ def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None
     if back:
         stride = -0.8 * stride
     cycles = max(2, round(seconds / period) if seconds else min(round(rng.uniform(2.6, 7.4) / period), 8))
+    cycles, stride = _over(metres, cycles, stride)
     wide, knees = rng.uniform(0.15, 0.22), rng.uniform(0.08, 0.13)
     look, sway, round_back = rng.uniform(-42, -12), rng.uniform(2, 6), rng.uniform(-4, 8)
     elbow: Point = (rng.uniform(0.4, 0.9), 0.2, -0.8)
@@ -80,6 +84,17 @@ def crawl(rng: random.Random, *, back: bool | None = None, seconds: float | None
     untrue = "belly|army|low crawl|forward|along" if back else "belly|army|low crawl"
     gesture = done.gesture(rng, kinds)
     return replace(gesture, seconds=done.times[-1], untrue=untrue)
+
+
+def _over(metres: float | None, cycles: int, stride: float) -> tuple[int, float]:
+    """Return how often each limb moves, and the metres that it moves at once, less than 0 = backward.
+
+    They are changed where the body is to go a number of metres.
+    """
+    if metres is None:
+        return cycles, stride
+    often = max(round(metres / abs(stride)), 1)
+    return often, metres / often * (1.0 if stride > 0 else -1.0)
 
 
 def _moved(at: _PostureAt, side: str, stride: float, period: float, cycles: int) -> Sequel:
@@ -129,13 +144,16 @@ class _LowForm:
     sway: float
 
 
-def low_crawl(rng: random.Random, *, back: bool = False, seconds: float | None = None) -> Gesture:
+def low_crawl(
+    rng: random.Random, *, back: bool = False, seconds: float | None = None, metres: float | None = None
+) -> Gesture:
     """Flat on the floor: the forearm of one side and the knee of the other move ahead, then the body is drawn after.
 
     Args:
         rng: decides everything that is not given.
         back: backward.
         seconds: for about how long.
+        metres: how far; None = as far as it comes.
     """
     tempo = rng.choice(["slow", "", "", "quick"])
     period = rng.uniform(*_LOW_PACES[tempo])
@@ -144,6 +162,7 @@ def low_crawl(rng: random.Random, *, back: bool = False, seconds: float | None =
         rng.uniform(0.16, 0.22), rng.uniform(0.1, 0.15), rng.uniform(14, 20), rng.uniform(-44, -34), rng.uniform(7, 12)
     )
     cycles = max(2, round((seconds or rng.uniform(4.0, 7.0)) / period))
+    cycles, stride = _over(metres, cycles, stride)
     done = _moved(partial(_flat, form), rng.choice(SIDES), stride, period, cycles)
     gesture = done.gesture(rng, ["crawl-low"])
     return replace(gesture, seconds=done.times[-1])

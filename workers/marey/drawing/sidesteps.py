@@ -42,12 +42,20 @@ PACES = {
     "fast": _Pace((0.3, 0.33), (0.6, 0.66), (0.0, 0.6), (0.4, 1.0), 0.06, 20.0),
 }
 _LIFT = 0.07
+_FARTHEST = 0.7
+"""Metres of a step at most."""
 _HIPS_S = 0.13
 """Standard deviation of the filter of the ways of the feet whose middle the hips follow, seconds."""
 
 
 def sidestep(
-    rng: random.Random, side: str, *, count: int | None = None, pace: str = "", seconds: float = 3.0
+    rng: random.Random,
+    side: str,
+    *,
+    count: int | None = None,
+    pace: str = "",
+    seconds: float = 3.0,
+    metres: float | None = None,
 ) -> Gesture:
     """Steps to a side, one after the other; the body faces ahead.
 
@@ -57,11 +65,15 @@ def sidestep(
         count: of the steps; None = as many as there is time for.
         pace: slow, fast, or empty: as one walks.
         seconds: that it has to fill, without a `count`.
+        metres: that the steps go in all; None = as far as they come.
     """
     form = PACES[pace]
     period, far, lift = rng.uniform(*form.seconds), rng.uniform(*form.metres), _LIFT * rng.uniform(0.8, 1.1)
     start, rests = rng.uniform(0.25, 0.45), rng.uniform(0.5, 0.8)
     steps = count or max(2, round((seconds - start - rests) / period))
+    if metres is not None:
+        steps = count or max(round(metres / far), 1)
+        far = min(metres / steps, _FARTHEST)
 
     def change(body: StandingBody) -> None:
         time = np.arange(len(body.joints)) / FPS - start

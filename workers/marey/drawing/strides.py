@@ -22,7 +22,13 @@ _FOLLOWS_S = 0.2
 
 
 def strides(
-    rng: random.Random, count: int, *, back: bool = False, pace: str = "", waits: tuple[float, float]
+    rng: random.Random,
+    count: int,
+    *,
+    back: bool = False,
+    pace: str = "",
+    waits: tuple[float, float],
+    metres: float | None = None,
 ) -> Gesture:
     """A body that stands, takes some strides, and stands: the last one brings a foot beside the other.
 
@@ -32,9 +38,12 @@ def strides(
         back: they go back.
         pace: slow, fast or empty.
         waits: seconds that the body stands before it and after it.
+        metres: that it goes; None = as far as it comes.
     """
     interval, first = rng.uniform(*_PACES[pace]), rng.randint(0, 1)
     far = -rng.uniform(*_BACK) if back else rng.uniform(*_AHEAD)
+    if metres is not None:
+        far = (-metres if back else metres) / (count - 1)
     steps = [
         Footstep(
             (first + number) % 2,

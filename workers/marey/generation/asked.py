@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from marey.drawing.kinds import COUNTED
 from marey.generation.begun import begun, frames_to_begin
+from marey.generation.distances import SPEEDS, as_far, distance_of, farther, frames_of_distance
 from marey.generation.drawn_sides import drawn_side
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
@@ -24,6 +25,7 @@ from marey.generation.fine_wish import FineWish
 from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
 from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
+from marey.generation.onward import without_return
 from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
@@ -32,7 +34,7 @@ from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_postu
 from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
-from marey.generation.steered import frames_of_circle, steered_features
+from marey.generation.steered import CLOSED, frames_of_circle, steered_features
 from marey.generation.stepped import frames_of_steps, stepped
 from marey.generation.timed import CUT, cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -52,9 +54,10 @@ from marey.selector.rules import RULES
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
-from marey.vocabulary.courses import CIRCLE, WayCourse, dribbles_ahead, stated_course
 from marey.vocabulary.courses import STRAIGHT as STRAIGHT_ON
 from marey.vocabulary.courses import WAYS as STEERED
+from marey.vocabulary.courses import WayCourse, dribbles_ahead, stated_course
+from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
 from marey.vocabulary.held_poses import held_pose
@@ -78,6 +81,8 @@ class AskedMotion:
             `repetitions`, how often the network `made` and the prompt `asked` for the action; `turn`, degrees from
             the first frame to the last, positive to the left, as the network `made` them and as they are `shown`;
             `course`, to which a way was bent (`marey.generation.steered`);
+            `went_back`, true where it goes on and the network went back (`marey.generation.onward`);
+            `distance`, metres that a way goes as `asked` for and as `shown` (`marey.generation.distances`);
             `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
             by how many seconds its flights are shorter than the network made them; `left_out`, how many seconds of
@@ -117,6 +122,7 @@ class _Wish:
         count: repetitions; None = any number.
         turn: how far the body turns; None = as it comes.
         course: on which it goes; None = as it comes.
+        metres: that it goes; None = as many as it comes.
         pace: at which it is done.
         gaze: where the head turns.
         joined: a transition replaces the first frames.
@@ -135,6 +141,7 @@ class _Wish:
     joined: bool = False
     drawn_side: str = ""
     course: WayCourse | None = None
+    metres: float | None = None
     seed: int = 0
 
     @classmethod
@@ -157,10 +164,11 @@ class _Wish:
         if action == SPINNING and count is not None:
             turn = Turn(count * WHOLE, count * WHOLE)
         course = stated_course(without_gaze(prompt), action) if count is None else None
+        metres = stated_distance(prompt, action) if count is None and not _closes(course) else None
         own = drawn_side(prompt, action)
         limb = limb_of(prompt, action) if own is None else None
         joined = bool(request.beside[0])
-        return cls(steps, action, limb, count, turn, pace, gaze, joined, own or "", course, request.seed)
+        return cls(steps, action, limb, count, turn, pace, gaze, joined, own or "", course, metres, request.seed)
 
     @property
     def side(self) -> str:
@@ -187,8 +195,12 @@ class _Wish:
     def _for_length(self, request: Request, limits: Limits) -> Request:
         if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
             return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
-        if self.course is not None and self.course.kind == CIRCLE and (request.open or request.frames is None):
+        if self.course is not None and self.course.kind in CLOSED and (request.open or request.frames is None):
             return replace(request, frames=frames_of_circle(self.course, self.action, limits))
+        fixed = None if request.open else request.frames
+        far = frames_of_distance(self.metres, self.action, limits, fixed) if self.metres else None
+        if far is not None:
+            return replace(request, frames=far)
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
@@ -203,6 +215,11 @@ def is_winding(text: TextFeatures) -> bool:
     """Return True if a text asks for a way off to a side, in a circle or in a zigzag."""
     course = stated_course(without_gaze(text.said), action_of(text))
     return course is not None and course.kind != STRAIGHT_ON
+
+
+def _closes(course: WayCourse | None) -> bool:
+    """Return True if a way comes back to where it began: as far as it is large."""
+    return course is not None and course.kind in CLOSED
 
 
 def _action_of(text: TextFeatures, steps: Sequence[Step] | None) -> str:
@@ -341,7 +358,10 @@ def _as_asked(
         for change in (_as_often, _turned, _on_floor, _ended) if whole is None or not whole.exact else ():
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
-    if whole is None or not whole.exact or wish.action not in AT_PACE:
+    far = _as_far(features, layout, wish, fixed, changes) if whole is None else None
+    if far is not None:
+        features = far
+    elif whole is None or not whole.exact or wish.action not in AT_PACE:
         features = _retimed(features, layout, wish, fixed, changes, whole)
     held = held_pose(request.text.said) if whole is not None and fixed is None and wish.action in HOLDING else None
     if held is not None and len(features) >= SHORTEST:
@@ -410,6 +430,9 @@ def _turned(
     lost = cut_of(len(features)) if wish.joined else 0
     replaced, features = features[:lost], features[lost:]
     if wish.course is not None:
+        onward = without_return(features, layout)
+        if onward is not None:
+            features, changes["went_back"] = onward, True
         steered = steered_features(features, layout, wish.course, wish.seed)
         if steered is None:
             return np.concatenate([replaced, features])
@@ -479,6 +502,23 @@ def _retimed(
     if wish.pace.of_way and "speed" in changes:
         return features[:fixed]  # a way may end at any step
     return features
+
+
+def _as_far(
+    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+) -> Float32 | None:
+    """Return the motion of a way that goes as far as is asked for, at the pace that is; None if it cannot."""
+    if wish.metres is None or wish.action not in SPEEDS or len(features) < SHORTEST:
+        return None
+    said = dict[str, Any]()
+    paced = features if fixed is not None else _retimed(features, layout, wish, None, said, None)
+    far = as_far(paced, layout, wish.metres, fixed)
+    if far is None and fixed is None:
+        far = farther(paced, layout, wish.metres, round(MAX_SECONDS * layout.fps))
+    if far is None:
+        return None
+    changes.update({**said, "distance": {"asked": round(wish.metres, 2), "shown": distance_of(far, layout)}})
+    return far
 
 
 def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:

@@ -42,6 +42,7 @@ from marey.vocabulary.bearings import (
     Vector,
     load_bearings,
 )
+from marey.vocabulary.in_place import goes_in_place
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -173,6 +174,8 @@ def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list
     names_load = action in DRAWN_ON and any(each.bearing.load for each in stated)
     if action in DRAWN_AS and hit_part(said):  # who is hit and "stumbles back" takes a step, and is not drunk
         stated = [each for each in stated if each.whole or not each.bearing.gait]
+    if goes_in_place(said, action):  # its knees are drawn as high as they go
+        stated = [each for each in stated if each.bearing.gait not in ("high-knees", "skip", "stagger")]
     return [*stated, *([] if names_load else _drawn_as(action, said))]
 
 

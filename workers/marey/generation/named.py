@@ -25,6 +25,7 @@ from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import StatedBearing
 from marey.vocabulary.counts import stated_number
+from marey.vocabulary.in_place import goes_in_place
 
 MOST = 8
 """Times that a movement is done at most."""
@@ -60,8 +61,8 @@ def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) ->
 
 
 def names_movement(prompt: str) -> bool:
-    """Return True if a prompt asks for a movement by name: no rule of an action is for it."""
-    return any(each.bearing.moves for each in stated_bearings(prompt))
+    """Return True if a prompt asks for a movement by name, or for a gait in place: no rule of an action is for it."""
+    return goes_in_place(prompt, "walk") or any(each.bearing.moves for each in stated_bearings(prompt))
 
 
 def _times(stated: StatedBearing) -> int | None:

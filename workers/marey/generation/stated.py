@@ -1,7 +1,7 @@
 """Movements whose prompt states their form, and that are drawn for that: arms that are raised to a height
 or in a direction, a number of claps, steps aside by number or at a pace, blows to a part of the body, kicks with a
 spin, waves of both arms over the head, seats with crossed legs, jumps back or to a side, turns on the spot
-and spins as far round as is said, stairs, and movements that have a name alone.
+and spins as far round as is said, stairs, gaits in place, and movements that have a name alone.
 
 A network knows the action, but neither how high the hand is to go nor how often or how fast it is done. What states
 nothing stays as the network makes it.
@@ -12,6 +12,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +29,13 @@ from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.stairs import stairs_asked_for
+from marey.generation.stepping_in_place import gait_asked_for_in_place
 from marey.generation.strides import strides_asked_for
 from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_place
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
 from marey.vocabulary.counts import stated_count
+from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.paces import stated_pace
 
 Float32 = NDArray[np.float32]
@@ -40,7 +43,9 @@ Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
 """`(wish, rng, seconds)`: the movement that the prompt states, None if it states none; seconds that it has to fill, or
 None."""
 
-AT_PACE = frozenset({"sidestep", "walk", "walk-backward", "turn", "turn-around", "spin", "climb-stairs"})
+AT_PACE = frozenset(
+    {"sidestep", "walk", "walk-backward", "run", "sprint", "turn", "turn-around", "spin", "climb-stairs"}
+)
 """Actions that are drawn at the pace that is asked for."""
 _HIGH = re.compile(r"\boverhead\b|\b(?:above|over) (?:(?:his|her|their|the|your) )?heads?\b")
 _BOTH = re.compile(r"\b(?:both|arms|hands)\b")
@@ -66,10 +71,11 @@ def _claps(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture
 
 def _steps_aside(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
     count, pace = stated_count(wish.prompt, "sidestep"), stated_pace(wish.prompt)
-    if not (count or pace) or _TO_AND_FRO.search(wish.prompt.lower()):
+    metres = stated_distance(wish.prompt, "sidestep") if not wish.fixed else None
+    if not (count or pace or metres) or _TO_AND_FRO.search(wish.prompt.lower()):
         return None
     side = wish.side or rng.choice(SIDES)
-    return sidestep(rng, side, count=count, pace=pace, seconds=seconds or rng.uniform(2.6, 3.6))
+    return sidestep(rng, side, count=count, pace=pace, seconds=seconds or rng.uniform(2.6, 3.6), metres=metres)
 
 
 def _spin_kick(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
@@ -118,7 +124,11 @@ STATED: Mapping[str, Statement] = {
     "turn-around": turn_asked_for,
     "spin": spin_asked_for,
     "climb-stairs": stairs_asked_for,
-    "walk": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=False),
+    "walk": lambda wish, rng, seconds: (
+        gait_asked_for_in_place("walk", wish, rng, seconds) or strides_asked_for(wish, rng, back=False)
+    ),
+    "run": partial(gait_asked_for_in_place, "run"),
+    "sprint": partial(gait_asked_for_in_place, "sprint"),
     "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=True),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }

@@ -1,4 +1,4 @@
-"""Walks and runs that go where their prompt says: straight ahead, off to a side, in a circle, or in a zigzag.
+"""Walks and runs that go where their prompt says: straight ahead, off to a side, in a circle, an eight, or a zigzag.
 
 A network learned ways that curve at any time and by any angle. Here the direction in which a body moves, smoothed over
 its steps, is replaced by the one that is asked for, and the motion bent to that course (`marey.motion.courses`).
@@ -20,7 +20,7 @@ from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array
-from marey.vocabulary.courses import ASIDE, CIRCLE, QUARTER, STRAIGHT, ZIGZAG, WayCourse
+from marey.vocabulary.courses import ASIDE, CIRCLE, EIGHT, QUARTER, STRAIGHT, ZIGZAG, WayCourse
 
 Float32 = NDArray[np.float32]
 
@@ -38,9 +38,23 @@ SPEED = {"walk": 1.15, "run": 2.7, "sprint": 3.6}
 """Metres a second of a way, about."""
 
 
+CLOSED = frozenset({CIRCLE, EIGHT})
+"""Courses that end where they begin."""
+EIGHT_ACROSS = {"walk": (2.6, 3.2), "run": (4.4, 5.6), "sprint": (6.0, 7.0)}
+"""Metres of both circles of an eight, side by side."""
+CHANGES_S = 0.35
+"""Standard deviation in seconds over which a body passes from one circle of an eight to the other."""
+
+
 def frames_of_circle(course: WayCourse, action: str, limits: Limits) -> int:
-    """Return the frames in which a body goes around a circle."""
-    return limits.within(round(math.pi * sum(course.across) / 2 / SPEED.get(action, SPEED["walk"]) * limits.fps))
+    """Return the frames in which a body goes around a circle, or both of an eight."""
+    return limits.within(
+        round(math.pi * sum(_across(course, action)) / 2 / SPEED.get(action, SPEED["walk"]) * limits.fps)
+    )
+
+
+def _across(course: WayCourse, action: str) -> tuple[float, float]:
+    return EIGHT_ACROSS.get(action, EIGHT_ACROSS["walk"]) if course.kind == EIGHT else course.across
 
 
 def steered_features(features: Float32, layout: FeatureLayout, course: WayCourse, seed: int) -> Float32 | None:
@@ -65,10 +79,10 @@ def steered_features(features: Float32, layout: FeatureLayout, course: WayCourse
     sign = {"left": 1.0, "right": -1.0}.get(course.side) or rng.choice((1.0, -1.0))
     passed = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(natural.places, axis=0), axis=1))])
     turns = sign * _turns(course, passed / max(passed[-1], 1e-9), layout.fps, rng)
-    if course.kind != CIRCLE:
+    if course.kind not in CLOSED:
         turns -= aside * smoothstep(np.clip(np.arange(len(joints)) / layout.fps / SETS_OFF_S, 0.0, 1.0))
     wanted = _steered(natural, trend, turns)
-    if course.kind == CIRCLE:
+    if course.kind in CLOSED:
         wanted = _closed(wanted, passed / max(passed[-1], 1e-9), course.across)
     return encode_all(layout, bent_along(joints, layout, natural, wanted))
 
@@ -97,6 +111,9 @@ def _turns(course: WayCourse, share: Array, fps: float, rng: random.Random) -> A
         return math.radians(QUARTER) * smoothstep(np.clip(time / SETS_OFF_S, 0.0, 1.0))
     if course.kind == CIRCLE:
         return 2 * math.pi * share
+    if course.kind == EIGHT:
+        way = 4 * math.pi * np.minimum(share, 1.0 - share)
+        return smooth_open(way[:, None], CHANGES_S * fps)[:, 0]
     angles = np.zeros(len(share))
     if course.kind == ZIGZAG:
         leg, at, way = rng.uniform(*ZIG_S), 0.0, 1.0
@@ -116,6 +133,6 @@ def _closed(course: Course, share: Array, across: tuple[float, float]) -> Course
     """Return a course that ends where it begins, as large as it comes within some bounds in metres."""
     places = course.places - share[:, None] * (course.places[-1] - course.places[0])
     size = float(np.ptp(places, axis=0).mean())
-    scale = float(np.clip(size, *across)) / max(size, 1e-9)
+    scale = float(np.clip(size, *across)) / max(size, 1e-9) if across[1] else 1.0
     scale = float(np.clip(scale, 0.8, 1.25))  # strides stay those of a walk
     return Course(places[0] + scale * (places - places[0]), course.headings)

@@ -28,6 +28,7 @@ from marey.generation.holding import climb, drives, hangs
 from marey.posing.limbs import FPS
 from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, poses_at
 from marey.posing.still import standing_still
+from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.turns import stated_turn
 
 Array = NDArray[np.floating]
@@ -157,7 +158,8 @@ def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture
     text = wish.prompt.lower()
     back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
     form = low_crawl if is_low_crawl(text) else crawl
-    return form(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5))
+    metres = None if wish.fixed else stated_distance(text, "crawl")
+    return form(rng, back=back, seconds=seconds or rng.uniform(4.0, 6.5), metres=metres)
 
 
 def is_low_crawl(text: str) -> bool:

@@ -14,6 +14,7 @@ from marey.motion.features import FeatureLayout
 from marey.motion.rotations import Array
 from marey.selector.matching import WAYS, wanted_of
 from marey.text.features import TextFeatures
+from marey.vocabulary.in_place import goes_in_place
 
 Float32 = NDArray[np.float32]
 
@@ -29,6 +30,8 @@ WAITS_S = 0.4
 
 def is_way(text: TextFeatures) -> bool:
     """Return True if a text asks for a walk, a run or a leap ahead, and for nothing else."""
+    if goes_in_place(text.said, "walk"):
+        return False
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
     return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON
 

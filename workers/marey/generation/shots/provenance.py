@@ -23,6 +23,8 @@ from marey.selector.records import match_of
 from marey.vocabulary.scope import ActionLists, match_scope, scope_of_rows
 
 KEY = "timeline"
+SHORT_WAY = 2.5
+"""Metres of a way that no rule takes for one."""
 
 
 def describe_timeline(
@@ -96,10 +98,13 @@ def with_selections(clip: MotionClip, selections: Sequence[Selection]) -> Motion
 
 def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, Any]]) -> PromptMatch:
     """Return the match of a row without the transition that it begins with: who stops first ends a step. Movements that
-    are no action have none, nor has one whose rule describes a body that is in another posture before or after."""
+    are no action have none, nor has one whose rule describes a body that is in another posture before or after, or a
+    longer way."""
     if row.changes.get("posture") in (AS_BEFORE, BENT_ON):
         return PromptMatch()
     if names_movement(row.text.said) or not is_as_alone(row.held, action_of(row.text)):
+        return PromptMatch()
+    if row.changes.get("distance", {}).get("asked", SHORT_WAY) < SHORT_WAY:
         return PromptMatch()
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
     frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))

@@ -20,6 +20,7 @@ from marey.generation.port import Generator, Limits, Request
 from marey.generation.posture import NO_POSTURE
 from marey.generation.postured import gestures_s
 from marey.generation.row_postures import Row, rises, row_postures
+from marey.generation.shots.way_lengths import with_room_back
 from marey.generation.timed import TimedText, part_seed
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
@@ -93,7 +94,10 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         own or _drawn_frames(generator, request, movement, number)
         for number, (own, movement) in enumerate(zip(stated, movements, strict=True))
     ]
-    if request.frames is not None:
+    if request.frames is None:
+        roomy = with_room_back(request.text.said, movements, lengths, generator.limits)
+        lengths = [own or room for own, room in zip(stated, roomy, strict=True)]
+    else:
         lengths = _shared(request.frames, lengths)
     if min(lengths) < MIN_ROW_SECONDS * fps:
         return request

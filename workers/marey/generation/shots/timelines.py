@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
 from marey.generation.asked import action_of, changes_of, generate_as_asked
+from marey.generation.distances import with_distance
 from marey.generation.footing import RUNS
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
@@ -30,6 +31,7 @@ from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
 from marey.generation.shots.levels import lifted, raised_rows
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
+from marey.generation.shots.way_lengths import WayRow, as_long_as, metres_between, ways_back
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
@@ -37,6 +39,8 @@ from marey.motion.features import FeatureLayout
 from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.counts import STEPPING, stated_count
+from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import STANDING
 
@@ -223,6 +227,14 @@ class _Row(_Strand):
         )
         return self.is_drawn and not (waits or self.held.is_drawn)
 
+    def as_way(self, layout: FeatureLayout) -> WayRow:
+        """Return what the row is for the lengths of ways."""
+        action = action_of(self.text)
+        turns = self.is_drawn and action in TURNING and self.features is not None
+        turn = heading_change(self.features, layout) if turns and self.features is not None else 0.0
+        counted = stated_count(self.text.said, action) if action in STEPPING else None
+        return WayRow(is_way(self.text), turn, stated_distance(self.text.said, action) if counted is None else None)
+
     def request(self) -> Request:
         """Return the request of the first window."""
         own_length = self.open and len(self.lengths) == 1
@@ -305,6 +317,8 @@ class _Timeline:
         self.timeline = request.timeline
         self.seed = request.seed
         self.drawing = request.drawing
+        self.said = request.text.said
+        self.back: dict[int, int] = {}
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
         prompts = ["", *(row.text.said for row in request.timeline), ""]
@@ -338,6 +352,7 @@ class _Timeline:
             ):
                 before.features, after.features = without_halt(before.features, after.features, layout)
         if layout.skeleton.name == HUMANML3D.name:
+            self._lead_back(layout)
             self._keep_guard(layout)
             self._flow(layout)
         later, times = 0.0, list[TimedText]()
@@ -399,6 +414,43 @@ class _Timeline:
                     after.changes = {**after.changes, **({"posture": AS_BEFORE} if down else {})}
                     before.changes = {**before.changes, **({"posture": BENT_ON} if struck else {})}
                     before.features, after.features, after.entered = joined.before, joined.after, joined.entered
+
+    def _lead_back(self, layout: FeatureLayout) -> None:
+        """Let ways back be as long as those there."""
+        ways = [row.as_way(layout) for row in self.rows]
+        self.back = ways_back(self.said, ways)
+        for number, there in self.back.items():
+            first, last = self.rows[there], self.rows[number]
+            if first.features is not None and last.features is not None and first.open and last.open:
+                whole = ways[there].metres is not None or first.is_drawn
+                cut = as_long_as(first.features, last.features, layout)
+                first.features, last.features = (first.features if whole else cut[0]), cut[1]
+
+    def _far(self, frames: Float32, layout: FeatureLayout) -> Float32:
+        """Return features (T, D) of the whole with its ways as long as is said."""
+        spans = list[tuple[int, int, float]]()
+        for number, row in enumerate(self.rows):
+            metres = row.as_way(layout).metres
+            if metres is not None:
+                spans.append((*self._goes(number), metres))
+        frames = with_distance(frames, layout, spans) if spans else frames
+        back = [
+            (*self._goes(number), metres_between(frames, layout, *self._goes(there)))
+            for number, there in self.back.items()
+        ]
+        frames = with_distance(frames, layout, back) if back else frames
+        for begin, end, metres in (*spans, *back):
+            row = next(each for each in self.rows if each.part.start == begin)
+            shown = round(metres_between(frames, layout, begin, end), 2)
+            row.changes = {**row.changes, "distance": {"asked": round(metres, 2), "shown": shown}}
+        return frames
+
+    def _goes(self, number: int) -> tuple[int, int]:
+        """Return the first frame of a way and the one after its last: it comes to a halt in the transition behind it,
+        unless it goes on."""
+        row, after = self.rows[number], self._row(number + 1)
+        halts = after is not None and not is_way(after.text)
+        return row.part.start, self._joined_at(number + 1) if halts else row.part.end
 
     def _keep_guard(self, layout: FeatureLayout) -> None:
         """Let fighters keep the guard up in the steps behind a blow or a block."""
@@ -472,6 +524,8 @@ class _Timeline:
             frames = transition.write(frames)
         if self.open and (turns := self._turns()):
             frames = with_whole_turns(frames, layout, turns)
+        if self.open and layout.skeleton.name == HUMANML3D.name:
+            frames = self._far(frames, layout)
         timeline = zip(self.timeline, self.rows, strict=True)
         changed = tuple(replace(timed, changes=row.changes) for timed, row in timeline)
         return TimelineMotion(frames.astype(np.float32), changed)
