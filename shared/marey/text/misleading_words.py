@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from marey.text.action_reader import named_actions
+from marey.text.lost_footing import with_falls
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.scope import STANDING
 
@@ -340,7 +341,7 @@ def without_misleading(prompt: str) -> str:
     dancer who leaps does so from one foot to the other.
     """
     prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
-    prompt = _DANCER_LEAPS.sub(_performs_a_leap, prompt)
+    prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(prompt))
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _LAYS_LEG.sub(r"\g<sits> with one leg over the other", prompt)
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))

@@ -53,6 +53,8 @@ _BRINGS = re.compile(
     r"|crosses|clasps|clutches|presses|places)\b"
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
+_BOWS = re.compile(r"\b(?:lower|bow|hang|drop|bend)s?\b")
+"""The same of the head."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
 LEAST_STROKES_HZ = 1.1
 """Strokes a second from which on a number counts these, and not how often the whole gesture is made."""
@@ -222,13 +224,15 @@ class StatedBearing:
 
     @property
     def is_brought(self) -> bool:
-        """True if its words say that the arms come to their place, not that they are there: "answers the phone"."""
-        return bool(self.bearing.arms and _BRINGS.search(self.words))
+        """True if its words say that arms or head come to their place, not that they are there: "answers the phone"."""
+        if self.bearing.arms:
+            return bool(_BRINGS.search(self.words))
+        return bool(self.bearing.head and _BOWS.search(self.words))
 
     @property
     def ends(self) -> bool:
         """True if its words say that the arms come down again: "answers the phone and hangs up"."""
-        return bool(_ENDS.search(self.words))
+        return bool(self.bearing.arms and _ENDS.search(self.words))
 
     @property
     def bearing(self) -> Bearing:

@@ -541,6 +541,9 @@ def test_a_restless_body_goes_from_one_foot_to_the_other() -> None:
         ("shoulder-rubbed", "", 21, 16, 0.2),
         ("shoulder-rubbed", "left", 21, 16, 0.2),
         ("shoulder-rubbed", "right", 20, 17, 0.2),
+        ("eyes-shaded", "left", 20, 15, 0.2),
+        ("head-back-scratch", "", 21, 15, 0.18),
+        ("listen", "left", 20, 15, 0.2),
         ("knee-rubbed", "", 21, 5, 0.25),
         ("knee-rubbed", "left", 20, 4, 0.25),
     ],
@@ -552,6 +555,24 @@ def test_a_hand_comes_to_the_part_that_hurts(name: str, side: str, wrist: int, j
     assert (away < near + 0.05).sum() > 1.5 * FPS
     other = np.linalg.norm(joints[:, 41 - wrist] - joints[:, joint], axis=1)
     assert other.min() > near
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "wrist", "joint", "near"),
+    [
+        ("shoulder-held", "left", 21, 16, 0.2),
+        ("arm-held", "left", 21, 18, 0.2),
+        ("arm-held", "right", 20, 19, 0.2),
+        ("side-held", "left", 20, 0, 0.28),
+        ("side-held", "right", 21, 0, 0.28),
+    ],
+)
+def test_a_hand_stays_at_the_part_that_hurts_on_the_way(
+    name: str, side: str, wrist: int, joint: int, near: float
+) -> None:
+    joints = drawn(walker(4.0), named(name, side))
+    assert np.linalg.norm(joints[:, wrist] - joints[:, joint], axis=1)[10:-10].max() < near
+    assert np.linalg.norm(joints[:, 41 - wrist] - joints[:, joint], axis=1)[10:-10].min() > near - 0.05
 
 
 def test_hands_that_tie_a_shoe_are_at_one_foot() -> None:

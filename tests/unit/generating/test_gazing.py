@@ -70,3 +70,10 @@ def test_all_but_the_head_stays() -> None:
     np.testing.assert_allclose(made.joints, forward_kinematics(made.skeleton, made.rotations, made.root), atol=1e-5)
     assert with_gaze(clip()).rotations is not None
     np.testing.assert_array_equal(with_gaze(clip()).rotations, clip().rotations)
+
+
+def test_a_shake_of_the_head_is_as_large_behind_a_glance() -> None:
+    for glances in (["shake"], ["left", "shake"]):
+        yaw, _ = faced(with_gaze(clip(gaze=glances)))
+        assert yaw[len(yaw) // 2 + 10 :].max() > 20
+        assert yaw[len(yaw) // 2 + 10 :].min() < -20

@@ -42,6 +42,10 @@ def test_every_bearing_that_moves_is_drawn() -> None:
         "a knee strike",
         "moonwalks",
         "stumbles forward and catches himself",
+        "slips on ice but stays on her feet",
+        "winds up and throws a fastball",
+        "peeks round the corner",
+        "catches the ball high in the air",
         "dives to the left",
         "slides on the ground feet first",
         "a tennis serve",
@@ -317,3 +321,55 @@ def test_a_stagger_goes_its_way_on_crooked_steps_and_ends_upright(
     assert np.linalg.norm(joints[:, 4] - joints[:, 5], axis=1).min() > 0.05
     assert joints[-1, PELVIS, 1] > 0.9
     assert ("nearly" in prompt) == (joints[:, PELVIS, 1].min() < 0.84)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_foot_that_slips_slides_ahead_as_the_trunk_goes_back_and_the_body_stands_again(seed: int) -> None:
+    joints = drawn("slips on a wet leaf but catches herself", seed=seed)
+    apart = np.abs(joints[:, TOES[0], 2] - joints[:, TOES[1], 2])
+    assert apart.max() > 0.4
+    leans = joints[:, NECK, 2] - joints[:, PELVIS, 2]
+    assert leans.min() < -0.1
+    assert joints[-1, PELVIS, 1] > 0.9
+    assert joints[:, PELVIS, 1].min() > 0.7
+
+
+@pytest.mark.parametrize(
+    ("prompt", "knee", "wrist"), [("a pitcher throws", 4, 21), ("a left-handed pitcher throws", 5, 20)]
+)
+def test_a_pitch_lifts_the_knee_strides_and_lets_go_over_the_other_foot(prompt: str, knee: int, wrist: int) -> None:
+    joints = drawn(prompt)
+    lifted = int(joints[:, knee, 1].argmax())
+    assert joints[lifted, knee, 1] > 0.85
+    ahead = joints[:, wrist, 2] - joints[:, PELVIS, 2]
+    lets_go = int(ahead.argmax())
+    assert lets_go > lifted
+    assert np.abs(joints[lets_go, ANKLES[0], 2] - joints[lets_go, ANKLES[1], 2]) > 0.5
+    assert ahead[lifted:lets_go].min() < -0.1
+
+
+@pytest.mark.parametrize(
+    ("prompt", "sign", "low"),
+    [("leans out to the left", 1.0, False), ("crouches and peeps out to the right", -1.0, True)],
+)
+def test_who_peeks_leans_trunk_and_head_out_to_the_side_on_planted_feet(prompt: str, sign: float, low: bool) -> None:
+    joints = drawn(prompt)
+    out = sign * (joints[:, HEAD, 0] - joints[0, HEAD, 0])  # to the left of a body that faces +Z
+    far = int(out.argmax())
+    assert out[far] > 0.28
+    assert sign * (joints[far, HEAD, 0] - joints[far, PELVIS, 0]) > 0.15
+    assert np.abs(joints[far - 6 : far + 6, TOES] - joints[far, TOES]).max() < 0.02
+    assert bool(joints[far, PELVIS, 1] < 0.75) is low
+
+
+@pytest.mark.parametrize(
+    ("prompt", "wrists"), [("catches the ball", WRISTS), ("catches the keys in her left hand", [20])]
+)
+def test_who_catches_reaches_out_and_gives_way(prompt: str, wrists: list[int]) -> None:
+    joints = drawn(prompt)
+    ahead = (joints[:, wrists, 2] - joints[:, [PELVIS], 2]).min(1)
+    reached = int(ahead.argmax())
+    assert ahead[reached] > 0.4
+    assert ahead[reached + round(0.4 * FPS)] < ahead[reached] - 0.12
+    idle = [wrist for wrist in WRISTS if wrist not in wrists]
+    assert all(joints[reached, wrist, 1] < joints[reached, NECK, 1] - 0.25 for wrist in idle)

@@ -69,6 +69,18 @@ def test_a_fall_ends_as_its_words_say_and_stays(prompt: str, faces: int, seed: i
     assert late[:, [PELVIS, CHEST, HEAD], 1].max() < 0.35
 
 
+@pytest.mark.parametrize("prompt", ["a cook slips on some grease", "slips in the mud and lands on her bottom"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_feet_that_slip_shoot_away_ahead_before_the_body_falls_on_its_back(prompt: str, seed: int) -> None:
+    joints = drawn("die", prompt, seed=seed)
+    assert front_of(joints)[-1, 1] > 0.6
+    lands = int((joints[:, PELVIS, 1] < 0.3).argmax())
+    front = front_of(joints)[0]
+    ahead = (joints[:, [7, 8]] - joints[:, [PELVIS]]) @ front
+    assert ahead[:lands].max(0).min() > 0.35
+    assert np.abs(joints[: round(0.4 * FPS), :, 1] - joints[0, :, 1]).max() < 0.1, "it stands first"
+
+
 def test_a_fall_over_the_knees_kneels_first() -> None:
     for seed in SEEDS:
         joints = drawn("die", "falls to his knees and dies", seed=seed)

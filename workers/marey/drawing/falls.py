@@ -30,7 +30,7 @@ def _arms_out(rng: random.Random, back: bool) -> dict[str, Limb]:
     return hands
 
 
-def _on_back(rng: random.Random, at: tuple[float, float], yaw: float = 0.0) -> Whole:
+def on_back(rng: random.Random, at: tuple[float, float], yaw: float = 0.0) -> Whole:
     """A body on its back."""
     feet = {side: Limb((rng.uniform(0.1, 0.26), -0.88, -0.05), towards=(0.5, -0.3, 0.8)) for side in SIDES}
     if rng.random() < 0.5:
@@ -121,7 +121,7 @@ def _fall_back(rng: random.Random, done: Tumble, pace: float) -> None:
     """Backward over the heels, stiff or with knees that bend."""
     stiff = rng.random() < 0.4
     _buckle(rng, done, pace, -6.0, (0.0, -0.08))
-    lies = _on_back(rng, (rng.uniform(-0.08, 0.08), -rng.uniform(0.86, 0.94) if stiff else -rng.uniform(0.6, 0.74)))
+    lies = on_back(rng, (rng.uniform(-0.08, 0.08), -rng.uniform(0.86, 0.94) if stiff else -rng.uniform(0.6, 0.74)))
     way = Whole((0.0, 0.5 * lies.at[1]), 0.66 if stiff else 0.5, (-36, 0, 0), (12, 0, 0), (14, 0, 0), pair(_FLUNG))
     done.then(rng.uniform(0.4, 0.5), way, fall=True)
     hands = {side: replace(limb, at=(0.5, 0.05, -0.02)) for side, limb in lies.hands.items()}
@@ -195,7 +195,7 @@ def _fall_aside(rng: random.Random, done: Tumble, pace: float) -> None:
 def _sink_back(rng: random.Random, done: Tumble, pace: float) -> None:
     """Down onto the seat, then onto the back."""
     _buckle(rng, done, pace, -2.0, (0.0, -0.1))
-    lies = _on_back(rng, (rng.uniform(-0.05, 0.05), -rng.uniform(0.44, 0.52)))
+    lies = on_back(rng, (rng.uniform(-0.05, 0.05), -rng.uniform(0.44, 0.52)))
     hands = pair(Limb((0.32, -0.36, 0.04), towards=(0.7, -0.3, -0.8)))
     seat = Whole((0.0, lies.at[1]), 0.15, (-14, 0, 0), (14, 0, 0), (16, 0, 0), hands, rest=1.0, splay=0.3)
     done.then(rng.uniform(0.42, 0.5), seat, fall=True)
@@ -211,7 +211,7 @@ def _spin_and_fall(rng: random.Random, done: Tumble, pace: float) -> None:
     feet = {RIGHT: Limb((-0.04, 0.02, 0.2), OWN)}
     turned = Whole((0.02, 0.02), 0.9, (2, 0, 0.45 * yaw), (4, 0, 25), (8, 0, 20), pair(_FLUNG), feet, splay=0.2)
     done.then(rng.uniform(0.3, 0.4) * min(pace, 1.2), turned)
-    lies = _on_back(rng, (-0.62, -0.3), yaw)
+    lies = on_back(rng, (-0.62, -0.3), yaw)
     way = replace(turned, at=(-0.28, -0.12), height=0.56, tilt=(-32, 0, 0.8 * yaw), spine=(10, 0, 10), neck=(10, 0, 5))
     done.then(rng.uniform(0.4, 0.5), way, fall=True)
     bent = pair(Limb((0.12, -0.62, 0.14), towards=(0.2, -0.5, 0.8)))

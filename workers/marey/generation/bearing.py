@@ -56,6 +56,8 @@ PASSES_S = 0.25
 """Standard deviation of the filter by which a body passes into a bearing in the middle of a motion, seconds."""
 BROUGHT_S = 0.8
 """Seconds before arms are brought to their place, and after they have left it."""
+FACE_S, STANDS = 0.5, frozenset({"idle"})
+"""Seconds before hands that are held at the face come there, in a motion of their own, and the actions of such ones."""
 SWING_S = 0.5
 """The same of the filter that leaves an arm's way and takes out its swing."""
 LATEST_S = 1.1
@@ -93,6 +95,7 @@ class BorneSpan:
         action: id of the action, which leaves some parts of the body free for them.
         seed: decides sizes and times.
         said: the prompt.
+        free: it is a whole motion of one movement, whose length is left open.
     """
 
     begin: int
@@ -101,6 +104,7 @@ class BorneSpan:
     action: str
     seed: int
     said: str = ""
+    free: bool = False
 
     def record(self) -> list[dict[str, str]]:
         """Return what the manifest says."""
@@ -145,7 +149,7 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         action = action_of(request.text)
         said = request.text.said
         stated = fitting(_with_drawn(stated_bearings(said), action, said), action)
-        return [BorneSpan(0, frames, stated, action, request.seed, said)] if stated else []
+        return [BorneSpan(0, frames, stated, action, request.seed, said, request.open)] if stated else []
     whole = [each for each in stated_bearings(request.text.said) if each.whole] if request.is_sequence else []
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
@@ -279,7 +283,10 @@ def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: boo
     the end. `goes_on`: it is held in the part before."""
     frames, moment = span.end - span.begin, round(BROUGHT_S * fps)
     begin, end = span.begin, span.end
-    if span.action in MOVES_FIRST and (stated.is_brought or stated.bearing.work):
+    at_face = span.free and not stated.whole and span.action in STANDS and _is_at_face(stated.bearing)
+    if at_face and not goes_on:  # a body stands with hanging arms before and after
+        begin, end = begin + min(round(FACE_S * fps), frames // 4), end - min(moment, frames // 4)
+    elif span.action in MOVES_FIRST and (stated.is_brought or stated.bearing.work):
         begin += round(LATE * frames)
     elif stated.is_brought and not goes_on:
         begin += min(moment, frames // 2)
@@ -289,6 +296,11 @@ def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: boo
     if stated.ends:
         end -= min(moment + round(PASSES_S * fps), frames // 4)
     return begin, end
+
+
+def _is_at_face(bearing: Bearing) -> bool:
+    """Return True if a hand is held at the head all the time."""
+    return any(pose.at == "head" and not pose.path for pose in bearing.arms.values())
 
 
 def _once(

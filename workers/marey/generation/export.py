@@ -6,9 +6,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from marey.generation.asked import changes_of, draws_bearings, is_winding
+from marey.generation.asked import action_of, changes_of, draws_bearings, is_winding
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
+from marey.generation.carrying import puts_load
 from marey.generation.gazing import with_gaze
+from marey.generation.loaded import with_load
 from marey.generation.named import names_movement
 from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
@@ -21,8 +23,13 @@ from marey.quality.clips import quality_of
 from marey.quality.limits import expected_by_prompts
 from marey.quality.postures import posture_jumps
 from marey.quality.record import PromptMatch
+from marey.selector.matching import wanted_of
 from marey.selector.records import match_of
+from marey.selector.unshown import UNSHOWN_MOST, unshown_actions
 from marey.vocabulary.scope import match_scope
+
+UNSHOWN = "unshown"
+"""Key of a manifest: actions that the words of the prompt name, and that the motion does not show."""
 
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
@@ -82,7 +89,10 @@ def finish(
     provenance = {**manifest_of(generator, request, settings), **changes_of(generated)}
     manifest = with_bearing({**provenance, CLEANED: clean, "body": body.describe()}, spans, layout.fps)
     finished = partial(finish_motion, layout=layout, body=body, fps=fps, clean=clean, manifest=manifest)
-    clip = with_gaze(finished(borne(generated, layout, spans)))
+    drawn = borne(generated, layout, spans)
+    if request.is_sequence and request.timeline is not None and draws_bearings(generator, request):
+        drawn = with_load(drawn, layout, request.timeline)
+    clip = with_gaze(finished(drawn))
     acts = actions_alone(spans)
     as_made = clip if acts == spans else finished(borne(generated, layout, acts))
     return judged(clip, request, as_made=as_made)
@@ -103,7 +113,11 @@ def judged(clip: MotionClip, request: Request, *, as_made: MotionClip | None = N
     quality = quality_of(clip, expected_by_prompts(_prompts(request)))
     if quality is None:
         return clip
-    quality = quality.with_match(least_match(clip) if request.timeline is not None else _match(as_made, request))
+    match = least_match(clip) if request.timeline is not None else _match(as_made, request)
+    if missed := _unshown(clip, request):
+        match = PromptMatch(value=min(match.value or 0.0, UNSHOWN_MOST))
+        clip = replace(clip, manifest={**clip.manifest, UNSHOWN: list(missed)})
+    quality = quality.with_match(match)
     if posture_jumps(clip):
         quality = quality.with_posture_jump()
     return replace(clip, manifest={**clip.manifest, QUALITY: quality.model_dump(mode="json")})
@@ -119,12 +133,23 @@ def _prompts(request: Request) -> list[str]:
     return [request.text.prompt, request.text.rewritten]
 
 
+def _unshown(clip: MotionClip, request: Request) -> tuple[str, ...]:
+    """Return the actions that the words of a prompt name beside those that are read of it, and that a clip does not
+    show."""
+    if request.recording is not None or (request.timeline is not None and not request.is_sequence):
+        return ()
+    texts = [row.text for row in request.timeline or ()] or [request.text]
+    steps = [step for text in texts for step in wanted_of(text.actions or (text.rewritten,)) or ()]
+    read = {action_of(text) for text in texts} | {each.action for step in steps for each in step}
+    return unshown_actions(request.text.said, read - {""}, clip.joints, clip.skeleton, clip.fps)
+
+
 def _match(clip: MotionClip, request: Request) -> PromptMatch:
     """Match a clip with its prompt, by its words or else by its meaning.
 
     Recordings of streams, which hold several prompts, have none, nor have movements that are no action.
     """
-    if request.recording is not None or names_movement(request.text.said):
+    if request.recording is not None or names_movement(request.text.said) or puts_load(request.text.said):
         return PromptMatch()
     sentences, winds = request.text.actions or (request.text.rewritten,), is_winding(request.text)
     return match_of(clip, sentences, request.scope, winds=winds)

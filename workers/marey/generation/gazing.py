@@ -27,7 +27,7 @@ PASSES_S = 0.13
 """Standard deviation of the filter that makes a turn of the head smooth, seconds."""
 EDGE_S = 0.3
 """Seconds at both ends in which the head faces ahead."""
-SHAKES, SHAKE_DEGREES, SHAKE_HZ, PAUSE_S = 3, 20.0, 1.7, 0.8
+SHAKES, SHAKE_DEGREES, SHAKE_HZ, PAUSE_S = 3, 27.0, 1.5, 0.8
 """Swings of a row of head shakes, their size to each side, swings a second, and seconds between rows."""
 
 
@@ -68,13 +68,13 @@ def _turns(glances: Sequence[str], frames: int, fps: float, rng: np.random.Gener
     ways = [way for glance in glances for way in ((first, second) if glance == "around" else (glance,))]
     edge = round(EDGE_S * fps)
     bounds = np.linspace(edge, max(frames - edge, edge), len(ways) + 1).round().astype(int)
-    turns = np.zeros((frames, 2))
+    turns, shaken = np.zeros((frames, 2)), np.zeros((frames, 2))
     for way, begin, end in zip(ways, bounds, bounds[1:], strict=False):
         if way == "shake":
-            turns[begin:end, 0] = _shaken(end - begin, fps)
+            shaken[begin:end, 0] = _shaken(end - begin, fps)
         else:
             turns[begin:end] = np.array(DEGREES[way]) * rng.uniform(0.85, 1.1)
-    return turns if set(ways) == {"shake"} else smooth(turns, PASSES_S * fps)
+    return smooth(turns, PASSES_S * fps) + shaken  # the filter would leave a third of the shakes
 
 
 def _shaken(frames: int, fps: float) -> Array:

@@ -18,6 +18,9 @@ from marey.drawing.gesture import Gesture
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
+from marey.drawing.peeks import catch, peek
+from marey.drawing.pitches import pitch
+from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
 from marey.drawing.stumbles import stumble
@@ -36,6 +39,9 @@ LUNGE_S = 1.9
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
 _REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
 _BACK = re.compile(r"\bback(?:wards?)?\b")
+_SLIPS = re.compile(r"\bslip|\bfooting\b")
+_CROUCHED = re.compile(r"\b(?:crouch|kneel|squat)\w*")
+_LEANS = re.compile(r"lean\w* (?:over |far |way )?(?:to|left|right|sideways)")
 _NEARLY = re.compile(r"\b(?:almost|nearly)\b")
 _SIDES = {"l": "left", "r": "right"}
 _SIDE_LETTER = re.compile(r"\bknee(?: \w+)? ([lr])$")
@@ -98,8 +104,8 @@ def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds
 
 
 def _stumble(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    del stated, wish, seconds
-    return stumble(rng)
+    del wish, seconds
+    return slip_caught(rng) if _SLIPS.search(stated.words) else stumble(rng)
 
 
 def _stagger(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -136,6 +142,23 @@ def _field_throw(stated: StatedBearing, wish: FineWish, rng: random.Random, seco
 def _bowling(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     return bowling(rng, _hand(stated, wish))
+
+
+def _pitch(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return pitch(rng, _hand(stated, wish))
+
+
+def _peek(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = stated.words
+    low = bool(_CROUCHED.search(text) or _CROUCHED.search(wish.beside[0].lower()))
+    return peek(rng, stated.side, low=low, looks=not _LEANS.match(text))
+
+
+def _catch(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return catch(rng, stated.side, high=bool(_HIGH.search(stated.words)))
 
 
 def _jump_shot(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -191,6 +214,9 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "shot-put": _field_throw,
     "frisbee-throw": _field_throw,
     "bowling": _bowling,
+    "pitch": _pitch,
+    "peek": _peek,
+    "catch": _catch,
     "jump-shot": _jump_shot,
     "fencing-lunge": _fencing_lunge,
     "shelf-lift": _shelf_lift,

@@ -23,6 +23,7 @@ from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.kicks import spin_kick
 from marey.drawing.seats import sit_legs_crossed
 from marey.drawing.sidesteps import sidestep
+from marey.generation.carrying import stated_load
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
 from marey.generation.hopping import hops_away, jumps_away
@@ -130,6 +131,7 @@ STATED: Mapping[str, Statement] = {
     "run": partial(gait_asked_for_in_place, "run"),
     "sprint": partial(gait_asked_for_in_place, "sprint"),
     "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=True),
+    **dict.fromkeys(("pick-up", "reach-forward"), stated_load),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }
 """Movements by action."""

@@ -22,6 +22,7 @@ from marey.drawing.gesture import Gesture
 from marey.drawing.hops import jump_turned
 from marey.drawing.leaps import leap
 from marey.drawing.rolls import flip, roll
+from marey.drawing.slips import slip
 from marey.drawing.swims import swim
 from marey.generation.fine_wish import FineWish
 from marey.generation.holding import climb, drives, hangs
@@ -47,6 +48,8 @@ MOST = 4
 """Times that a movement is done at most, one after the other."""
 _BACK = re.compile(r"\b(?:back|backwards?|supine|face[ -]?up|slip\w*|heels)\b")
 _FRONT = re.compile(r"\b(?:forwards?|face|face[ -]?(?:first|down)|front|prone|stomach|belly|chest|trip\w*|stumbl\w*)\b")
+_SLIPS = re.compile(r"\bslip(?:s|ping|ped)?\b|\blos(?:es?|ing|t) (?:his |her |their |the )?(?:footing|foothold)\b")
+_ON_SEAT = re.compile(r"\b(?:butt|bum|backside|bottom|behind|rear|seat|tailbone|arse|ass)\b")
 _SIDE = re.compile(r"\b(?:side|sides|sideways|left|right|over to (?:one|his|her|the) side)\b")
 _BACKWARD = re.compile(r"\bbackwards?\b|\bback(?:s|ing) (?:up|away|off)\b")
 _DANCES = re.compile(
@@ -93,6 +96,8 @@ _ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|ch
 def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = _FROM.sub(_away, wish.prompt.lower())
+    if _SLIPS.search(text) and not (_FRONT.search(text) or _SIDE.search(text)):
+        return slip(rng, "sit" if _ON_SEAT.search(text) else "back")
     knees, aside = bool(_KNEES.search(text)), bool(_SIDE.search(text))
     forms = [
         *(["knees-side"] if knees and aside else ["knees"] if knees else []),

@@ -69,6 +69,12 @@ def _on_spot(m: Motion) -> float:
     return min(IN_PLACE, least(lifts, 2.5, 1), most(m.path, 0.3 * m.seconds, 0.3))
 
 
+def on_the_spot(m: Motion, *, runs: bool) -> float:
+    """Grade a gait whose words say that it stays in place: feet that rise one after the other, faster in a run."""
+    there = min(_on_spot(m) / IN_PLACE, most(m.extent, 1.0, 0.3))
+    return min(there, least(_steps(m) / m.seconds, 1.6, 0.4)) if runs else there
+
+
 def run_any_way(m: Motion, side: str) -> float:
     """Run, straight or not."""
     there = min(_forward(m, 0.5), _running(m), least(float(np.percentile(m.flow[:, 0], 75)), 1.8, 0.4))

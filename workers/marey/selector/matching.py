@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from marey.quality.record import SHOWN
-from marey.selector.gaits import turn_standing
+from marey.selector.gaits import on_the_spot, turn_standing
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
@@ -32,6 +32,12 @@ SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2
 
 _SIDES = {"left": "left", "right": "right", "both": "both", "clockwise": "right", "counterclockwise": "left"}
 _WORDS = re.compile(r"[a-z]+")
+_BENDS = re.compile(
+    r"\b(?:curv(?:e|es|ing|ed)|veer(?:s|ing|ed)?|arc(?:s|ing)?|swerv(?:e|es|ing)|circl(?:e|es|ing)|loops?)\b"
+)
+"""Words of a way that is not straight."""
+_SPOT = re.compile(r"\b(?:in place|on the spot|on one spot|on a treadmill)\b")
+_GAITS = frozenset({"walk", "run", "sprint"})
 _REASON = re.compile(
     r"\b(?:because|since (?:the|his|her|its|their)|as (?:the|his|her|its|their) (?:left|right|other)"
     r"|due to|so as|to (?:spare|protect|rest) )\b.*",
@@ -50,7 +56,7 @@ class WantedAction:
         side: `left`, `right`, `both`, or empty: any.
         degrees: of an action of `EXACT`, where the words say how far; None: as in its definition.
         count: how often, of an action that `REPETITIONS` has; None: any number.
-        in_place: of a turn whose words speak of no way: one on the spot shows it, too.
+        in_place: of a turn whose words speak of no way: one on the spot shows it, too; of a gait that is to stay there.
         winds: of a gait whose words speak of a way that is not straight.
     """
 
@@ -137,12 +143,20 @@ def _step(sentence: str) -> Step | None:
                 side if actions[name].sided else "",
                 degrees=_degrees(prompt, name),
                 count=stated_count(prompt, name) if name == counted else None,
-                in_place=name == TURNING and wanted == [TURNING] and turns_in_place(prompt),
+                in_place=_is_in_place(name, wanted, prompt),
+                winds=name in _GAITS and _BENDS.search(prompt.lower()) is not None,
             )
             for name in wanted
         )
         or None
     )
+
+
+def _is_in_place(name: str, wanted: Sequence[str], prompt: str) -> bool:
+    """Return True for a turn on the spot, and a gait whose words say that it does not travel."""
+    if name in _GAITS:
+        return _SPOT.search(prompt.lower()) is not None
+    return name == TURNING and wanted == [TURNING] and turns_in_place(prompt)
 
 
 def _degrees(sentence: str, action: str) -> float | None:
@@ -186,6 +200,8 @@ def _grade(motion: Motion, step: Step) -> float:
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
     rules = {**rules, **WHILE_TURNING} if wanted.winds else rules
     rule = rules[wanted.action] if wanted.degrees is None else EXACT[wanted.action](wanted.degrees)
+    if wanted.in_place and wanted.action in _GAITS:
+        return lambda m, side: max(rule(m, side), on_the_spot(m, runs=wanted.action != "walk"))
     if wanted.in_place:
         on_way, on_spot = rule, turn_standing if wanted.degrees is None else EXACT[ON_THE_SPOT](wanted.degrees)
         return lambda m, side: max(on_way(m, side), on_spot(m, side))

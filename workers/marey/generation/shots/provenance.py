@@ -6,7 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from marey.generation.asked import action_of, is_winding
+from marey.generation.carrying import WALKS, puts_load
 from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.row_postures import is_as_alone
@@ -19,12 +23,16 @@ from marey.motion.clip import SELECTION, MotionClip
 from marey.quality.postures import rises_of
 from marey.quality.record import PromptMatch
 from marey.quality.selection import Selection
+from marey.selector.matching import side_of
 from marey.selector.records import match_of
+from marey.vocabulary.counts import stated_count
 from marey.vocabulary.scope import ActionLists, match_scope, scope_of_rows
 
 KEY = "timeline"
 SHORT_WAY = 2.5
 """Metres of a way that no rule takes for one."""
+STRIDES, MOST_STRIDES, STRIDE_M = frozenset({"walk", "walk-backward", "sidestep"}), 6, 0.28
+"""Ways that are drawn of stated steps, how many at most, and the metres of each from which on it is one in full."""
 
 
 def describe_timeline(
@@ -102,14 +110,41 @@ def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, 
     longer way."""
     if row.changes.get("posture") in (AS_BEFORE, BENT_ON):
         return PromptMatch()
-    if names_movement(row.text.said) or not is_as_alone(row.held, action_of(row.text)):
+    puts = "drawn" in row.changes and puts_load(row.text.said, WALKS)
+    if puts or names_movement(row.text.said) or not is_as_alone(row.held, action_of(row.text)):
         return PromptMatch()
     if row.changes.get("distance", {}).get("asked", SHORT_WAY) < SHORT_WAY:
         return PromptMatch()
+    if (few := _drawn_strides(clip, row)) is not None:
+        return few
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
     frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))
     sentences, winds = row.text.actions or (row.text.rewritten,), is_winding(row.text)
     return match_of(clip, sentences, row.scope, frames=frames, winds=winds)
+
+
+def _drawn_strides(clip: MotionClip, row: TimedText) -> PromptMatch | None:
+    """Return the match of a way of a few stated steps that is drawn as such, by how far it goes and to which side; None
+    for any other row. A rule that counts steps would miss those in the transitions, and no rule is of one or two."""
+    action = action_of(row.text)
+    number = stated_count(row.text.said, action) if action in STRIDES and "drawn" in row.changes else None
+    if number is None or not 1 <= number <= MOST_STRIDES:
+        return None
+    frames = slice(round(row.start * clip.fps), round(row.end * clip.fps))
+    if clip.frames < 2 or len(clip.joints[frames]) < 2:
+        return None
+    forward, left = way_of(clip.joints[frames])
+    side = side_of(row.text.said)
+    gone = {"walk": forward, "walk-backward": -forward}.get(action, {"left": left, "right": -left}.get(side, abs(left)))
+    return PromptMatch(value=round(float(np.clip(gone / (number * STRIDE_M), 0.0, 1.0)), 3))
+
+
+def way_of(joints: NDArray[np.floating]) -> tuple[float, float]:
+    """Return the metres that joints (T, 22, 3) go forward and to the left, as the body faces at first."""
+    left = (joints[0, 1] - joints[0, 2]) * [1.0, 0.0, 1.0]
+    left = left / np.linalg.norm(left)
+    gone = joints[-1, 0] - joints[0, 0]
+    return float(gone @ np.cross(left, [0.0, 1.0, 0.0])), float(gone @ left)
 
 
 def least_match(clip: MotionClip) -> PromptMatch:
