@@ -12,21 +12,21 @@ _NUMBER = rf"(?:{'|'.join(TO_TWENTY.split()[:12])}|\d{{1,2}})"
 _TIMES = rf"(?:once|twice|thrice|{_NUMBER}[ ](?:more[ ])?times)"
 _LIMB = r"(?:hand|arm|foot|leg|knee|fist|elbow|palm|side|shoulder|forearm|heel)"
 _ON = r"(?:on|with|to|using|from|over)"
-_OWN = r"(?:(?:the|his|her|their|its)[ ])?"
+_OWN = r"(?:(?:the|his|her|their|its|your|my)[ ])?"
 _OTHER_SIDE = re.compile(
     rf"""(?:^|(?<=[,;.]\ )|(?<=\band\ )|(?<=\bthen\ ))
     (?P<who>(?:(?:a|an|the|this|that|one|my)\ (?:[\w-]+\ ){{1,3}}?(?=(?:is\ )?\w+(?:s|ing)\ )
     |he\ |she\ |they\ )?(?:is\ )?)
     (?P<number>{_NUMBER}\ (?:more\ )?)?(?P<verb>(?!(?:left|right|a|an|the|his|her|and|then)\b)[a-z]+)
     (?P<how>(?:\ (?!(?:and|then|left|right|{_TIMES}
-    |{_ON}\ (?:(?:the|his|her|their)\ )?(?:left|right))\b)[\w'-]+){{0,5}})
+    |{_ON}\ (?:(?:the|his|her|their|your|my)\ )?(?:left|right))\b)[\w'-]+){{0,5}})
     (?P<times>\ {_TIMES})?(?P<on>\ {_ON})?\ (?P<own>{_OWN})
     (?P<side>left|right)(?P<limb>\ {_LIMB})?(?P<after>\ {_TIMES})?
     (?P<join>,?\ (?:and\ )?then\ |,\ |,?\ and\ )
     (?P<again>(?:{_TIMES}|{_NUMBER})\ )?
     (?:(?P<verb2>[a-z]+)\ )??(?:{_ON}\ )?{_OWN}
     (?P<other>left|right)(?P<limb2>\ (?:{_LIMB}|one))?
-    (?P<last>\ {_TIMES})?(?=\W*$|;|\.)""",
+    (?P<last>\ {_TIMES})?(?=\W*$|;|\.|,?\ (?:and\ )?then\ |,?\ and\ (?!(?:left|right|the|then)\b)[a-z]+s\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
 _READ_AS_ONE = re.compile(
@@ -60,23 +60,28 @@ _STOPS = re.compile(
 )
 """The same of one that comes to rest: "walk stop", "run to idle"."""
 _THEN = ", then "
+_RESTS = re.compile(
+    r"(?:stand|stop|halt|rest|wait|pause)s?(?: (?:still|there|up|straight|upright|again))*\W*$", re.IGNORECASE
+)
 _SIDES = frozenset(("left", "right"))
 _WORD = re.compile(r"[a-z]+")
 
 
-def parts_by_sides(prompt: str) -> tuple[str, ...]:
+def parts_by_sides(prompt: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the parts of a prompt that has one movement done on one side and then on the other, such as "points left,
-    then points right"; none of any other."""
+    then points right", and, apart, the words behind them that have the body stand; none of any other."""
     parts = tuple(prompt.split(_THEN))
-    if len(parts) != 2 or re.search(r"[;,]|\band\b", parts[1]):
-        return ()
+    rests = parts[2:]
+    parts = parts[:2]
+    if len(parts) != 2 or len(rests) > 1 or not all(map(_RESTS.match, rests)) or re.search(r"[;,]|\band\b", parts[1]):
+        return (), ()
     first, second = (_WORD.findall(part.lower()) for part in parts)
     verb = next((word for word in second if not re.fullmatch(_NUMBER, word)), "")
     sides = [_SIDES.intersection(words) for words in (first, second)]
     in_turn = len(sides[0]) == 1 == len(sides[1]) and sides[0] != sides[1]
     if not in_turn or verb not in first or "and" in first or _READ_AS_ONE.match(verb):
-        return ()
-    return parts
+        return (), ()
+    return parts, rests
 
 
 def with_elided(prompt: str) -> str:

@@ -37,6 +37,7 @@ from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
 from marey.text.winding_ways import with_plain_zigzag
+from marey.text.word_order import in_usual_order
 from marey.text.words import EDGE_PUNCTUATION
 from marey.vocabulary.take_names import as_words
 
@@ -245,7 +246,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_misleading(_in_plain_words(with_elided(as_words(text)))) for text in texts]
+        texts = [without_misleading(_in_plain_words(with_elided(in_usual_order(as_words(text))))) for text in texts]
         encoded = self._texts_to_read
         if encoded is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]

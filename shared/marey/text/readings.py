@@ -130,15 +130,19 @@ class TrainedReaders:
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
             one = len(movements) == 1  # "drives, then swerves"
-            return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, movements)
+            each_side = tuple(side for each in movements for side in self._by_sides(each.text) or (each,))
+            return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, each_side)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
         return ReadPrompt.of(bare.prompt, read.likely(UNSPLIT) if self._movements else read.action, surely=surely)
 
     def _by_sides(self, prompt: str) -> tuple[ReadMovement, ...]:
-        """Return the movements of a prompt that asks for one action on one side and then on the other; else none."""
-        parts = [(part, self._read_action(part).likely(UNSPLIT)) for part in parts_by_sides(prompt)]
+        """Return the movements of a prompt that asks for one action on one side and then on the other, and perhaps for
+        a body that stands then; else none."""
+        sides, rests = parts_by_sides(prompt)
+        parts = [(part, self._read_action(part).likely(UNSPLIT)) for part in sides]
         alike = len({action for _, action in parts}) == 1 and None not in {action for _, action in parts}
-        return tuple(ReadMovement(part, action) for part, action in parts) if alike else ()
+        found = (*parts, *((part, STANDING) for part in rests))
+        return tuple(ReadMovement(part, action) for part, action in found) if alike else ()
 
     def _after_gaze(self, prompt: str) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt that has the head turn first, and then asks for one action; else none."""

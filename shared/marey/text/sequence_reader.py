@@ -91,7 +91,8 @@ _TO_A_SEAT = re.compile(
 )
 _CARRIED_BACK = re.compile(
     r"(\b(?:carr|bring|tak|lug|haul|tot)\w* "
-    r"(?:it|them|him|her|(?:the|a|an|his|her|their|this|that) (?!step)(?:\w+ ){0,2}?\w+))"
+    r"(?:it|them|him|her|(?:the|a|an|his|her|their|this|that) (?!(?:[\w-]+ ){0,3}(?:steps?|paces?|strides?)\b)"
+    r"(?:\w+ ){0,2}?\w+))"
     r" back\b(?! (?:and forth|up|down|wards?))",
     re.IGNORECASE,
 )

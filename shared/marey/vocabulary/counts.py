@@ -66,6 +66,16 @@ _ALTERNATIVES = ("or", "to")
 STEPPING = frozenset({"walk", "walk-backward", "run"})
 """Actions of which steps are counted, and nothing else: "walks twice around the house" is one walk."""
 _STEPS = frozenset({"step", "steps", "pace", "paces", "stride", "strides"})
+_ONE_STEP = re.compile(
+    r"\b(?:a|one|1|another|single) (?:(?!time|few|couple)\w+ )?(?:step|pace|stride)\b"
+    r"|\bstep(?:s|ped)? (?:\w+ly )?(?:once )?(?:straight )?(?:back|forward|ahead)(?:wards?)?\b"
+)
+"""Words of a single step; "steps" is a verb there."""
+_SEVERAL_STEPS = re.compile(
+    r"\b(?:\d+|two|three|four|five|six|seven|eight|nine|ten|some|several|few|many|of|big|small|slow|quick|keeps?)"
+    r" steps\b"
+)
+"""Words of several steps."""
 _WORDS = re.compile(r"[a-z]+")
 
 
@@ -85,6 +95,12 @@ def stated_count(prompt: str, action: str) -> int | None:
     if action == "punch" and found and len(blows := stated_blows(text)) > 1:
         found = {len(blows)}  # "jab, jab, cross": neither twice nor once
     return found.pop() if len(found) == 1 and 0 < max(found) <= MOST else None
+
+
+def is_single_step(prompt: str) -> bool:
+    """Return True if a prompt asks for one step ahead or back without a number: "steps back", "takes a big step"."""
+    text = " ".join(prompt.lower().split())
+    return bool(_ONE_STEP.search(text)) and not _SEVERAL_STEPS.search(text)
 
 
 def stated_things(prompt: str, nouns: Set[str]) -> int | None:

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Literal, cast
 
-Glance = Literal["left", "right", "up", "down", "around", "shake"]
-"""`around`: to one side and to the other; `shake`: quickly to and fro."""
+Glance = Literal["left", "right", "up", "down", "around", "behind", "behind_left", "behind_right", "shake"]
+"""`around`: to one side and to the other; `behind`: over either shoulder, or that of a side, with the shoulders;
+`shake`: quickly to and fro."""
 
 _AT = (
     r"(?: (?:at|into|towards?) (?:(?:him|her|them|it|someone)"
@@ -16,16 +17,20 @@ _AT = (
     r"(?=$|[.,;!]| (?:and|then|while|with|before|as)\b))?"
 )
 """Objects that a head faces which turns up or down: "up at the tower"."""
+_BEHIND = r"behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
 _WHERE = {
-    "left": r"left|leftwards?|over (?:his|her|their|the) left shoulder|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
+    "behind_left": rf"over (?:his|her|their|the|your|my) left shoulder"
+    rf"|(?:left )?{_BEHIND} (?:over|on|to) (?:his|her|their|the) left(?: shoulder| side)?",
+    "behind_right": rf"over (?:his|her|their|the|your|my) right shoulder"
+    rf"|(?:right )?{_BEHIND} (?:over|on|to) (?:his|her|their|the) right(?: shoulder| side)?",
+    "left": r"left|leftwards?|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
     "right": r"(?:(?:in|at|into) )?(?:the|his|her) (?:right|rear-?view|rear view|driving) mirror"
-    r"|right(?! (?:at|into|in|through|past)\b)|rightwards?|over (?:his|her|their|the) right shoulder",
+    r"|right(?! (?:at|into|in|through|past)\b)|rightwards?",
     "up": rf"up(?! (?:the|to) ){_AT}|upwards?|(?:at|to|into|towards?) (?:the )?(?:(?:night|blue|dark|starry) )?"
     r"(?:sky|ceiling|stars|heavens|clouds|moon|sun)",
     "down": rf"down(?! the ){_AT}|downwards?|at (?:(?:the|his|her|their) )?(?:floor|ground|feet|shoes|watch)",
-    "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left"
-    r"|behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
-    r"|over (?:his|her|their|the|one) shoulder",
+    "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left",
+    "behind": rf"{_BEHIND}|over (?:his|her|their|the|one|a|your|my) shoulder",
 }
 _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())

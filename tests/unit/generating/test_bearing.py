@@ -82,6 +82,13 @@ def test_a_stooped_body_leans_and_its_feet_stay() -> None:
     np.testing.assert_allclose(after[:, TOES], before[:, TOES], atol=0.02)
 
 
+def test_manners_lean_together_as_far_as_one_of_them_and_the_arm_on_a_cane_stays() -> None:
+    joints = drawn(standing(), *map(named, ("stooped", "cane", "old", "foot-dragging")))
+    assert 22 < np.median(pitch(joints)) < 34
+    assert joints[-1, 21, 1] > 0.8, "the hand on the cane"
+    assert np.median(pitch(drawn(standing(), named("stooped"), named("old")))) < 34
+
+
 def test_a_hand_that_salutes_comes_to_the_brow_once_and_goes_down_again() -> None:
     joints = drawn(standing(), named("salute"))
     away = np.linalg.norm(joints[:, 21] - joints[:, HEAD], axis=1)

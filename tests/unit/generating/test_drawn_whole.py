@@ -179,3 +179,15 @@ def test_a_number_of_spins_is_as_many_whole_turns(prompt: str, turns: int | None
     turn = _Wish.of(ask(prompt)).turn
     assert turn is not None
     assert (turn.least == 360.0 * turns) if turns else turn.whole
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bow_between_other_movements_is_no_snap(seed: int) -> None:
+    wish = FineWish(prompt="bows", beside=("walks in", "leaves"))
+    drawn = drawn_whole(HUMANML3D_263, "bow", wish, seed, None)
+    assert drawn is not None
+    joints = HUMANML3D_263.decode(drawn.features)
+    trunk = joints[:, 12] - joints[:, 0]
+    lean = np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1]))
+    assert lean.max() > 18
+    assert np.abs(np.gradient(lean)).max() * HUMANML3D_263.fps < 150

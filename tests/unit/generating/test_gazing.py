@@ -77,3 +77,17 @@ def test_a_shake_of_the_head_is_as_large_behind_a_glance() -> None:
         yaw, _ = faced(with_gaze(clip(gaze=glances)))
         assert yaw[len(yaw) // 2 + 10 :].max() > 20
         assert yaw[len(yaw) // 2 + 10 :].min() < -20
+
+
+@pytest.mark.parametrize(("glance", "sign"), [("behind_left", 1.0), ("behind_right", -1.0)])
+def test_who_looks_behind_turns_the_shoulders_too(glance: str, sign: float) -> None:
+    before, made = clip(), with_gaze(clip(gaze=[glance]))
+
+    def yaw(joints: np.ndarray, left: int, right: int) -> np.ndarray:
+        across = joints[:, left] - joints[:, right]
+        return np.degrees(np.arctan2(-across[:, 2], across[:, 0]))
+
+    middle = len(made.joints) // 2
+    shoulders = (yaw(made.joints, 16, 17) - yaw(before.joints, 16, 17))[middle]
+    assert 35 < sign * shoulders < 60
+    np.testing.assert_allclose(made.joints[:, :3], before.joints[:, :3], atol=1e-5)

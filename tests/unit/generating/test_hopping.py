@@ -12,6 +12,7 @@ from marey.generation.fine_wish import FineWish
 from marey.generation.hopping import hops_away, jumps_away
 from marey.motion.features import HUMANML3D_263
 from marey.selector.motion import Motion
+from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES
 
 LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
@@ -36,6 +37,7 @@ def moved(action: str, prompt: str, seed: int, side: str = "") -> tuple[np.ndarr
         ("jump", "jumps right", "right", (-1, 0)),
         ("hop", "hops to the left", "left", (1, 0)),
         ("hop", "hops backward on one leg", "", (0, -1)),
+        ("hop", "a backward hop on the right foot", "right", (0, -1)),
     ],
 )
 def test_a_jump_goes_where_the_words_say(action: str, prompt: str, side: str, way: tuple[int, int], seed: int) -> None:
@@ -57,3 +59,17 @@ def test_as_many_jumps_as_are_asked_for() -> None:
 def test_other_jumps_are_left(prompt: str) -> None:
     for draw in (jumps_away, hops_away):
         assert draw(FineWish(prompt=prompt), random.Random(1), None) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("prompt", "side", "count"),
+    [("hops forward on the left leg", "left", 4), ("jumps ahead on her right foot", "right", 2)],
+)
+def test_hops_ahead_stay_on_their_foot(prompt: str, side: str, count: int, seed: int) -> None:
+    drawn = drawn_whole(LAYOUT, "hop", FineWish(count, side=side, prompt=prompt), seed, None)
+    assert drawn is not None
+    joints = LAYOUT.decode(drawn.features).astype(np.float64)
+    assert joints[-1, 0, 2] - joints[0, 0, 2] == pytest.approx(0.41 * count, abs=0.1 * count)
+    assert RULES["hop"](Motion(joints, FPS), side) >= 0.5
+    assert len(REPETITIONS["hop"](Motion(joints, FPS))) == count

@@ -163,7 +163,7 @@ def test_steps_aside_have_the_pace_that_is_stated(prompt: str, least: float, mos
 
 
 def test_steps_aside_without_number_or_pace_and_to_both_sides_are_left_as_they_are() -> None:
-    for prompt in ("steps to the left", "quickly shuffles from side to side"):
+    for prompt in ("strafes to the left", "quickly shuffles from side to side"):
         assert stated_features(LAYOUT, "sidestep", FineWish(prompt=prompt), 60, 1) is None
 
 
@@ -201,7 +201,7 @@ def test_a_spin_kick_turns_all_the_way_round_and_strikes(side: str) -> None:
         foot = joints[:, 7 if side == "left" else 8]
         assert foot[:, 1].max() > 0.55
         assert RULES["kick"](Motion(joints, FPS), side) >= 0.5
-    assert stated_features(LAYOUT, "kick", FineWish(prompt="a high kick"), 60, 1) is None
+    assert stated_features(LAYOUT, "kick", FineWish(prompt="a front kick"), 60, 1) is None
 
 
 def test_both_arms_wave_over_the_head() -> None:
@@ -244,3 +244,26 @@ def test_one_leg_lies_over_the_other_on_a_seat(prompt: str, action: str) -> None
 
 def test_who_sits_without_such_words_is_left_as_it_is() -> None:
     assert stated_features(LAYOUT, "sit", FineWish(prompt="sits on a chair"), 60, 1) is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_high_kick_comes_up_to_the_head(seed: int) -> None:
+    for side, foot in (("left", 10), ("right", 11)):
+        features = stated_features(LAYOUT, "kick", FineWish(side=side, prompt=f"a high kick, {side} leg"), None, seed)
+        assert features is not None
+        joints = LAYOUT.decode(features)
+        assert joints[:, foot, 1].max() > 1.4
+        assert joints[:, 21 - foot, 1].max() < 0.2
+    for prompt in ("kicks low", "kicks the ball high", "kicks a high ball"):
+        assert stated_features(LAYOUT, "kick", FineWish(prompt=prompt), None, seed) is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_who_jumps_for_joy_leaves_the_floor_as_often_as_said_with_raised_fists(seed: int) -> None:
+    features = stated_features(LAYOUT, "cheer", FineWish(prompt="jumps for joy three times"), None, seed)
+    assert features is not None
+    joints = LAYOUT.decode(features)
+    flies = joints[:, [10, 11], 1].min(axis=1) > 0.04
+    assert np.sum(flies[1:] & ~flies[:-1]) == 3
+    assert (joints[flies][:, [20, 21], 1].max(axis=0) > joints[flies][:, 15, 1].max() - 0.05).all()
+    assert stated_features(LAYOUT, "cheer", FineWish(prompt="cheers with both fists"), None, seed) is None

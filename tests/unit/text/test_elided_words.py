@@ -27,6 +27,14 @@ from marey.text.elided_words import parts_by_sides, with_elided
             "hops twice on his left leg, then once on the right",
             "hops twice on his left leg, then hops once on his right leg",
         ),
+        (
+            "hops once on the left foot, then twice on the right foot, then bows",
+            "hops once on the left foot, then hops twice on the right foot, then bows",
+        ),
+        (
+            "waves with the left hand, then the right and sits",
+            "waves with the left hand, then waves with the right hand and sits",
+        ),
         ("lifts the left leg, then the right arm", "lifts the left leg, then lifts the right arm"),
         ("waves left and right", "waves left and right"),
         ("looks left, then right", "looks left, then right"),
@@ -55,17 +63,20 @@ def test_names_of_takes_have_a_body_stand_before_or_after_a_way(prompt: str, rea
 
 
 @pytest.mark.parametrize(
-    ("prompt", "parts"),
+    ("prompt", "parts", "rests"),
     [
         (
             "kicks with the left leg, then kicks with the right leg",
             ("kicks with the left leg", "kicks with the right leg"),
+            (),
         ),
-        ("three hops on the left, then two hops on the right", ("three hops on the left", "two hops on the right")),
-        ("dodges left, then dodges right", ()),
-        ("points left, then walks right", ()),
-        ("points left", ()),
+        ("three hops on the left, then two hops on the right", ("three hops on the left", "two hops on the right"), ()),
+        ("waves left, then waves right, then stands still", ("waves left", "waves right"), ("stands still",)),
+        ("waves left, then waves right, then sits down", (), ()),
+        ("dodges left, then dodges right", (), ()),
+        ("points left, then walks right", (), ()),
+        ("points left", (), ()),
     ],
 )
-def test_sides_in_turn_are_parts(prompt: str, parts: tuple[str, ...]) -> None:
-    assert parts_by_sides(prompt) == parts
+def test_sides_in_turn_are_parts(prompt: str, parts: tuple[str, ...], rests: tuple[str, ...]) -> None:
+    assert parts_by_sides(prompt) == (parts, rests)

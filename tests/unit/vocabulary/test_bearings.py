@@ -549,3 +549,16 @@ def test_stumbles_swords_and_restless_bodies_are_read(prompt: str, name: str) ->
 )
 def test_other_drawing_falling_and_throwing_is_none_of_them(prompt: str) -> None:
     assert not stated_bearings(prompt)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "names"),
+    [
+        ("a woman walks against a strong wind", {"headwind"}),
+        ("he leans into the gale and walks on", {"headwind"}),
+        ("the flag flies in the wind", set()),
+        ("he walks through the wind farm", set()),
+    ],
+)
+def test_who_walks_against_the_wind_leans_into_it(prompt: str, names: set[str]) -> None:
+    assert {each.name for each in stated_bearings(prompt)} == names

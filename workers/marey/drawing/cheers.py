@@ -81,6 +81,14 @@ def cheer(rng: random.Random, *, times: int | None = None) -> Gesture:
     return Gesture(seconds, tuple(filter(None, kinds)), change, side, times, untrue=untrue)
 
 
+def joy_jump(rng: random.Random, times: int) -> Gesture:
+    """Jumps with both fists thrown up, as often as `times`."""
+    gesture = cheer(rng, times=times)
+    while "cheer-jump" not in gesture.kinds:
+        gesture = cheer(rng, times=times)
+    return gesture
+
+
 def _pumps(
     first: float, times: int, ends: tuple[Array, Array], seconds: tuple[float, float, float]
 ) -> tuple[list[float], list[Array]]:

@@ -54,12 +54,16 @@ class Manner:
         heel: degrees by which the heel rises first.
         sway: metres that the hips move over the standing foot.
         look: seconds by which the shoulders are ahead of the hips.
+        peak: share of a step at which the foot is highest.
+        throw: metres by which it is further ahead there.
     """
 
     lift: float
     heel: float
     sway: float
     look: float
+    peak: float = 0.5
+    throw: float = 0.0
 
     @classmethod
     def draw(cls, rng: random.Random) -> Manner:
@@ -84,7 +88,7 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: f
         went = _went(share, step.up - places[-1, step.foot, 1])
         target = np.array([step.left, step.up, step.forward, np.radians(step.degrees)])
         places[:, step.foot] += went * (target - places[-1, step.foot])
-        lifted[:, step.foot] += np.sin(np.pi * np.clip((share - 0.08) / 0.92, 0, 1)) ** 2
+        lifted[:, step.foot] += np.sin(np.pi * _risen(np.clip((share - 0.08) / 0.92, 0, 1), manner.peak)) ** 2
         swings[:, step.foot] += np.sin(np.pi * share**0.6) ** 2
     body = smooth(places.mean(1), follows, FPS)
     for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
@@ -94,6 +98,7 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: f
     feet = about_vertical(joints[:, _TOES] - joints[0, 0] * LEVEL, np.full((len(local), 2), -angle))
     toes = about_vertical(feet, places[..., 3]) + places[..., :3]
     toes[..., 1] += manner.lift * lifted
+    toes += about_vertical(np.array([0.0, 0.0, manner.throw]) * lifted[..., None], places[..., 3])
     weight = smooth((lifted[:, 1] - lifted[:, 0]) * manner.sway, 0.1, FPS)
     dip = smooth(lifted.max(1) * 0.25 * manner.sway, 0.1, FPS)
     root = about_vertical(local[:, 0] + np.stack([weight, -dip, 0 * dip], axis=-1), body[:, 3]) + body[:, :3]
@@ -101,6 +106,11 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: f
     yaw = spine_yaw(body[:, 3], shoulders)
     root[:, 1] -= _too_high(local, root, yaw[:, 0], toes, places[..., 3])
     return posed(local, root, yaw, toes, places[..., 3])
+
+
+def _risen(share: Array, peak: float) -> Array:
+    """Shares (T,) of a step, bent so that its middle is at `peak`."""
+    return np.interp(share, [0.0, peak, 1.0], [0.0, 0.5, 1.0])
 
 
 def _went(share: Array, rise: float) -> Array:
@@ -124,13 +134,14 @@ def _too_high(local: Array, root: Array, yaw: Array, toes: Array, toe_yaw: Array
 
 
 def swing_arms_with(body: StandingBody, steps: Sequence[Footstep], degrees: float) -> None:
-    """Swing each arm ahead with the steps of the other foot."""
+    """Swing each arm ahead with the steps of the other foot: it is furthest where the foot comes down, and hangs again
+    after the last step."""
     time = np.arange(len(body.joints)) / FPS
     phase = np.zeros(len(time))
-    for step in steps:
-        share = np.clip((time - step.start) / step.seconds, 0.0, 1.0)
-        phase += SIGN[SIDES[step.foot]] * np.sin(np.pi * share)
-    phase = smooth(phase, 0.14, FPS)
+    for number, step in enumerate(steps):
+        target = SIGN[SIDES[step.foot]] if number < len(steps) - 1 else 0.0
+        phase += eased(np.clip((time - step.start) / step.seconds, 0.0, 1.0)) * (target - phase[-1])
+    phase = smooth(phase, 0.1, FPS)
     for side in SIDES:
         _, shoulder, elbow, _ = ARMS[side]
         swung = SIGN[side] * degrees * phase

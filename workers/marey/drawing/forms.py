@@ -13,6 +13,8 @@ from marey.drawing.gesture import BOTH, SIDES, Gesture
 
 LONG_S, BRIEF_S = 6.5, 3.0
 """Seconds from which on a movement is longer than one is who asks for no length, alone and beside others."""
+MORE_S: Mapping[str, float] = {"bow": 0.5}
+"""Seconds more of some actions, which would be a snap otherwise."""
 _BOTH = re.compile(r"\b(?:both (?:\w+ )?(?:arms?|hands?)|(?:his|her|their|the|with|two) (?:arms|hands))\b")
 _ONE = re.compile(r"\b(?:(?:one|a|an|single) (?:\w+ )?(?:arm|hand)|one[- ](?:armed|handed))\b")
 _TEMPOS: Mapping[str, tuple[str, ...]] = {"slow": ("-slow", "-calm"), "fast": ("-quick", "-fast", "-brisk")}
@@ -100,7 +102,7 @@ def misfit(gesture: Gesture, action: str, asked: StatedForm) -> float:
     unusual = bool(forms.usual - kinds)
     unusual += bool(forms.fights - kinds) and bool(_BLOWS.search(asked.beside))
     too_long = gesture.seconds > LONG_S and not _LONG.search(text)
-    room = BRIEF_S if asked.brief else asked.seconds
+    room = BRIEF_S + MORE_S.get(action, 0.0) if asked.brief else asked.seconds
     excess = too_long if room is None else max(gesture.seconds - room, 0.0)
     return NAMED * lacks + UNASKED * unasked + OTHER * (unusual + excess)
 

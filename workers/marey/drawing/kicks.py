@@ -20,6 +20,8 @@ from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingB
 _LEG = 0.785
 """Metres from hip to ankle of a leg that is almost straight."""
 _HIP = 0.83
+_HIGH = 1.42, 1.48
+"""Metres of the foot over the floor in a kick that is called high."""
 
 
 def _side(rng: random.Random, done: Sequel, kinds: list[str], *, stands: bool = False) -> Gesture:
@@ -74,11 +76,18 @@ def spin_kick(rng: random.Random, side: str = "") -> Gesture:
     return replace(gesture, change=change)
 
 
-def _kicked(rng: random.Random, form: str, guard: bool) -> Sequel:
-    """The postures of a kick with the left leg."""
+def high_kick(rng: random.Random, side: str = "") -> Gesture:
+    """A kick ahead whose foot comes up to the head, with the leg of `side` unless it is empty."""
+    side = side or rng.choice(SIDES)
+    done = _kicked(rng, "kick-front", guard=False, up=rng.uniform(*_HIGH))
+    return (done if side == LEFT else done.mirrored()).gesture(rng, ["kick", "kick-front", "kick-high"], side)
+
+
+def _kicked(rng: random.Random, form: str, guard: bool, up: float = 0.0) -> Sequel:
+    """The postures of a kick with the left leg; `up`: metres of the foot over the floor, 0 = by chance."""
     height = {"kick-front": (0.7, 1.2), "kick-side": (0.62, 1.0), "kick-round": (0.7, 1.1), "kick-low": (0.52, 0.66)}
-    up = rng.uniform(*height[form])
-    high = (up - 0.5) / 0.7
+    up = up or rng.uniform(*height[form])
+    high = min((up - 0.5) / 0.7, 1.15)
     over: Point = (rng.uniform(0.02, 0.05), rng.uniform(0.9, 0.93), rng.uniform(-0.02, 0.03))
     arms = _guard(rng) if guard else _swinging(rng, -1.0)
     away = _guard(rng) if guard else _swinging(rng, 1.0)
@@ -109,7 +118,7 @@ def _kicked(rng: random.Random, form: str, guard: bool) -> Sequel:
 
 
 def _ahead(up: float) -> tuple[FootPlace, FootPlace, Point]:
-    far = math.sqrt(_LEG**2 - (up - _HIP) ** 2)
+    far = math.sqrt(_LEG**2 - (up - _HIP) ** 2) + max(0.2 * (up - 1.1), 0.0)  # the hips rise with a high leg
     return (
         FootPlace((0.08, 0.5 + 0.2 * (up - 0.5), 0.16), (0, -0.5, 0.85)),
         FootPlace((0.06, up, far), (0, 0.6, 0.8)),

@@ -41,6 +41,8 @@ PACES = {
     "": _Pace((0.62, 0.74), (0.44, 0.52), (0.0, 0.52), (0.46, 0.98), 0.02, 8.0),
     "fast": _Pace((0.3, 0.33), (0.6, 0.66), (0.0, 0.6), (0.4, 1.0), 0.06, 20.0),
 }
+_SINGLE = {"slow": (0.43, 0.48), "": (0.54, 0.64), "fast": (0.54, 0.64)}
+"""Metres of a step that is the only one, by pace."""
 _LIFT = 0.07
 _FARTHEST = 0.7
 """Metres of a step at most."""
@@ -68,7 +70,8 @@ def sidestep(
         metres: that the steps go in all; None = as far as they come.
     """
     form = PACES[pace]
-    period, far, lift = rng.uniform(*form.seconds), rng.uniform(*form.metres), _LIFT * rng.uniform(0.8, 1.1)
+    period, lift = rng.uniform(*form.seconds), _LIFT * rng.uniform(0.8, 1.1)
+    far = rng.uniform(*(_SINGLE[pace] if count == 1 else form.metres))
     start, rests = rng.uniform(0.25, 0.45), rng.uniform(0.5, 0.8)
     steps = count or max(2, round((seconds - start - rests) / period))
     if metres is not None:

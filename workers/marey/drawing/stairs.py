@@ -14,8 +14,9 @@ from marey.posing.standing import NECK, StandingBody, eased
 
 _PACES = {"slow": (0.86, 0.98), "": (0.56, 0.64), "fast": (0.36, 0.4)}
 """Seconds from one tread to the next, by pace."""
-_RISES, _TREADS = (0.16, 0.18), (0.27, 0.3)
-"""Metres that a tread is higher than the one below, and is deep."""
+_RISE, _TREAD = 0.17, 0.285
+"""Metres that a tread is higher than the one below, and is deep: who goes up and comes back down is on the same
+stairs."""
 _LONGEST_S = 8.0
 """Seconds of the way at most."""
 _SWINGS = 0.85
@@ -48,7 +49,7 @@ def walk_stairs(rng: random.Random, flight: Flight, waits: tuple[float, float]) 
     """
     down, count = flight.down, flight.stairs
     interval = min(rng.uniform(*_PACES[flight.pace]), _LONGEST_S / (count + 1))
-    rise, tread, first = rng.uniform(*_RISES), rng.uniform(*_TREADS), rng.randint(0, 1)
+    rise, tread, first = _RISE, _TREAD, rng.randint(0, 1)
     steps = [
         Footstep(
             (first + number) % 2,

@@ -13,19 +13,22 @@ from marey.posing.standing import StandingBody, envelope, swings, tremble
 
 _SLIGHT, _DEEP, _DEEPEST = 36.0, 66.0, 100.0
 """Degrees of a bow from the hips to the neck; the trunk as a whole tilts by three quarters of this."""
+_BOWS_DEGREES_S = 85.0
+"""Degrees a second by which a body bows at most."""
 _DEEPLY, _DEEP_HOLD_S = 1.4, 0.7
 """How many times as long as another a deep bow takes to go down, and seconds for which it is held at least."""
 
 
 def bow(rng: random.Random, *, times: int | None = None) -> Gesture:
-    degrees = rng.choice([rng.uniform(24, _SLIGHT), rng.uniform(_SLIGHT, _DEEP), rng.uniform(80, _DEEPEST)])
+    degrees = rng.choice([rng.uniform(30, _SLIGHT), rng.uniform(_SLIGHT, _DEEP), rng.uniform(80, _DEEPEST)])
     times = times or rng.choices((1, 2, 3), (8, 1, 1))[0]
     tempo = rng.choice(["quick", "", "", "slow"])
     rise = {"quick": (0.35, 0.55), "": (0.6, 1.1), "slow": (1.0, 1.6)}[tempo]
     hold = {"quick": (0.05, 0.2), "": (0.15, 0.9), "slow": (1.0, 2.0)}[tempo]
     if degrees > _DEEP and tempo != "quick":
         rise, hold = (rise[0] * _DEEPLY, rise[1] * _DEEPLY), (max(hold[0], _DEEP_HOLD_S), hold[1] + _DEEP_HOLD_S)
-    paces = [GesturePace.draw(rng, rise, hold)]
+    least = degrees / _BOWS_DEGREES_S
+    paces = [GesturePace.draw(rng, (max(rise[0], least), max(rise[1], least)), hold)]
     for _ in range(times - 1):
         one = replace(paces[0], start=paces[-1].seconds + rng.uniform(0.0, 0.3))
         paces.append(one)

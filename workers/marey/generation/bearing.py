@@ -24,6 +24,8 @@ from marey.generation.asked import action_of
 from marey.generation.done import AGAIN_HELD, BEGINS_S, FALL, PACES, raised_s
 from marey.generation.gaits import GAITS, STAMP_S, stomping
 from marey.generation.hits import hit_part
+from marey.generation.leans import trunk_shares
+from marey.generation.marching import marches_straight
 from marey.generation.port import MotionFeatures, Request
 from marey.generation.timed import TimedText
 from marey.motion.features import FeatureLayout, encode_all
@@ -180,6 +182,8 @@ def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list
         stated = [each for each in stated if each.whole or not each.bearing.gait]
     if goes_in_place(said, action):  # its knees are drawn as high as they go
         stated = [each for each in stated if each.bearing.gait not in ("high-knees", "skip", "stagger")]
+    if marches_straight(said):  # its knees are drawn as high as they are said to be
+        stated = [each for each in stated if each.bearing.gait != "high-knees"]
     return [*stated, *([] if names_load else _drawn_as(action, said))]
 
 
@@ -233,8 +237,14 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
                 side = str(rng.choice(list(LEGS)))
             joints = draw(joints, layout, span.begin, span.end, side, rng)
     body = StandingBody(joints)
-    for stated, ways, rng in _drawn(spans, len(features), layout.fps):
-        _Drawing(body, stated, ways, layout.fps, rng).draw()
+    shares, all_drawn = trunk_shares(span.stated for span in spans), _drawn(spans, len(features), layout.fps)
+    drawings = [
+        _Drawing(body, each, ways, layout.fps, rng, shares.get(each.name, 1.0)) for each, ways, rng in all_drawn
+    ]
+    for drawing in drawings:
+        drawing.draw_body()
+    for drawing in drawings:
+        drawing.draw_arms()
     drawn = body.solved()
     if not any(each.shown_in(span.action) == "body" for span in spans for each in span.stated):
         drawn[:, _LEG_JOINTS] = joints[:, _LEG_JOINTS]  # solved knees of who kneels go through the floor
@@ -345,9 +355,15 @@ class _Drawing:
     """One bearing that is drawn on a body."""
 
     def __init__(
-        self, body: StandingBody, stated: StatedBearing, ways: _Ways, fps: float, rng: np.random.Generator
+        self,
+        body: StandingBody,
+        stated: StatedBearing,
+        ways: _Ways,
+        fps: float,
+        rng: np.random.Generator,
+        share: float = 1.0,
     ) -> None:
-        self._body, self._ways, self._rng = body, ways, rng
+        self._body, self._ways, self._rng, self._share = body, ways, rng, share
         self._bearing: Bearing = stated.bearing
         self._arms = arms_of(stated)
         self._done, self._times = ways.done, ways.times
@@ -357,15 +373,15 @@ class _Drawing:
         self._pace = float(rng.uniform(0.92, 1.08))
         self._size, self._begins = float(rng.uniform(0.9, 1.1)), 0.0 if ways.done is not None else rng.uniform(0, 0.6)
 
-    def draw(self) -> None:
-        """Draw it: trunk first, arms last."""
+    def draw_body(self) -> None:
+        """Draw trunk, head, shoulders and hips."""
         bearing, body = self._bearing, self._body
         way, legs = self._ways.trunk * self._size, self._ways.legs * self._size
         keys = bearing.keys or Keys(times=(0.0,))
         if bearing.sink or keys.sink or bearing.back:
-            body.shift(-(bearing.sink + self._keyed(keys.sink)) * legs, -bearing.back * legs)
+            body.shift(-(self._share * bearing.sink + self._keyed(keys.sink)) * legs, -bearing.back * legs)
         if bearing.trunk or keys.trunk:
-            trunk = bearing.trunk + self._keyed(keys.trunk)
+            trunk = self._share * bearing.trunk + self._keyed(keys.trunk)
             body.bow(trunk * legs, arms_hang=0.85, head=0.0)
             body.lean(SEATED_SHARE * trunk * (way - legs), "left")
         if keys.twist:
@@ -386,7 +402,10 @@ class _Drawing:
             body.turn(NECK, "forward", bearing.tilt * way * side)
         if bearing.shrug:
             body.shrug(bearing.shrug * way)
-        if bearing.swing != 1.0:
+
+    def draw_arms(self) -> None:
+        """Draw the swing of the arms and their poses; all of the body is drawn before."""
+        if self._bearing.swing != 1.0:
             for side in ARMS:
                 self._swing(side)
         for side, pose in self._arms.items():

@@ -50,7 +50,7 @@ KNEE_UP, KNEE_SKIPS, KNEE_STOMPS = 78.0, 58.0, 64.0
 STOMPS, STOMP_FALLS_S, STAMP_S = 0.05, 0.25, 0.75
 """Metres by which the hips of a stomping body drop where a foot comes down, seconds in which it does so, and seconds
 from one stamp of a body that stands to the next."""
-DRAGS, DRAGS_LOW = 0.12, 0.045
+DRAGS, DRAGS_LOW = 0.12, 0.015
 """Share that is left of the height to which a dragged foot rises, and metres by which the hips sink for it."""
 ROPE_S, ROPE_AIR, ROPE_UP, ROPE_DIP = 0.44, 0.55, 0.085, 0.035
 """Seconds of a hop over a rope, the share of them in the air, and metres by which the body rises, and sinks between."""

@@ -20,11 +20,22 @@ from marey.motion.rotations import Array, from_rotvec, multiply
 GAZE = "gaze"
 """Key of a manifest, and of the record of a row of a timeline."""
 SHARES = {"neck": 0.45, "head": 0.55}
-"""How much of a turn each joint takes."""
-DEGREES: Mapping[str, tuple[float, float]] = {"left": (55, 0), "right": (-55, 0), "up": (0, -28), "down": (0, 32)}
-"""To the left, and down."""
+"""How much of a turn of the head each joint takes."""
+TRUNK = ("spine1", "spine2", "spine3")
+"""Joints that turn evenly with a body that looks behind itself."""
+DEGREES: Mapping[str, tuple[float, float, float]] = {
+    "left": (55, 0, 0),
+    "right": (-55, 0, 0),
+    "up": (0, -28, 0),
+    "down": (0, 32, 0),
+    "behind_left": (70, 4, 48),
+    "behind_right": (-70, 4, -48),
+}
+"""Of the head to the left and down, and of the trunk to the left."""
 PASSES_S = 0.13
 """Standard deviation of the filter that makes a turn of the head smooth, seconds."""
+BEHIND_S = 0.17
+"""The same where the trunk turns too."""
 EDGE_S = 0.3
 """Seconds at both ends in which the head faces ahead."""
 SHAKES, SHAKE_DEGREES, SHAKE_HZ, PAUSE_S = 3, 27.0, 1.5, 0.8
@@ -36,12 +47,15 @@ def with_gaze(clip: MotionClip) -> MotionClip:
     names = clip.skeleton.joint_names
     if not set(SHARES) <= set(names):
         return clip
-    turns = np.zeros((clip.frames, 2))
+    turns = np.zeros((clip.frames, 3))
     for begin, end, glances, seed in _spans(clip):
         turns[begin:end] += _turns(glances, end - begin, clip.fps, np.random.default_rng([seed, len(glances)]))
     if not turns.any():
         return clip
     rotations = clip.rotations.astype(np.float64)
+    for name in TRUNK:
+        twist = from_rotvec(np.radians(turns[:, 2] / len(TRUNK))[:, None] * [0.0, 1.0, 0.0])
+        rotations[:, names.index(name)] = multiply(twist, rotations[:, names.index(name)])
     for name, share in SHARES.items():
         joint = names.index(name)
         yaw, pitch = (np.radians(share * turns[:, k])[:, None] for k in (0, 1))
@@ -63,18 +77,20 @@ def _spans(clip: MotionClip) -> Iterator[tuple[int, int, Sequence[str], int]]:
 
 
 def _turns(glances: Sequence[str], frames: int, fps: float, rng: np.random.Generator) -> Array:
-    """Return degrees (T, 2) to the left and down."""
+    """Return degrees (T, 3) of the head to the left and down, and of the trunk to the left."""
     first, second = rng.permutation(["left", "right"]).tolist()
-    ways = [way for glance in glances for way in ((first, second) if glance == "around" else (glance,))]
+    several = {"around": (first, second), "behind": (f"behind_{first}",)}
+    ways = [way for glance in glances for way in several.get(glance, (glance,))]
     edge = round(EDGE_S * fps)
     bounds = np.linspace(edge, max(frames - edge, edge), len(ways) + 1).round().astype(int)
-    turns, shaken = np.zeros((frames, 2)), np.zeros((frames, 2))
+    turns, shaken = np.zeros((frames, 3)), np.zeros((frames, 3))
     for way, begin, end in zip(ways, bounds, bounds[1:], strict=False):
         if way == "shake":
             shaken[begin:end, 0] = _shaken(end - begin, fps)
         else:
             turns[begin:end] = np.array(DEGREES[way]) * rng.uniform(0.85, 1.1)
-    return smooth(turns, PASSES_S * fps) + shaken  # the filter would leave a third of the shakes
+    # The filter would leave a third of the shakes.
+    return smooth(turns, (BEHIND_S if turns[:, 2].any() else PASSES_S) * fps) + shaken
 
 
 def _shaken(frames: int, fps: float) -> Array:

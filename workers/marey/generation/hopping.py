@@ -18,14 +18,19 @@ _WAY = re.compile(
     r"(?:leg|foot))|onto|into|over|to (?:his|her|their) (?:feet|seat)))"
 )
 """Words of a jump back or to a side."""
+_AHEAD = re.compile(r"\b(?:forwards?|ahead|across|along|onwards?|over to|to the (?:door|wall|window|other side))\b")
+"""Words of hops ahead."""
+_BACKWARD_HOPS = re.compile(r"\bback(?:wards?)? (?:\w+ )?(?:hop|jump)\w*\b")
 _ONE_LEG = re.compile(r"\bone (?:leg|foot)\b|\b(?:left|right) (?:leg|foot)\b")
 _FAR = re.compile(r"\b(?:far|big|long|great)\b")
 _FLIGHT_S = {"hop": (0.3, 0.36)}
 _BACK_M, _ASIDE_M = {"hop": (0.35, 0.5)}, (0.25, 0.36)
 _JUMP_S, _JUMP_BACK_M, _JUMP_ASIDE_M = (0.36, 0.44), (0.5, 0.68), (0.45, 0.6)
 """Seconds of a flight, and metres of one, of hops and of all others."""
-MOST = 8
-"""Jumps that are drawn at most."""
+_AHEAD_M = 0.34, 0.48
+"""Metres of a hop ahead on one foot."""
+MOST, SOME = 12, (3, 5)
+"""Jumps that are drawn at most, and hops ahead of which no number is stated."""
 _FARTHER = 1.35
 
 
@@ -47,12 +52,17 @@ def jumps_away(wish: FineWish, rng: random.Random, seconds: float | None) -> Ges
 
 
 def hops_away(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
-    """Return the hop on one foot that a prompt asks for, back or to a side, once if no number is stated; None if it
-    asks for none."""
+    """Return the hops on one foot that a prompt asks for, ahead, back or to a side, once back or aside if no number is
+    stated; None if it asks for none."""
     del seconds
-    found = _WAY.search(wish.prompt.lower())
+    text = wish.prompt.lower()
+    found = _WAY.search(text)
     if found is None:
-        return None
+        if _ONE_LEG.search(text) and _BACKWARD_HOPS.search(text):
+            return hop_away(rng, _times(wish), 0.0, -rng.uniform(*_ASIDE_M), wish.side)
+        if not (_AHEAD.search(text) and _ONE_LEG.search(text)):
+            return None
+        return hop_away(rng, _times(wish, rng.randint(*SOME)), 0.0, rng.uniform(*_AHEAD_M), wish.side)
     metres = rng.uniform(*_ASIDE_M)
     if found["back"]:
         return hop_away(rng, _times(wish), 0.0, -metres, wish.side)
@@ -64,6 +74,6 @@ def _sign(side: str, rng: random.Random) -> float:
     return SIGN[side if side in SIDES else rng.choice(SIDES)]
 
 
-def _times(wish: FineWish) -> int:
-    """Return how many jumps are asked for."""
-    return min(wish.count or stated_count(wish.prompt, "jump") or stated_count(wish.prompt, "hop") or 1, MOST)
+def _times(wish: FineWish, usual: int = 1) -> int:
+    """Return how many jumps are asked for, or that are usual."""
+    return min(wish.count or stated_count(wish.prompt, "jump") or stated_count(wish.prompt, "hop") or usual, MOST)

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.drawing.arms import clap_times, wave_overhead
+from marey.drawing.cheers import joy_jump
 from marey.drawing.floor import sit_floor
-from marey.drawing.gesture import SIDES, Gesture
-from marey.drawing.kicks import spin_kick
+from marey.drawing.gesture import Gesture
+from marey.drawing.kicks import high_kick, spin_kick
 from marey.drawing.seats import sit_legs_crossed
-from marey.drawing.sidesteps import sidestep
 from marey.generation.carrying import stated_load
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
@@ -30,14 +30,13 @@ from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.stairs import stairs_asked_for
+from marey.generation.stepping_aside import steps_aside
 from marey.generation.stepping_in_place import gait_asked_for_in_place
 from marey.generation.strides import strides_asked_for
 from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_place
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
 from marey.vocabulary.counts import stated_count
-from marey.vocabulary.distances import stated_distance
-from marey.vocabulary.paces import stated_pace
 
 Float32 = NDArray[np.float32]
 Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
@@ -54,6 +53,15 @@ _WILD = re.compile(r"\b(?:wild\w*|frantic\w*|desperate\w*|franticly|attention|fo
 _GOES = re.compile(r"\b(?:walk|run|jog|sit|kneel|jump|turn|danc)\w*")
 """Words of what else a body does that waves."""
 _SPINS = re.compile(r"\b(?:spin\w*|spun|tornado|turning|360|whirl\w*|wheel[ -]kick|back[ -]?hook)\b")
+_HIGH_KICK = re.compile(
+    r"\bhigh[ -]kick\w*|\bhigh (?:\w+ )?kicks?\b|\bkick(?:s|ing|ed)? (?:(?!low|not)\w+ ){0,4}?high\b(?! (?:up )?in)"
+    r"|\bkick\w* .*\b(?:head|face|eye|shoulder)[ -](?:high|height|level)\b"
+    r"|\bkick\w* .*\b(?:over|above) (?:his|her|their) head\b"
+)
+_NO_FRONT_KICK = re.compile(r"\b(?:ball|football|round\w*|side|crescent|axe|back|bicycle|knees?|can|stone|door)\b")
+_JUMPS = re.compile(r"\b(?:jump|leap|bounc|hop)\w*\b")
+MOST_JUMPS = 8
+"""Jumps for joy at most."""
 _CROSSED = re.compile(
     r"\bcross(?:ed|ing)?[ -]leg\w*|\blegs (?:\w+ )?crossed\b|\b(?:crossed|crosses (?:his|her|their)) legs\b|\blotus\b"
 )
@@ -62,7 +70,6 @@ _LEG_OVER = re.compile(
     r"|\b(?:leg|knee|ankle) (?:crossed |thrown |resting )?(?:over|on|across) (?:the (?:other|opposite)|another)\b"
 )
 _DOWN = re.compile(r"\bdown\b|\btakes? a seat\b|\bfrom standing\b")
-_TO_AND_FRO = re.compile(r"\b(?:side to side|back and forth|to and fro|left and right|right and left|both)\b")
 
 
 def _claps(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
@@ -70,18 +77,22 @@ def _claps(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture
     return clap_times(rng, wish.count, high=bool(_HIGH.search(wish.prompt.lower()))) if wish.count else None
 
 
-def _steps_aside(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
-    count, pace = stated_count(wish.prompt, "sidestep"), stated_pace(wish.prompt)
-    metres = stated_distance(wish.prompt, "sidestep") if not wish.fixed else None
-    if not (count or pace or metres) or _TO_AND_FRO.search(wish.prompt.lower()):
-        return None
-    side = wish.side or rng.choice(SIDES)
-    return sidestep(rng, side, count=count, pace=pace, seconds=seconds or rng.uniform(2.6, 3.6), metres=metres)
-
-
-def _spin_kick(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+def _formed_kick(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
     del seconds
-    return spin_kick(rng, wish.side) if _SPINS.search(wish.prompt.lower()) and (wish.count or 1) == 1 else None
+    text = wish.prompt.lower()
+    if (wish.count or 1) != 1:
+        return None
+    if _SPINS.search(text):
+        return spin_kick(rng, wish.side)
+    return high_kick(rng, wish.side) if _HIGH_KICK.search(text) and not _NO_FRONT_KICK.search(text) else None
+
+
+def _jumps_for_joy(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+    del seconds
+    if not _JUMPS.search(wish.prompt.lower()):
+        return None
+    times = wish.count or stated_count(wish.prompt, "jump") or rng.choice((2, 3))
+    return joy_jump(rng, min(times, MOST_JUMPS))
 
 
 def _wave_overhead(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
@@ -112,10 +123,11 @@ def _leg_over(*, down: bool) -> Statement:
 STATED: Mapping[str, Statement] = {
     "raise-arm": stated_raise,
     "clap": _claps,
-    "sidestep": _steps_aside,
+    "sidestep": steps_aside,
     "idle": named_movement,
     "flinch": stated_hit,
-    "kick": _spin_kick,
+    "kick": _formed_kick,
+    "cheer": _jumps_for_joy,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
     "sit": _leg_over(down=False),
@@ -126,11 +138,11 @@ STATED: Mapping[str, Statement] = {
     "spin": spin_asked_for,
     "climb-stairs": stairs_asked_for,
     "walk": lambda wish, rng, seconds: (
-        gait_asked_for_in_place("walk", wish, rng, seconds) or strides_asked_for(wish, rng, back=False)
+        gait_asked_for_in_place("walk", wish, rng, seconds) or strides_asked_for(wish, rng, seconds, back=False)
     ),
     "run": partial(gait_asked_for_in_place, "run"),
     "sprint": partial(gait_asked_for_in_place, "sprint"),
-    "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, back=True),
+    "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, seconds, back=True),
     **dict.fromkeys(("pick-up", "reach-forward"), stated_load),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }

@@ -12,7 +12,7 @@ from marey.selector.gaits import on_the_spot, turn_standing
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
-from marey.vocabulary.counts import STEPPING, stated_count
+from marey.vocabulary.counts import STEPPING, is_single_step, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 from marey.vocabulary.turns import stated_turn, turns_in_place
@@ -142,7 +142,7 @@ def _step(sentence: str) -> Step | None:
                 name,
                 side if actions[name].sided else "",
                 degrees=_degrees(prompt, name),
-                count=stated_count(prompt, name) if name == counted else None,
+                count=_count(prompt, name) if name == counted else None,
                 in_place=_is_in_place(name, wanted, prompt),
                 winds=name in _GAITS and _BENDS.search(prompt.lower()) is not None,
             )
@@ -214,11 +214,19 @@ def _counted(rule: Rule, action: str, count: int) -> Rule:
 
     def grade(m: Motion, side: str) -> float:
         found = rule(m, side)
-        if len(REPETITIONS[action](m)) != count:
+        often = len(REPETITIONS[action](m))
+        closes = count == 1 and often == 2 and action in STEPPING  # the other foot comes beside the one that steps
+        if often != count and not closes:
             return min(found, NOT_AS_OFTEN)
         return max(found, SHOWN) if count < SEVERAL.get(action, 0) else found
 
     return grade
+
+
+def _count(prompt: str, action: str) -> int | None:
+    """Return how often a prompt asks for an action; of "steps back" it is one step."""
+    count = stated_count(prompt, action)
+    return 1 if count is None and action in STEPPING and is_single_step(prompt) else count
 
 
 def _in_order(motion: Motion, rules: Sequence[Callable[[Motion], float]]) -> float:

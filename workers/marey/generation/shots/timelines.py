@@ -341,7 +341,7 @@ class _Timeline:
         begins later where that begins much higher or lower than the one before ends; not where people stand on
         something, since all movements begin on one floor."""
         first = self.rows[0]
-        if first.open and first.features is not None and is_way(first.text):
+        if first.open and first.features is not None and is_way(first.text) and not first.is_drawn:
             first.features = without_wait(first.features, layout)
         for before, after in pairwise(self.rows):
             if (
