@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from marey.text.action_reader import OUTSIDE
-from marey.text.clause_parts import only_named, parts_in_time
+from marey.text.clause_parts import begins_with_verb, is_on_other_side, only_named, parts_in_time
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.scope import STANDING
 
@@ -38,6 +38,8 @@ _MANNER = re.compile(
     r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
 )
 """Words that say how something is done, though one of them names an action."""
+_FROM = re.compile(r"\W*from\ (?:a\ )?(?:ly|sitt|kneel|crouch|squatt|sleep|seat|prone|supine)\w*\b", re.IGNORECASE)
+"""Beginning of words of the posture from which someone rises: "from lying on his back"."""
 _WITH = re.compile(
     r"""\W*(?:(?:with|without|like|as\ if|using|behind|beside|above)\b(?!\ that\b)
     |(?:\d+|an?|one|two|three|four|five|six|seven|eight|nine|ten|several|a\ few)\ (?:\w+\ )?
@@ -45,6 +47,15 @@ _WITH = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """Beginning of words that say how or how often the movement before them is done: "with his sleeve", "four strokes"."""
+_HELD = re.compile(
+    r"""\W*(?:standing(?:\ (?:up|still|there))?(?=\W*(?:$|,))
+    |(?:(?:with|his|her|their|the|both|one|left|right)\ )*(?:arms?|hands?|palms?|fists?|elbows?|eyes|chin|chest|head
+    |shoulders?|knees?|legs?|feet|back|thumbs?|fingers?)\ (?:held\ |stretched\ |straight\ |wide\ |high\ )*
+    (?:up|out|down|straight|high|raised|open|wide|apart|together|crossed|folded|bent|closed|lifted|spread|extended|low
+    |overhead|forward|upwards?)\b(?!\ (?:and|then)\b))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Beginning of how the body is held in the movement before it: "arm straight up", "standing"."""
 _MEANWHILE = re.compile(r"\W*(?!(?:go|com|follow|end|be)ing\b)\w{2,}ing\b", re.IGNORECASE)
 """Beginning of what comes with the movement before it: "serves, tossing the ball"."""
 _UNTIL = re.compile(r"\W*until (?:he|she|they|it)(?:'s|'re| (?:is|are|can\W?t|cannot|has|have))\b", re.IGNORECASE)
@@ -142,6 +153,7 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
     for group in groups:
         last = merged[-1] if merged else []
         alike = len(group) == len(last) == 1 and (last[0].name, group[0].name) in (*_ONE, (group[0].name,) * 2)
+        alike = alike and not is_on_other_side(last[0].text, group[0].text, group[0].name)
         if alike:
             surer = max(group[0].probability, last[0].probability)
             merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
@@ -159,9 +171,10 @@ def with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
     for clause in clauses:
         text = without_joints(clause.text)
         goes_on = BOUND_TO_HANDS.get(found[-1].name) if found else None
-        how = _MANNER.match(clause.text) or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
+        how = _MANNER.match(clause.text) or _FROM.match(clause.text)
+        how = how or (clause.name in (STANDING, OUTSIDE) and _UNTIL.match(clause.text))
         how = how or (bool(found) and comes_with(found[-1].text, clause.text))
-        belongs = how or _END.fullmatch(text) or (goes_on and goes_on.match(text))
+        belongs = how or is_end(text) or (goes_on and goes_on.match(text))
         if found and (belongs or found[-1].text.lower().endswith((" from", " while"))):
             found[-1] = replace(found[-1], text=f"{found[-1].text} {clause.text}")
         else:
@@ -169,12 +182,25 @@ def with_belongings(clauses: Iterable[ReadClause]) -> list[ReadClause]:
     return found
 
 
+def is_end(text: str) -> bool:
+    """Return True if a clause without its joints is the end of a movement, which comes by itself: "lands softly"."""
+    return _END.fullmatch(text) is not None
+
+
 def comes_with(before: str, text: str) -> bool:
     """Return True if a clause says how or how often the one before it is done, or comes at the same time: "serves, |
     tossing the ball"; "walking in, | sitting down" are two."""
-    if _WITH.match(text):
+    if _WITH.match(text) or (_HELD.match(text) and begins_with_verb(_last_clause(before))):
         return True
     return bool(_MEANWHILE.match(text)) and not re.search(r"\b\w{2,}ing\b", before) and only_named(text) is None
+
+
+def _last_clause(text: str) -> str:
+    """Return the words of a text behind its last sign and its subject: "shrugs" of "he sits, the man shrugs"."""
+    last = re.split(r"[,;:.]", text.strip(" ,;:."))[-1].strip()
+    return re.sub(
+        r"^(?:(?:the|an?|his|her|our|my) )(?:[\w-]+ ){1,2}?(?=\w+s\b)|^\w+ (?=\w+s (?:a|an|the|his|her)\b)", "", last
+    )
 
 
 def parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:

@@ -27,6 +27,9 @@ SERIES = frozenset({"karate", "dance"})
 """Actions that consist of others: "practises karate, punches and kicks"."""
 CHANGES = frozenset({"slow", "speed", "accelerate", "step"})
 """Verbs of who goes on at another pace or place: "slows to a walk", "steps back"."""
+IN_TURN = frozenset({"turn", "sidestep", "hop", "dodge"})
+"""Actions that are done to one side and then to the other: two of them are no single one."""
+_SIDE = re.compile(r"\b(left|right)(?:wards?)?\b", re.IGNORECASE)
 _SIGN = re.compile(
     r"\s*(?:;|\.(?=\s)|->|→|,)\s*(?:and\s+)?(?:then\s+|finally\s+|next\s+)?|\s+(?:and\s+)?then\s+|\s+(?P<and>and)\s+",
     re.IGNORECASE,
@@ -53,10 +56,15 @@ def parts_in_time(text: str, *, listed: bool = False) -> list[tuple[str, str]]:
     return parts if len(parts) <= MOST_PARTS and all(action for _, action in parts) else []
 
 
+def goes_on(text: str) -> bool:
+    """Return True if a text begins with words that the movement before it goes on: "and carries on"."""
+    return _GOES_ON.match(_SUBJECT.sub("", text)) is not None
+
+
 def before_next_verb(text: str) -> tuple[str, str]:
     """Return a clause without a verb of its own, and what is behind it: "with a sleeve", "throws it away"."""
     for sign in _SIGN.finditer(text):
-        if _begins_with_verb(text[sign.end() :]):
+        if begins_with_verb(text[sign.end() :]):
             return text[: sign.start()].strip(), text[sign.end() :]
     return text, ""
 
@@ -67,15 +75,23 @@ def only_named(text: str) -> str | None:
     return next(iter(named)) if len(named) == 1 else None
 
 
+def is_on_other_side(before: str, after: str, action: str) -> bool:
+    """Return True if an action is done again, on the other side: "turns left, | turns right"."""
+    sides = [{side.lower() for side in _SIDE.findall(text)} for text in (before, after)]
+    return action in IN_TURN and len(sides[0]) == 1 == len(sides[1]) and sides[0] != sides[1]
+
+
 def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:
     begin = 0
     for sign in _SIGN.finditer(text):
         left, right = text[begin : sign.start()], text[sign.end() :]
-        if not _begins_with_verb(right) and (sign["and"] or not (_is_short_name(right) and _COMMAND.match(left))):
+        if not begins_with_verb(right) and (sign["and"] or not (_is_short_name(right) and _COMMAND.match(left))):
             continue  # before the names are looked for, which takes longer
         action = only_named(left) or ""
         after = only_named(_first(right)) or only_named(_CLAUSE.split(right)[0]) or ""
-        if not action or not after or action == after:
+        if not action or not after:
+            continue
+        if action == after and (sign["and"] or not is_on_other_side(left, _first(right), action)):
             continue
         if action in SERIES and "then" not in sign[0].lower():
             continue
@@ -95,7 +111,8 @@ def _first(text: str) -> str:
     return text if sign is None else text[: sign.start()]
 
 
-def _begins_with_verb(text: str) -> bool:
+def begins_with_verb(text: str) -> bool:
+    """Return True if a text begins with a verb that is no participle: "he quickly turns"."""
     first = re.match(r"[a-z]+", _SUBJECT.sub("", text).lower())
     if first is None or first[0].endswith("ing"):
         return False

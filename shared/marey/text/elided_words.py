@@ -26,7 +26,8 @@ _OTHER_SIDE = re.compile(
     (?P<again>(?:{_TIMES}|{_NUMBER})\ )?
     (?:(?P<verb2>[a-z]+)\ )??(?:{_ON}\ )?{_OWN}
     (?P<other>left|right)(?P<limb2>\ (?:{_LIMB}|one))?
-    (?P<last>\ {_TIMES})?(?=\W*$|;|\.|,?\ (?:and\ )?then\ |,?\ and\ (?!(?:left|right|the|then)\b)[a-z]+s\b)""",
+    (?P<last>\ {_TIMES})?
+    (?=\W*$|;|\.|,?\ (?:and\ )?then\b|,?\ and\ (?!(?:left|right|the|then)\b)[a-z]+s\b|,\ (?!left\b|right\b))""",
     re.IGNORECASE | re.VERBOSE,
 )
 _READ_AS_ONE = re.compile(
@@ -100,11 +101,12 @@ def _said_again(found: re.Match[str]) -> str:
         return found[0]
     again = (found["again"] or "").strip()
     is_number = bool(again) and "times" not in again and again not in ("once", "twice", "thrice")
+    verb = found["verb"].lower()
     if found["number"]:
-        act = f"{again or found['number'].strip()} {found['verb']}{found['how']}"
+        act = f"{again or found['number'].strip()} {verb}{found['how']}"
         times = ""
     else:
-        act = f"{found['verb']}{found['how']}"
+        act = f"{verb}{found['how']}"
         times = (
             f"{again} times"
             if is_number

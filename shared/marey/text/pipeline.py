@@ -36,6 +36,7 @@ from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
+from marey.text.time_order import in_time_order
 from marey.text.winding_ways import with_plain_zigzag
 from marey.text.word_order import in_usual_order
 from marey.text.words import EDGE_PUNCTUATION
@@ -50,9 +51,11 @@ TOGETHER = 64
 """Prompts whose texts are encoded together."""
 
 
-def _in_plain_words(prompt: str) -> str:
-    """Return a prompt with plain words of ways that wind and of gaits in place."""
-    return with_plain_gait_in_place(with_plain_zigzag(prompt))
+def _in_known_words(prompt: str) -> str:
+    """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
+    that mislead them, and with plain words of ways that wind and of gaits in place."""
+    ordered = with_elided(in_time_order(in_usual_order(as_words(prompt))))
+    return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 
 
 class TextPipeline:
@@ -246,7 +249,7 @@ class TextPipeline:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
-        texts = [without_misleading(_in_plain_words(with_elided(in_usual_order(as_words(text))))) for text in texts]
+        texts = [_in_known_words(text) for text in texts]
         encoded = self._texts_to_read
         if encoded is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]

@@ -16,22 +16,26 @@ from marey.text.action_reader import (
     joins_clauses,
     named_actions,
 )
-from marey.text.clause_order import comes_with
-from marey.text.clause_parts import before_next_verb, parts_in_time
+from marey.text.clause_order import BOUND_TO_HANDS, comes_with, without_joints
+from marey.text.clause_parts import SERIES, before_next_verb, only_named, parts_in_time
 from marey.text.elided_words import parts_by_sides
 from marey.text.encoders import Encoding
-from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise
+from marey.text.held_hand import with_held_hand
+from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise, without_misleading
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
 from marey.text.sequence_reader import (
     CARRYING,
     WAYS,
     ReadMovement,
+    from_there,
+    rest,
     sequence_reader,
     turned_to_carry,
     way_to_a_stop,
     way_to_rest,
 )
+from marey.text.told_apart import told_apart
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
@@ -44,6 +48,8 @@ UNSPLIT = 0.35
 """Probability from which on a prompt that is no sequence asks for one action."""
 ATTACK = "stab"
 """Action that "lunges" is read as."""
+WHOLE = SERIES | frozenset(BOUND_TO_HANDS)
+"""Actions that others are parts of."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel", "laugh"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
 
@@ -98,7 +104,65 @@ class TrainedReaders:
         parts = [said for each in bare for said, _ in parts_in_time(each.text)] if self._movements else []
         self._pooled([*texts, *(each.text for each in bare if each.text), *parts])  # together, in half the time
         self._encode_together([each if each.text else as_written(each.prompt) for each in bare])
-        return [self._carried(self._borne(each) or self._reading(as_written(each.prompt)), each) for each in bare]
+        return [self._carried(self._apart(self._whole(each), each), each) for each in bare]
+
+    def _whole(self, bare: BarePrompt) -> ReadPrompt:
+        return self._borne(bare) or self._reading(as_written(bare.prompt))
+
+    def _apart(self, reading: ReadPrompt, bare: BarePrompt) -> ReadPrompt:
+        """Return a reading in which what stands together though signs set it apart is several movements."""
+        if not self._movements:
+            return reading
+        if not reading.movements:
+            movements = told_apart(bare.prompt, self._surely_part)
+            found = tuple(with_held_hand(from_there(movements)))
+            return ReadPrompt(bare.prompt, found, drawn=reading.drawn) if found else reading
+        movements = tuple(
+            part
+            for each in reading.movements
+            for part in (
+                () if each.action in WHOLE else self._known(each) or told_apart(each.text, self._part, way=False)
+            )
+            or (each,)
+        )
+        return replace(reading, movements=tuple(with_held_hand(from_there(movements))))
+
+    def _known(self, movement: ReadMovement) -> tuple[ReadMovement, ...]:
+        """Return a movement whose action is in doubt with the one that is read in its words alone; else none."""
+        found = self._part(movement.text) if movement.action is None and not movement.seconds else ()
+        named = named_actions(BarePrompt.of(movement.text).text, surely=True)
+        return found if len(found) == 1 and found[0].action in named else ()
+
+    def _part(self, text: str) -> tuple[ReadMovement, ...]:
+        """Return the movements of a clause; none if it asks for none, or that is in doubt."""
+        bare = BarePrompt.of(without_misleading(text))
+        reading = self._whole(bare)
+        movements = reading.movements
+        if movements and movements[-1] == rest() and not way_to_a_stop(text):
+            movements = movements[:-1]  # behind counted steps, where something else comes
+        if movements or not reading.plain:
+            return movements
+        action = next(name for name, each in load_vocabulary().actions.items() if each.plain_words == reading.plain)
+        named = reading.drawn or named_actions(bare.text)
+        return (ReadMovement(text, action),) if named else ()
+
+    def _surely_part(self, text: str) -> tuple[ReadMovement, ...]:
+        """Return the movements of a clause of a prompt that the readers take for one; none unless its words name each
+        of them surely."""
+        found = self._part(text)
+        surely = all(
+            each.action not in (None, *WHOLE, *RISING)
+            and (
+                only_named(without_gaze(BarePrompt.of(each.text).text)) == each.action != STANDING
+                or self._is_gesture(each.text)
+            )
+            for each in found
+        )
+        return found if surely else ()
+
+    @staticmethod
+    def _is_gesture(text: str) -> bool:
+        return any(each.bearing.gesture or each.bearing.work for each in BarePrompt.of(text).stated)
 
     def _carried(self, reading: ReadPrompt, bare: BarePrompt) -> ReadPrompt:
         """Return a reading in which who carries something back turns round for it."""
@@ -125,6 +189,8 @@ class TrainedReaders:
         if self._movements and (movements := self._by_sides(bare.prompt)):
             return ReadPrompt(bare.prompt, movements)
         if self._movements and (movements := self._after_gaze(bare.prompt)):
+            return ReadPrompt(bare.prompt, movements)
+        if self._movements and (movements := self._stop_and_gaze(bare.prompt)):
             return ReadPrompt(bare.prompt, movements)
         read = self._read_bare(bare)
         sure = self._is_surely_one(bare, read)
@@ -153,6 +219,16 @@ class TrainedReaders:
             return ()
         action = self._read_action(said).likely(UNSPLIT)
         return () if action is None else (ReadMovement(looks, STANDING), ReadMovement(said, action))
+
+    def _stop_and_gaze(self, prompt: str) -> tuple[ReadMovement, ...]:
+        """Return the movements of a prompt of a way to a stop, behind which the head turns; else none."""
+        acts = without_gaze(prompt)
+        looks = without_joints(prompt[len(acts) :])
+        if acts == prompt or not prompt.startswith(acts) or not way_to_a_stop(acts) or not only_gaze(looks):
+            return ()
+        movements = self._reading(as_written(acts)).movements
+        stops = without_joints(prompt[len(way_to_a_stop(acts)) :])
+        return (*movements[:-1], ReadMovement(stops, STANDING)) if len(movements) > 1 else ()
 
     def _is_surely_one(self, bare: BarePrompt, read: ReadAction) -> bool:
         """Return True if a prompt is not looked at for several movements."""

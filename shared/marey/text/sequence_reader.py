@@ -45,7 +45,7 @@ from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 8
+VERSION = 9
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -192,7 +192,7 @@ class SequenceReader(Reader):
         """
         if way := way_to_rest(bare.prompt, action):
             several = [ReadMovement(text, one) for text, one in parts_in_time(way)]  # "jogs, slows to a walk and stops"
-            return (*(several or [ReadMovement(way, action)]), _rest())
+            return (*(several or [ReadMovement(way, action)]), rest())
         written = self._clauses(bare, encoding, pooled)
         whole = list(parted(with_belongings(written)))
         if len(whole) == 1 < len(written) and (whole[0].name in BOUND_TO_HANDS or _is_doubtless(whole[0])):
@@ -205,9 +205,9 @@ class SequenceReader(Reader):
             return _turn_and_rest(clauses)
         if any("negation" in match_scope(_WITHOUT.sub("", each.text), every_action()).flags for each in clauses):
             return ()
-        found = list(_from_there(map(_movement, groups)))
+        found = list(from_there(map(_movement, groups)))
         if found[-1].action == STANDING and found[-2].action in WAYS and way_to_a_stop(bare.prompt):
-            found[-1] = _rest()
+            found[-1] = rest()
         return tuple(found)
 
     def _clauses(
@@ -303,7 +303,7 @@ def way_to_rest(text: str, action: str | None) -> str:
     return way_to_a_stop(text) or (text if steps is not None else "")
 
 
-def _rest() -> ReadMovement:
+def rest() -> ReadMovement:
     """Return what a stop is read as: standing, in plain words alone."""
     return ReadMovement(phrase_in_third_person(load_vocabulary().need(STANDING).plain), STANDING, REST_S)
 
@@ -347,9 +347,13 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
     )
 
 
-def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
-    """Yield movements that begin as the one before has ended: who sat down and waits sits, who stands up does so from
+def from_there(movements: Iterable[ReadMovement]) -> tuple[ReadMovement, ...]:
+    """Return movements that begin as the one before has ended: who sat down and waits sits, who stands up does so from
     there, and who runs and jumps over something leaps."""
+    return tuple(_from_there(movements))
+
+
+def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     before = down = climbed = None
     for movement in movements:
         action = movement.action

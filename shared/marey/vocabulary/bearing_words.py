@@ -90,7 +90,12 @@ _NO_ACTION = frozenset(
         "have",
     ]
 )
-_DOER = re.compile(r"^\W*(?:an?|the|my|his|her|this) (?:\w+ )?\w+(?:ist|er|or|ian)s?\W*$")
+_DOER = re.compile(
+    r"^\W*(?:an?|the|my|his|her|this) (?:\w+ )?\w+(?:ist|er|or|ian)s?\W*$"
+    r"|^\W*(?:(?:an?|the|my|his|her|our|this) )?(?:[\w-]+ )?"
+    r"(?:basketball|tennis|football|soccer|volleyball|baseball|golf|hockey|badminton|rugby|cricket) "
+    r"(?:player|star|pro|champion|coach|fan)s?\W*$"
+)
 """A noun that names a person by what they do: "a violinist"."""
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
 _NOUN_PHRASE = re.compile(rf"(?:\b(?:{_ALL}) (?:(?!(?:{_ALL}) )\w+ )?)?$")
@@ -104,7 +109,7 @@ _SIDE = re.compile(r"\b(left|right)\b")
 _HEALTHY = re.compile(r"\bfavou?ring\b|\bgood\b")
 """Words of the leg that does not hurt."""
 _WITH_HAND = re.compile(
-    r",? (?:with|using) (?:(?:his|her|their|its|the|one's) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
+    r",? (?:with|using) (?:(?:his|her|their|its|the|one's|my|your) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
 )
 """Words of the hand that does a gesture, behind its own."""
 _OVER_AND_OVER = re.compile(
@@ -315,7 +320,7 @@ def _says_more(text: str) -> bool:
     words = set(re.findall(r"[a-z']+", _HANDED.sub("", text.lower())))
     said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
     if len(said) > 1:
-        return not _doers().match(text.lower())
+        return not (_doers().match(text.lower()) or _DOER.match(text.lower()))
     return bool(said) and not _DOER.search(text.lower())
 
 
@@ -370,7 +375,8 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
         if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
             yield _Words(*match.span(), stated)
     elif kind == "how" or _is_subject(text[: match.start()]):
-        hand = _WITH_HAND.match(text, match.end()) if not stated.side and stated.bearing.gesture else None
+        by_hand = stated.bearing.gesture or stated.bearing.work or len(stated.bearing.arms) == 1
+        hand = _WITH_HAND.match(text, match.end()) if not stated.side and by_hand else None
         over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
         if hand is None:
             yield _Words(match.start(), match.end() if over is None else over.end(), stated)

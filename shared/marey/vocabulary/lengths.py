@@ -46,6 +46,8 @@ _BEFORE = re.compile(r"\b(?:after|every|each|first|last|next|another|per|within|
 _AFTER = re.compile(r"^[ ]?(?:later|ago|in\b|apart|into|mark|hand|from now|at a time|between)")
 _NEXT = re.compile(r"\b(?:then|before|after|afterwards?|followed by|finally|next)\b|[;.!?](?:\s|$)|->|→|\s[-–—]\s")
 """Separators of actions in the order of time."""
+_FIRST = re.compile(r"^(?:right |just |shortly )?(?:after|before|once|when)\b(?P<clause>[^,;.]*[a-z]{3}[^,;.]*),")
+"""A first clause that says when the others come: "after clapping for two seconds, she bows"."""
 _LISTED = re.compile(r"(?:,|\band\b)(?:\s+and)?\s+(?:(?:he|she|they)\s+)?(?:\w+ly\s+)?(?=(?P<verb>[a-z]+)\b)")
 """Separators of the clauses of a list, before the verb of the next one."""
 _NAMED_PARTS = frozenset({"back", "face", "head", "hand", "arms", "legs", "feet", "hands"})
@@ -88,7 +90,7 @@ def stated_length(prompt: str) -> StatedLength:
     found = [match for match in _LENGTH.finditer(text) if not _is_moment(text, match)]
     if not found:
         return StatedLength()
-    rest = _LENGTH.sub(f" {_HERE} ", text)
+    rest = _FIRST.sub(r"\g<clause> then", _LENGTH.sub(f" {_HERE} ", text))
     clauses = [clause for part in _NEXT.split(rest) for clause in _listed(part)]
     parts = [part for part in clauses if re.search(r"[^\W\d_]{3}", _LABEL.sub("", part))]
     if len(found) < len(parts):

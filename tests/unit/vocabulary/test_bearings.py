@@ -350,6 +350,9 @@ def test_other_words_are_left_alone(prompt: str) -> None:
     ("prompt", "side"),
     [
         ("a person limps on the left leg", "left"),
+        ("limps over to the sofa on his right leg", "right"),
+        ("listens with her left hand to her ear", "left"),
+        ("a scout listens, hand to his ear", ""),
         ("walks with an injured right knee", "right"),
         ("a man limps, favoring his left leg", ""),  # two words for one bearing: the first has no side
         ("walks favoring his left leg", "right"),
@@ -509,7 +512,14 @@ def test_who_sneaks_on_tiptoe_is_drawn_so_whole() -> None:
 
 @pytest.mark.parametrize(
     ("prompt", "side"),
-    [("beckons with his left hand", "left"), ("blows a kiss with the right hand", "right"), ("beckons", "")],
+    [
+        ("beckons with his left hand", "left"),
+        ("blows a kiss with the right hand", "right"),
+        ("beckons", ""),
+        ("shaving with the left hand", "left"),
+        ("wash the window with your left hand", "left"),
+        ("walks off, waving with her left hand", "left"),
+    ],
 )
 def test_a_gesture_is_done_by_the_hand_that_stands_behind_it(prompt: str, side: str) -> None:
     (stated,) = stated_bearings(prompt)

@@ -91,3 +91,9 @@ def test_a_warning_tells_the_length_of_a_part_from_one_out_of_the_range() -> Non
     row = ScopeReport()
     row.judge("0-5 …", "tiny", LISTS, rows=[("row 1 (0-5)", "walks, then waves for 3 seconds")])
     assert row.warnings()[-1].endswith("it is used only if the parts are made one by one")
+
+
+def test_the_length_of_a_first_clause_is_that_of_a_part() -> None:
+    assert stated_length("After clapping for two seconds, the clown bows.") == StatedLength(is_partial=True)
+    assert stated_length("After a bow, he claps for two seconds, then kneels").is_partial
+    assert stated_length("after two seconds, he claps") == StatedLength()

@@ -1,0 +1,218 @@
+"""Words of the order of actions, and of what comes back, written out before a prompt is read (ours).
+
+The readers were trained on clauses in the order of time. "Before she sits down, she waves", the numbers of a list, a
+trip before a getting up and a way "in the opposite direction" are written as what is done, one after the other.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+
+from marey.vocabulary.bearings import bearing_words
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.inflection import gerund, phrase_in_third_person, third_person
+from marey.vocabulary.word_lists import load_word_lists
+
+_WHO = r"(?:he|she|they|it|(?:the|a|an|his|her|their|our|my)\ (?:[\w-]+\ ){0,2}?[\w-]+)"
+_BEFORE = re.compile(
+    rf"""^(?:right\ |just\ |shortly\ )?before\ (?:(?P<who>{_WHO})\ (?=\w+s\b)|(?=\w+ing\b))
+    (?P<later>[^,.;]+),\ (?!and\b|then\b)(?P<first>(?:(?!\bthen\b)[^.;])+?)(?P<end>\W*)$""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A prompt whose first clause is done last: "before she sits down, the nurse stretches"."""
+_AFTER = re.compile(
+    rf"^(?:right |just |shortly )?after (?P<first>\w+ing\b[^,.;]*), (?P<who>{_WHO.replace(chr(92) + ' ', ' ')})"
+    r" (?P<later>(?:\w+ly )?[a-z]+s\b.*)$",
+    re.IGNORECASE,
+)
+"""A first clause without its subject: "after clapping for two seconds, the old man sits down"."""
+_RISES = (
+    r"(?:(?:slowly|quickly|painfully|gingerly|then)\ )*(?:(?:he|she|they)\ )?(?:(?:slowly|quickly|immediately|then)\ )*"
+    r"(?:(?:gets?|getting|climbs?|rises?|stands?|scrambles?|springs?)\ (?:right\ |straight\ |back\ )?"
+    r"(?:up|(?:on)?to\ (?:his|her|their|its)\ feet)|picks?\ (?:him|her|them)sel\w+\ (?:back\ )?up)\b"
+)
+_TRIPS = re.compile(
+    rf"""\b(?P<trip>trip|stumble)(?P<s>s)?
+    (?:\ (?:over|on)\ (?:a|an|the|his|her|their|some)\ (?:\w+\ )?\w+|\ over|\ up)?
+    (?=(?:,|;|\.|\ ->|\ and|\ then|,\ and|,\ then)?\ (?:and\ |then\ |but\ )*{_RISES})""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A trip behind which one gets up, so that it was a fall: "trips, gets back up"."""
+_BACK_UP = re.compile(r"\b(?P<rise>get|gets|getting|stand|stands|standing) back up\b(?! (?:the|to|a)\b)", re.IGNORECASE)
+_FALLS_AND_CLIMBS = re.compile(
+    r"""(?P<falls>\bfalls?\ forward(?:,|;|\.)?\ (?:and\ |then\ )*(?:(?:he|she|they|it)\ )?(?:\w+ly\ )?)
+    (?:climb|scramble|stagger|get)(?P<s>s)?(?:\ back)?\ (?:up|to\ (?:his|her|their|its)\ feet)\b(?!\ (?:a|the|to)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A fall behind which one comes to one's feet by other words than "gets up"."""
+_FREEZES = re.compile(
+    r"(?P<joint>(?:[,;.]|\band|\bthen|\bhe|\bshe) )freeze(?P<s>s)?(?: in place)?(?=\s*(?:[,;.]|$|and\b|then\b))",
+    re.IGNORECASE,
+)
+"""A sudden stop, of which the readers make one who is cold."""
+_COLD = re.compile(r"\b(?:cold|freezing|snow\w*|ic[ey]\w*|winter|blizzard|frost\w*|shiver\w*|death)\b", re.IGNORECASE)
+_GAIT = r"(?:walk|run|jog|sprint|sneak|march|stroll|limp|dash|crawl|go|head|creep)"
+_OPPOSITE = re.compile(
+    rf"""(?:(?P<turns>\bturns?)\ )?
+    (?P<joint>(?:,|;|\.|\band|\bthen|->)\ (?:(?:he|she|they)\ )?)(?P<way>{_GAIT})(?P<s>e?s)?\b
+    (?P<off>\ (?:away|off|back))?\ (?:in\ )?the\ (?:opposite|other)\ (?:direction|way)\b(?!\ (?:of|to|from)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A way back to where the body came from: "freezes, then runs off in the opposite direction"."""
+_TURNED = re.compile(r"\bturn\w* (?:a?round|back|180)[^.;]*$", re.IGNORECASE)
+_CARRIES_ON = re.compile(
+    r"\b(?:(?P<carries>carr(?:y|ies)) on|(?<=then )(?P<keeps>keeps?|continues?|goe?s? on)) (?P<verb>\w+ing)\b",
+    re.IGNORECASE,
+)
+"""Words of who does something again, or still: "stumbles, then carries on limping"."""
+_WAVES_ON_A_WAY = re.compile(
+    r"""\bwav(?P<s>es|e)\b(?P<how>(?:\ (?!while\b|as\b)[\w-]+){0,6})\ while
+    \ (?P<way>(?:walk|runn|jogg|march|stroll|limp)ing)\b
+    (?P<where>[^,.;]*)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A wave on a way, which is told behind it: "waves while walking ahead"."""
+_COUNTED_BEFORE_TURN = re.compile(
+    rf"""(?P<steps>\b{_GAIT}(?:e?s)?\b[^,.;]*\bsteps?\b[^,.;]*?)(?:,?\ (?:and\ )?(?:then\ )?|,\ )
+    (?P<turn>turns?\ (?:\w+ly\ )?(?:to\ (?:the|his|her)\ )?(?:left|right|around))(?:,?\ (?:and\ )?(?:then\ )?|,\ )
+    (?P<keep>keeps?|continues?|go(?:es)?\ on|carr(?:y|ies)\ on|walks?\ on)(?:\ (?P<again>\w+ing))?\b""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Counted steps, a turn and the way behind it: "walks two steps, turns left and walks on"."""
+_IN_TURN = re.compile(
+    r"\b(?P<verb>turns?|pivots?|sidesteps?|side steps?|hops?|kicks?)(?P<how> [^,.;]*\b(?:left|right)\b[^,.;]*),"
+    r" (?:and )?(?=(?P=verb)\b[^,.;]*\b(?:left|right)\b)",
+    re.IGNORECASE,
+)
+"""An action on one side before the same on the other: "turns left, turns right"."""
+_NUMBER = re.compile(r"(?:^|(?<=[\s,;.]))\(?(?P<number>\d{1,2})[.):]\s+(?=[^\W\d])")
+LEAST_NUMBERS = 2
+"""Numbers from 1 on that make a prompt a list."""
+_OF_BEARINGS, _FIRST = re.compile(r"<(\w+)>"), re.compile(r"^[\w|-]+")
+"""Verbs in the words of bearings."""
+_DOES: Mapping[str, str] = {
+    **dict.fromkeys(("jogger",), "jogs"),
+    **dict.fromkeys(("runner", "racer"), "runs"),
+    **dict.fromkeys(("sprinter",), "sprints"),
+    **dict.fromkeys(("walker", "hiker", "wanderer", "stroller", "pedestrian"), "walks"),
+    **dict.fromkeys(("dancer", "ballerina"), "dances"),
+    **dict.fromkeys(("swimmer",), "swims"),
+}
+"""Verbs of people whose nouns say what they do."""
+_DOER = re.compile(
+    rf"""^(?P<who>(?:(?:a|an|the|one)\ )?(?:(?!(?:night|street|rope|tightrope|dog|blade)\b)[\w-]+\ ){{0,2}}?
+    (?:{"|".join(_DOES)}))
+    (?P<how>(?:,\ |\ (?:who|that)\ (?:is|looks|seems)\ )[\w\ -]+)?[.!]?$""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A prompt without a verb, of a person named by what they do: "a jogger, tired"."""
+
+
+def in_time_order(prompt: str) -> str:
+    """Return a prompt with its actions in the order of time, and with the words of those that it leaves out: "claps,
+    then sits down" of "before she sits down, she claps". Any other prompt is returned as it is."""
+    text = _AFTER.sub(_after, _BEFORE.sub(_before, _without_numbers(prompt)))
+    text = _BACK_UP.sub(r"\g<rise> up", _TRIPS.sub(_trips, text))
+    text = _FALLS_AND_CLIMBS.sub(lambda up: f"{up['falls']}get{up['s'] or ''} up", text)
+    text = text if _COLD.search(text) else _FREEZES.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", text)
+    text = _CARRIES_ON.sub(_carries_on, text)
+    text = _COUNTED_BEFORE_TURN.sub(_steps_and_turn, _WAVES_ON_A_WAY.sub(_waving, text))
+    text = _IN_TURN.sub(r"\g<verb>\g<how>, then ", text)
+    return _OPPOSITE.sub(_turned, _DOER.sub(_does, text))
+
+
+def _before(found: re.Match[str]) -> str:
+    """Return what is done first, and then what comes later."""
+    later = found["later"]
+    if found["who"] is None:
+        verb, _, rest = later.partition(" ")
+        known = _verbs_of_gerunds().get(verb.lower())
+        if known is None:
+            return found[0]
+        later = f"{phrase_in_third_person(known)} {rest}".strip()
+    return f"{found['first']}, then {later}{found['end']}"
+
+
+def _after(found: re.Match[str]) -> str:
+    """Return what is done first with its subject, and then what comes later."""
+    verb, _, rest = found["first"].partition(" ")
+    known = _verbs_of_gerunds().get(verb.lower())
+    if known is None:
+        return found[0]
+    return f"{found['who']} {' '.join(filter(None, (phrase_in_third_person(known), rest)))}, then {found['later']}"
+
+
+@lru_cache(maxsize=1)
+def _verbs_of_gerunds() -> Mapping[str, str]:
+    """Return each verb that is known, by its form in -ing."""
+    phrases = [phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near)]
+    verbs = {phrase.split()[0] for phrase in (*phrases, *load_word_lists().other_verbs)}
+    for _, words in bearing_words():
+        verbs.update(verb for entries in words.values() for entry in entries for verb in _OF_BEARINGS.findall(entry))
+        verbs.update(verb for entry in words.get("gaits", ()) for verb in _FIRST.findall(entry)[0].split("|"))
+    return {gerund(verb): verb for verb in sorted(verbs) if verb.isalpha()} | {"leaving": "walk off"}
+
+
+def _carries_on(found: re.Match[str]) -> str:
+    """Return a verb in the form of the one that says that it goes on."""
+    said = found["carries"] or found["keeps"]
+    verb = _verbs_of_gerunds().get(found["verb"].lower())
+    if verb is None:
+        return f"{'keeps' if said.lower().endswith('s') else 'keep'} {found['verb']}"
+    return third_person(verb) if said.lower().split()[0].endswith("s") else verb
+
+
+def _trips(found: re.Match[str]) -> str:
+    """Return the fall that a trip ends with."""
+    return f"fall{found['s'] or ''} forward"
+
+
+def _waving(found: re.Match[str]) -> str:
+    """Return a way with a wave beside it."""
+    way = _verbs_of_gerunds().get(found["way"].lower(), "walk")
+    return f"{third_person(way) if found['s'] == 'es' else way}{found['where']} while waving{found['how']}"
+
+
+def _steps_and_turn(found: re.Match[str]) -> str:
+    """Return steps, a turn and a way, one after the other."""
+    third = found["turn"].lower().startswith("turns")
+    way = _verbs_of_gerunds().get((found["again"] or "walking").lower(), "walk")
+    return f"{found['steps']}, then {found['turn']}, then {third_person(way) if third else way} forward"
+
+
+def _turned(found: re.Match[str]) -> str:
+    """Return a way behind the turn that it begins with; without another where one is told before."""
+    third = found["s"] is not None
+    if found["turns"]:  # "turns and walks in the opposite direction"
+        return f"{found['turns']} around and then {found['way']}{found['s'] or ''} away"
+    way = f"{found['way']}{found['s'] or ''} away"
+    if _TURNED.search(found.string[: found.start("way")]):
+        return f"{found['joint']}{way}"
+    return f"{found['joint']}turn{'s' if third else ''} around and then {way}"
+
+
+def _does(found: re.Match[str]) -> str:
+    """Return who is named by what they do with the verb of it; as it is where words behind say what else is done."""
+    how = found["how"] or ""
+    noun = found["who"].split()[-1].lower()
+    if re.search(r"\b\w+ing\b|\b(?:is|looks|seems) (?:at|in|on)\b", how):
+        return found[0]
+    return f"{found['who']} {_DOES[noun]}{how}"
+
+
+def _without_numbers(prompt: str) -> str:
+    """Return a list with numbers from 1 on, in their order, as what is done one after the other."""
+    signs = list(_NUMBER.finditer(prompt))
+    if len(signs) < LEAST_NUMBERS or [int(sign["number"]) for sign in signs] != list(range(1, len(signs) + 1)):
+        return prompt
+    before = prompt[: signs[0].start()].strip()
+    listed = ", then ".join(_listed(prompt, signs))
+    return f"{before} {listed}".strip()
+
+
+def _listed(prompt: str, signs: list[re.Match[str]]) -> Iterator[str]:
+    ends = [*(sign.start() for sign in signs[1:]), len(prompt)]
+    for sign, end in zip(signs, ends, strict=True):
+        yield prompt[sign.end() : end].strip(" ,;.")

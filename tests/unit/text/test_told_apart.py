@@ -1,0 +1,80 @@
+"""Movements that signs set apart, as the pipeline reads them."""
+
+from __future__ import annotations
+
+import pytest
+
+from marey.text.pipeline import TextPipeline
+from marey.text.told_apart import clauses_apart
+from tests.support.texts import shared_pipeline
+
+
+@pytest.fixture(scope="module")
+def reading() -> TextPipeline:
+    pipeline = shared_pipeline()
+    spec = pipeline.spec.model_copy(update={"plain_action": True, "movements": True})
+    return TextPipeline(spec, rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("He ducks, comes up with a hook", ["He ducks", "comes up with a hook"]),
+        ("kneels. Then she waves", ["kneels", "she waves"]),
+        ("duck -> roll", ["duck", "roll"]),
+        ("bows, arms wide", ["bows, arms wide"]),
+        ("jumps, lands softly", ["jumps, lands softly"]),
+        ("a routine (kick, punch, block), then a bow", ["a routine (kick, punch, block)", "a bow"]),
+    ],
+)
+def test_signs_set_clauses_apart(text: str, parts: list[str]) -> None:
+    assert clauses_apart(text) == parts
+
+
+@pytest.mark.parametrize(
+    ("prompt", "movements"),
+    [
+        ("The goalie throws the ball, ducks, and then raises both fists in triumph", 3),
+        ("Turn left, then turn right.", 2),
+        ("sidestep right, sidestep left", 2),
+        ("hop once on the right leg, then twice on the left leg, then stop", 3),
+        ("a backhand swing, then a quick side step to the right, then a forehand swing", 3),
+        ("march five steps, turn left and keep marching", 3),
+        ("she crouches to tie her shoe; then she gets up and walks off", 3),
+        ("walk ahead, then turn left", 0),
+        ("bends his knees, jumps up and lands", 0),
+        ("a karate form: block, punch, kick", 0),
+        ("shrugs, both palms up", 0),
+        ("he hails a cab: arm straight up", 0),
+        ("a nurse rocks a baby in her arms, standing", 0),
+        ("football player heads the ball", 0),
+        ("basketball star takes a jump shot", 0),
+        ("a man walks up while waving with his left hand", 0),
+    ],
+)
+def test_parts_that_are_movements_are_rows(reading: TextPipeline, prompt: str, movements: int) -> None:
+    (read,) = reading.features([prompt])
+    assert len(read.movements) == movements
+
+
+def test_a_stop_before_a_gaze_ends_a_way(reading: TextPipeline) -> None:
+    (read,) = reading.features(["jogs in, skids to a stop, looks up, looks right"])
+    assert [each.prompt for each in read.movements] == ["jogs in", "skids to a stop, looks up, looks right"]
+
+
+@pytest.mark.parametrize(
+    ("prompt", "thrown"),
+    [
+        ("a boy picks up a snowball with his left hand, then throws it", "throws it with the left hand"),
+        ("a boy picks up a snowball with his left hand, then throws it with the right arm", None),
+        ("a boy picks up a snowball, then throws it", "throws it"),
+    ],
+)
+def test_the_hand_that_has_taken_something_throws_it(reading: TextPipeline, prompt: str, thrown: str | None) -> None:
+    (read,) = reading.features([prompt])
+    assert read.movements[-1].prompt == (thrown or "throws it with the right arm")
+
+
+def test_who_ties_a_shoe_gets_up_from_the_crouch(reading: TextPipeline) -> None:
+    (read,) = reading.features(["he crouches to tie his shoe; then he gets up"])
+    assert read.movements[-1].graph.text.startswith("a person stands upright")
