@@ -88,6 +88,19 @@ def test_toes_move_least_since_they_stand():
     assert moved[[10, 11]].max() < 0.2 * moved.mean()
 
 
+def test_a_leg_that_was_made_too_long_does_not_turn_the_pelvis():
+    joints = np.repeat(HUMANML3D.rest[None].astype(np.float64), 2, axis=0)
+    right = [HUMANML3D.joint_names.index(f"R_{name}") for name in ("knee", "ankle", "foot")]
+    joints[0, right] += [[0.0, -0.06, 0.06], [0.0, -0.1, 0.1], [0.0, -0.1, 0.1]]  # a swing that a decoder stretched
+    joints[1, right] += [[0.0, -0.005, 0.0], [0.0, -0.005, 0.0], [0.0, -0.005, 0.0]]  # a stance
+    fitted = BoneFit(HUMANML3D).fit(joints)
+    hips = fitted[:, HUMANML3D.facing[0]] - fitted[:, HUMANML3D.facing[1]]
+    assert np.degrees(np.abs(np.arctan2(hips[:, 2], -hips[:, 0]))).max() < 3
+    moved = np.linalg.norm(fitted - joints, axis=-1)[:, right[-1]]
+    assert moved[0] > 0.05
+    assert moved[1] < 0.002
+
+
 def test_all_clips_have_the_same_offsets_to_the_last_bit():
     clips = [finish_motion(of_another_size(seed), HUMANML3D_263, fps=fps) for seed in range(4) for fps in (20, 60)]
     assert len({clip.offsets.tobytes() for clip in clips}) == 1
