@@ -20,6 +20,7 @@ from marey.generation.distances import SPEEDS, as_far, distance_of, farther, fra
 from marey.generation.drawn_sides import drawn_side
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
+from marey.generation.even_runs import EVEN, even_run
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.fine_wish import FineWish
 from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
@@ -82,6 +83,7 @@ class AskedMotion:
             the first frame to the last, positive to the left, as the network `made` them and as they are `shown`;
             `course`, to which a way was bent (`marey.generation.steered`);
             `went_back`, true where it goes on and the network went back (`marey.generation.onward`);
+            `evened`, true where a run lost its beat and its strides were made anew (`marey.generation.even_runs`);
             `distance`, metres that a way goes as `asked` for and as `shown` (`marey.generation.distances`);
             `speed`, how many times as fast the motion is played as the network made it; `gaze`, where the head
             turns (`marey.generation.gazing`); `grounded`, true where the body was let down to the floor; `flights`,
@@ -355,6 +357,7 @@ def _as_asked(
         if drawn is not None:
             features, changes["drawn"] = drawn, wish.action if wish.action in FINE else DRIBBLING
     if layout.skeleton.name == HUMANML3D.name:
+        features = features if whole is not None else _evened(features, layout, wish, changes)
         for change in (_as_often, _turned, _on_floor, _ended) if whole is None or not whole.exact else ():
             if len(features) >= SHORTEST:
                 features = change(features, layout, wish, fixed, changes)
@@ -403,6 +406,15 @@ def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Reque
     if wish.action not in FINE or not request.drawing or _shows(features, layout, wish, request):
         return None
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
+
+
+def _evened(features: Float32, layout: FeatureLayout, wish: _Wish, changes: dict[str, Any]) -> Float32:
+    """Return the motion without the moments in which a run loses its beat."""
+    even = even_run(features, layout) if wish.action in EVEN and wish.count is None else None
+    if even is None or len(features) < SHORTEST:
+        return features
+    changes["evened"] = True
+    return even
 
 
 def _as_often(
