@@ -47,6 +47,11 @@ PlainName = Annotated[
     ),
 ]
 """A file or bundle name that cannot leave its folder."""
+MAX_STYLE = 64
+StyleCaption = Annotated[
+    str, Field(max_length=500, pattern=worded(r"^\S[^\r\n]*$", "one line that begins with a word"))
+]
+"""A training caption that language models are shown."""
 
 
 class _Frozen(BaseModel):
@@ -102,6 +107,9 @@ class TextSpec(_Frozen):
     wording: Literal["caption", "description"] = "caption"
     """Texts that the model was trained on, in whose wording a language model rewrites: captions of one sentence, or
     descriptions of about 60 words (SnapMoGen)."""
+    style: tuple[StyleCaption, ...] = Field(default=(), max_length=MAX_STYLE)
+    """Captions of the training data that a language model is shown for `caption`; none = those of the starter
+    bundles (MOGO's TCA, Sec. 2.3)."""
 
     @model_validator(mode="after")
     def _check_movements(self) -> Self:
@@ -121,6 +129,8 @@ class TextSpec(_Frozen):
             values.pop("split_actions", None)
         if self.wording == "caption":
             values.pop("wording", None)
+        if not self.style:
+            values.pop("style", None)
         return values
 
 

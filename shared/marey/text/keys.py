@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from typing import Any
 
 from marey.bundles import TextSpec, find_bundle
 from marey.core.errors import InvalidBundle
@@ -19,7 +20,7 @@ from marey.vocabulary.scope import VERSION, ActionLists
 
 PIPELINE_VERSION = 5
 """Raise it when the graph, the actions or the features of the same prompt change for any reason but weights."""
-REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1, "tca": 1}
+REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 2, "tca": 2}
 ASKING = frozenset({"openai", "tca"})
 """Rewriters that ask a language model."""
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
@@ -60,12 +61,14 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 
-def _rewriter_parts(spec: TextSpec) -> list[str | int]:
-    parts: list[str | int] = [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]]
+def _rewriter_parts(spec: TextSpec) -> list[Any]:
+    parts: list[Any] = [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]]
     if spec.rewriter_model:
         parts.append(spec.rewriter_model)
     if spec.rewriter in ASKING and spec.wording != "caption":
         parts.append(spec.wording)
+    if spec.rewriter in ASKING and spec.style:
+        parts.append(["style", *spec.style])
     if spec.rewriter == "tca":
         parts.append(load_vocabulary().sha256)
     return parts

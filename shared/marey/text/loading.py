@@ -5,6 +5,7 @@ Each is imported on first use: a process that reads prompts with MiniLM never im
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from marey.bundles import find_bundle
@@ -76,8 +77,11 @@ def load_labeller(name: str) -> RoleLabeller:
     )
 
 
-def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption") -> PromptRewriter:
-    """The rewriter of that name; `openai` and `tca` write in the wording of the training texts.
+def load_rewriter(
+    name: str, labeller: RoleLabeller, wording: Wording = "caption", style: Sequence[str] = ()
+) -> PromptRewriter:
+    """The rewriter of that name; `openai` and `tca` write in the wording of the training texts, and captions in the
+    style of those of `style`; see `TextSpec`.
 
     Raises:
         InvalidBundle: there is none, or `tca` for descriptions, which may use other verbs anyway.
@@ -91,10 +95,10 @@ def load_rewriter(name: str, labeller: RoleLabeller, wording: Wording = "caption
         return RulesRewriter(labeller, Speller.load())
     if name in ASKING:
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
-        from marey.text.wordings import QUESTIONS, alignment
+        from marey.text.wordings import alignment, question_of
 
         if name == "tca" and wording != "caption":
             raise InvalidBundle("the rewriter 'tca' writes captions", where=wording, hint="Use the rewriter openai.")
-        question = alignment(load_vocabulary()) if name == "tca" else QUESTIONS[wording]
+        question = alignment(load_vocabulary(), style) if name == "tca" else question_of(wording, style)
         return OpenAIRewriter(Endpoint.of(settings()), question, name)
     raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai, tca.")

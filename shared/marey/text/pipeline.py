@@ -102,7 +102,7 @@ class TextPipeline:
         labeller = OneAtATime(load_labeller(spec.labeller))
         return cls(
             spec,
-            rewriter=load_rewriter(spec.rewriter, labeller, spec.wording),
+            rewriter=load_rewriter(spec.rewriter, labeller, spec.wording, spec.style),
             labeller=labeller,
             encoder=load_encoder(spec.encoder, encoder_path),
         )

@@ -10,6 +10,8 @@ import pytest
 import torch
 
 from marey.bundles import Bundle, find_bundle
+from marey.core.errors import InvalidInput
+from marey.data.manifest import MANIFEST
 from marey.data.prepared import PreparedData
 from marey.models.mogo import ablation
 from marey.models.mogo.ablation import (
@@ -19,6 +21,7 @@ from marey.models.mogo.ablation import (
     SCALING,
     VARIANTS,
     LevelToken,
+    ablate_data,
     ablate_levels,
     ablate_tokenizer,
     ablate_transformer,
@@ -34,6 +37,7 @@ from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 from tests.support.ablations import judge_by_two_prompts
+from tests.support.prepared import write_prepared
 
 from .networks import columns, prompts
 
@@ -107,6 +111,32 @@ def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
         wanted = replace(TINY.tokenizer, levels=levels)
         assert MOGOConfig.from_dict(made.manifest.parameters).tokenizer == wanted
     assert ablate_levels(request) == shown
+
+
+def test_data_are_mixed_with_shares_of_another_set_and_the_tokenizer_stays(
+    prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge_by_two_prompts(monkeypatch)
+    bundle = options.run / "bundle"
+    request = AblationRequest(prepared.path, str(bundle), tmp_path / "report", steps=1, batch=4, threads=1)
+    with pytest.raises(InvalidInput) as caught:
+        ablate_data(request)
+    assert caught.value.where == "--with"
+    other = write_prepared(tmp_path / "other", clips=12)
+    manifest = json.loads((other / MANIFEST).read_text())
+    manifest["sources"][0]["name"] = "others"
+    (other / MANIFEST).write_text(json.dumps(manifest))
+    shown = ablate_data(replace(request, other=other))
+    head, _, *rows = shown.splitlines()
+    assert {"validation loss", "foot skate"} <= {cell.strip() for cell in head.split("|")}
+    assert [row.split(" | ")[0] for row in rows] == ["| 0 % added", "| 50 % added", "| 100 % added"]
+    clips = len(prepared.clips)
+    mixed = [len(PreparedData.open(tmp_path / "report" / "data-mixes" / name).clips) for name in ("50", "100")]
+    assert mixed == [clips + 4, clips + 8]
+    made = [find_bundle(str(tmp_path / "report" / f"data-{number}-0" / "bundle")) for number in range(3)]
+    before = find_bundle(str(bundle)).manifest.files["tokenizer.safetensors"].sha256
+    assert {each.manifest.files["tokenizer.safetensors"].sha256 for each in made} == {before}
+    assert [len(each.manifest.data) for each in made] == [1, 2, 2]
 
 
 def test_the_sizes_of_the_papers_tables() -> None:

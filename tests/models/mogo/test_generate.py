@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from marey.models.mogo.config import TINY, InferenceConfig
 from marey.models.mogo.generate import Generator, SamplingSettings
 from marey.models.mogo.spec import SPEC
 from marey.models.mogo.state import NEVER
+from marey.models.mogo.streaming import StreamBatch
 from marey.models.mogo.train import train_stage
 from marey.motion.skeleton import HUMANML3D
 from marey.registry import Setting
@@ -82,17 +84,38 @@ def test_a_bundle_may_make_longer_motions_than_it_was_trained_on(generator: Gene
 
 
 def test_beyond_its_training_length_a_motion_is_that_of_a_stream(tmp_path: Path) -> None:
-    """Attention looks back over its window, whatever the length of the whole."""
+    """Attention looks back over its window, and the clock stops, whatever the length of the whole."""
     config = replace(TINY, longest_frames=70, split_actions=False)
     generator = Generator.load(random_bundle(tmp_path / "long", config), device="cpu")
     request = Request(text_features(0, 1), seed=5, frames=70)
     (made,) = generator.generate([request])
     streams = generator.streams(1, SamplingSettings().inference(config.inference))
-    actions, _ = generator.actions(request.text)
-    session = streams.start(actions, 5, ends_from=NEVER, lasts=[70])
+    actions, natural = generator.actions(request.text)
+    assert natural[0] <= TINY.max_frames
+    session = streams.start(actions, 5, ends_from=NEVER, lasts=natural)
     columns = [streams.step()[session] for _ in range(70)]
     assert np.array_equal(made.tokens.T, torch.stack(columns).numpy())
     assert len({tuple(column.tolist()) for column in columns[TINY.max_frames :]}) > 1
+
+
+def test_the_clock_stops_as_in_a_stream_beyond_the_training_length_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    generator = Generator.load(random_bundle(tmp_path / "long", replace(TINY, longest_frames=70)), device="cpu")
+    told: list[list[int]] = []
+    plain = StreamBatch.start
+
+    def start(self: StreamBatch, *args: Any, lasts: list[int], **options: Any) -> int:
+        told.append(list(lasts))
+        return plain(self, *args, lasts=lasts, **options)
+
+    monkeypatch.setattr(StreamBatch, "start", start)
+    text = text_features(0, 1)
+    made = generator.generate([Request(text, 1, frames) for frames in (70, TINY.max_frames)])
+    assert [len(each.features) for each in made] == [70, TINY.max_frames]
+    natural = generator.actions(text)[1]
+    assert sum(natural) < 70
+    assert told == [natural, [TINY.max_frames]]
 
 
 def test_prompt_seed_and_settings_make_a_difference(generator: Generator) -> None:

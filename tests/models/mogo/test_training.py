@@ -11,6 +11,7 @@ import torch
 
 from marey.core.errors import InvalidInput, NotFound
 from marey.data.prepared import PreparedData
+from marey.data.style import style_of
 from marey.models.mogo import steers
 from marey.models.mogo.assembly import assemble, unpack
 from marey.models.mogo.config import TINY, MOGOConfig
@@ -30,7 +31,7 @@ from marey.training.sentences import SentenceData
 from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
 from tests.support.device_memory import device_with_room_for
-from tests.support.prepared import farthest_move
+from tests.support.prepared import farthest_move, write_prepared
 
 CPU = torch.device("cpu")
 
@@ -242,3 +243,14 @@ def test_steered_motions_leave_one_clip_for_another_and_are_made_once(prepared: 
         reach = 4  # frames by which the encoder looks ahead
         start = int(made.starts[row])
         assert torch.equal(made.tokens[start : start + max(seam - 1 - reach, 0)], whole[: max(seam - 1 - reach, 0)])
+
+
+def test_a_bundle_records_captions_of_its_training_data(tmp_path: Path) -> None:
+    data = PreparedData.open(write_prepared(tmp_path / "data", clips=12, acts=("walk", "bow", "jump")))
+    given = options(data, tmp_path / "run", 1)
+    for stage in ("tokenizer", "transformer"):
+        train_stage(stage, given)
+    made = assemble(data.path, given.run, tmp_path / "bundle", TINY)
+    assert made.manifest.text is not None
+    assert made.manifest.text.style == style_of(data.split("train"))
+    assert set(made.manifest.text.style) == {f"a person does {act}" for act in ("walk", "bow", "jump")}

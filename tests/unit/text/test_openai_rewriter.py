@@ -7,7 +7,7 @@ import socket
 from collections.abc import Iterator
 
 import pytest
-from pydantic import SecretStr
+from pydantic import SecretStr, ValidationError
 
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle, InvalidInput
@@ -19,7 +19,7 @@ from marey.text.loading import load_rewriter
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
 from marey.text.pipeline import TextPipeline
 from marey.text.rewriters import NotRewritten, Rewrite
-from marey.text.wordings import QUESTIONS
+from marey.text.wordings import alignment, question_of
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.language_model import ChatRequest, CompletionReply, LanguageModel
 from tests.support.texts import shared_pipeline
@@ -41,7 +41,7 @@ def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def rewriter_of(model: LanguageModel, seconds: float = 30.0) -> OpenAIRewriter:
-    return OpenAIRewriter(Endpoint(model.url, "some-model", SecretStr(KEY), seconds), QUESTIONS["caption"])
+    return OpenAIRewriter(Endpoint(model.url, "some-model", SecretStr(KEY), seconds), question_of("caption"))
 
 
 def reason_of(rewriter: OpenAIRewriter, prompt: str = PROMPT) -> str:
@@ -83,12 +83,41 @@ def test_an_alignment_is_asked_for_the_actions_of_the_vocabulary(
         load_rewriter("tca", pipeline.labeller, "description")
 
 
+def test_a_bundle_shows_the_captions_of_its_own_data(model: LanguageModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = ("The actor {braces} strides off.", "Somebody ducks and stays low for a while.")
+    config = Settings(rewriter_url=model.url, rewriter_model="some-model")
+    monkeypatch.setattr(loading, "settings", lambda: config)
+    labeller = shared_pipeline().labeller
+    for name in ("openai", "tca"):
+        load_rewriter(name, labeller, style=own).rewrite(f"{PROMPT} {name}")
+        instruction = model.asked[-1].question["messages"][0]["content"]
+        assert "these captions:\n- The actor {braces} strides off.\n- Somebody ducks" in instruction
+        assert "A youth waves hi" not in instruction
+    assert alignment(load_vocabulary(), own).instruction == instruction
+    assert question_of("description", own).instruction == question_of("description").instruction
+
+
+def test_the_style_is_part_of_the_key_of_features_where_a_language_model_is_asked() -> None:
+    sha256 = "0" * 64
+
+    def key(**values: object) -> str:
+        return feature_key(
+            "walk", TextSpec.model_validate({"encoder_sha256": sha256, "labeller_sha256": sha256, **values})
+        )
+
+    assert key(style=("a person strides",)) == key()
+    assert len({key(rewriter="tca", style=style) for style in ((), ("a b c",), ("a b d",))}) == 3
+    assert "style" not in TextSpec().model_dump()
+    with pytest.raises(ValidationError):
+        TextSpec(style=("a person walks\nand obeys",))
+
+
 DESCRIBED = "The person shuffles forward, the left foot dragging behind, with both arms hanging loosely at the sides."
 
 
 def rewrite_of(answer: str) -> Rewrite:
     with LanguageModel(lambda asked, before: CompletionReply(answer)) as model:
-        made = OpenAIRewriter(Endpoint(model.url, "some-model", None, 5.0), QUESTIONS["description"]).rewrite(
+        made = OpenAIRewriter(Endpoint(model.url, "some-model", None, 5.0), question_of("description")).rewrite(
             "zombie walk"
         )
         (asked,) = model.asked
@@ -170,7 +199,7 @@ def test_an_endpoint_that_is_not_there_is_the_reason() -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{free.getsockname()[1]}/v1"
-    assert "cannot be reached" in reason_of(OpenAIRewriter(Endpoint(url, "m", None), QUESTIONS["caption"]))
+    assert "cannot be reached" in reason_of(OpenAIRewriter(Endpoint(url, "m", None), question_of("caption")))
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,19 @@ def test_a_description_may_say_more_but_loses_nothing(pipeline: TextPipeline, re
         ("a person waves", "a person walks", "verbs"),
         ("he strolls", "a person ambles", "verbs"),
         ("he strolls", "a person walks and waves", "verbs"),
+        # a phrase such as "heave self up" says nothing of its verb in other ones
+        ("a docker heaves a barrel", "a docker throws a barrel", None),
+        ("a docker heaves himself up onto the wall", "a docker throws himself up onto the wall", "verbs"),
+        ("a knight swings a sword", "a knight kicks", "verbs"),
+        # the name of the action brings a direction
+        ("a clerk flumps onto a stool", "a clerk sits down on a stool", None),
+        ("a clerk flumps onto a stool", "a clerk sits up on a stool", "a direction"),
+        ("a nurse strolls", "a nurse walks backward", "a direction"),
+        ("a nurse walks and flumps onto a stool", "a nurse walks backward and sits on a stool", "a direction"),
+        # no verb was found, or a noun names the action
+        ("a backflip", "a person flips", None),
+        ("a backflip", "a person kicks", "verbs"),
+        ("a person", "a person walks and waves", "verbs"),
     ],
 )
 def test_an_alignment_brings_other_verbs_into_the_vocabulary_and_keeps_the_rest(

@@ -1,8 +1,8 @@
 """Held-out prompts by authors who saw the definitions of the vocabulary and nothing else.
 
 Two authors ask for single actions, by which the supported actions of a bundle are published; a third wrote a list of
-300 prompts as a games studio would send it, and a fifth asks for sequences. Nothing is trained on them or chosen by
-them. By the prompts of a fourth, `development`, settings are chosen.
+300 prompts as a games studio would send it, a fifth asks for sequences, and a sixth in verbs that the vocabulary lacks.
+Nothing is trained on them or chosen by them. By the prompts of a fourth, `development`, settings are chosen.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 AUTHORS = (1, 2)
-STUDIO_AUTHOR, DEVELOPMENT_AUTHOR, SEQUENCE_AUTHOR = 3, 4, 5
+STUDIO_AUTHOR, DEVELOPMENT_AUTHOR, SEQUENCE_AUTHOR, OTHER_VERBS_AUTHOR = 3, 4, 5, 6
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,18 @@ def action_prompts() -> tuple[ActionPrompt, ...]:
 @lru_cache(maxsize=1)
 def development_prompts() -> tuple[ActionPrompt, ...]:
     """Return five prompts of each action, by which settings may be chosen."""
-    tables = tomllib.loads(Path(__file__).with_name("prompts_development.toml").read_text("utf-8"))
-    return tuple(
-        ActionPrompt(text, (action,), "", DEVELOPMENT_AUTHOR) for action, texts in tables.items() for text in texts
-    )
+    return _by_action("prompts_development.toml", DEVELOPMENT_AUTHOR)
+
+
+@lru_cache(maxsize=1)
+def other_verb_prompts() -> tuple[ActionPrompt, ...]:
+    """Return prompts of one action each, in verbs that the vocabulary does not know."""
+    return _by_action("prompts_other_verbs.toml", OTHER_VERBS_AUTHOR)
+
+
+def _by_action(file: str, author: int) -> tuple[ActionPrompt, ...]:
+    tables = tomllib.loads(Path(__file__).with_name(file).read_text("utf-8"))
+    return tuple(ActionPrompt(text, (action,), "", author) for action, texts in tables.items() for text in texts)
 
 
 @lru_cache(maxsize=1)

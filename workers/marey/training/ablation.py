@@ -34,6 +34,7 @@ class AblationRequest:
         batch: clips a step; None = as configured.
         seeds: training seeds of each variant; see `compare`.
         threads: 0 = PyTorch's default.
+        other: prepared data that an ablation of data adds; None = none.
     """
 
     data: Path
@@ -43,6 +44,7 @@ class AblationRequest:
     batch: int | None = None
     seeds: int = 1
     threads: int = 0
+    other: Path | None = None
 
     def training(self, run: Path, config: C, seed: int) -> TrainOptions[C]:
         """Return the options of the training of a variant."""

@@ -15,6 +15,7 @@ from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
 from marey.data.licences import Terms, check_mix
 from marey.data.prepared import PreparedData
+from marey.data.style import style_of
 from marey.nn.bundling import GeneratorConfig, write_generator
 from marey.training.parts import TrainedPart, save_part
 from marey.training.staging import TrainableConfig, TrainingRecipe, bundle_terms
@@ -84,7 +85,8 @@ def gather(prepared: Path, run: Path, recipe: TrainingRecipe[C], config: C) -> G
         "metrics": {f"{stage}/{k}": v for stage, part in parts.items() for k, v in part.metrics.items()},
         "training": {"commit": _commit(), "budgets": {name: part.budget for name, part in parts.items()}},
     }
-    return Gathered(parts, CaptionTexts.load(data).spec, manifest)
+    spec = CaptionTexts.load(data).spec.model_copy(update={"style": style_of(data.split("train"))})
+    return Gathered(parts, spec, manifest)
 
 
 def scatter(

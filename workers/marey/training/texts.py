@@ -32,6 +32,8 @@ from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
 from marey.text.pipeline import TextPipeline
 
 CHUNK = 256
+OTHER_PIPELINE = "captions were read by another encoder or labeller"
+READ_AGAIN = "Read all captions again, or choose the encoder and labeller of that folder."
 SPECIFIC = LEVELS.index("specific")
 MAX_BYTES = 8 * 2**30
 KINDS = {
@@ -110,8 +112,7 @@ class CaptionTexts:
         flat = [caption for clip in captions for caption in clip]
         unique = list(dict.fromkeys(flat))
         if known is not None and known.texts.spec != pipeline.spec:
-            hint = "Read all captions again, or choose the encoder and labeller of that folder."
-            raise InvalidInput("captions were read by another encoder or labeller", where="known", hint=hint)
+            raise InvalidInput(OTHER_PIPELINE, where="known", hint=READ_AGAIN)
         row_of = {} if known is None else dict(known.rows)
         unread = [text for text in unique if text not in row_of]
         texts = cls._read(unread, pipeline, processes, encoder_path, progress)
@@ -119,6 +120,27 @@ class CaptionTexts:
             texts = known.texts._with(texts)
         row_of |= {text: row for row, text in enumerate(unread, len(texts.node_start) - 1 - len(unread))}
         return texts._arranged(np.array([row_of[text] for text in flat], np.int64), [len(clip) for clip in captions])
+
+    @classmethod
+    def of_known(cls, captions: Sequence[Sequence[str]], known: Sequence[KnownCaptions]) -> CaptionTexts:
+        """Return the captions of each clip, all of which were read before; nothing is parsed or encoded.
+
+        Args:
+            captions: captions of each clip.
+            known: one or several folders' captions.
+
+        Raises:
+            InvalidInput: they were read by different pipelines.
+        """
+        texts, row_of = known[0].texts, dict(known[0].rows)
+        for more in known[1:]:
+            if more.texts.spec != texts.spec:
+                raise InvalidInput(OTHER_PIPELINE, where="known", hint=READ_AGAIN)
+            first = len(texts.node_start) - 1
+            texts = texts._with(more.texts)
+            row_of = {caption: first + row for caption, row in more.rows.items()} | row_of
+        rows = np.array([row_of[caption] for clip in captions for caption in clip], np.int64)
+        return texts._arranged(rows, [len(clip) for clip in captions])
 
     @classmethod
     def _read(

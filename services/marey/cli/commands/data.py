@@ -72,6 +72,26 @@ def prepare(
     console.result(str(output))
 
 
+@app.command()
+def mix(
+    base: Annotated[Path, typer.Argument(metavar="BASE", help="Prepared data that are kept whole.")],
+    other: Annotated[Path, typer.Argument(metavar="OTHER", help="Prepared data of the same features, to add from.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],
+    share: Annotated[
+        float, typer.Option("--share", min=0.0, max=1.0, help="Share of the training clips of OTHER.")
+    ] = 1.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the draw.")] = 0,
+) -> None:
+    """Add a share of another set's training clips; clips for tests and statistics stay those of BASE, for its
+    tokenizer."""
+    from marey.cli.roles import data
+
+    with _progress() as progress:
+        line = data.mix_data(base, other, share, output, seed, lambda done, total: progress("mixing", done, total))
+    console.say(f"{output}: {line}")
+    console.result(str(output))
+
+
 def _named(pairs: list[str]) -> list[tuple[str, Path]]:
     if len(pairs) % 2:
         raise InvalidInput("a SOURCE without its PATH", hint="Write: marey data prepare bandai-namco ARCHIVE -o DIR")

@@ -335,6 +335,9 @@ def ablate(
             "--seeds", help="Training seeds of each variant; with two or more, one further where intervals touch."
         ),
     ] = 2,
+    other: Annotated[
+        Path | None, typer.Option("--with", help="Prepared data of which --what data adds 0, 50 and 100 %.")
+    ] = None,
     threads: Threads = 0,
 ) -> None:
     """Train variants of a model, and measure what each of its parts is worth. Called again, it goes on."""
@@ -342,6 +345,6 @@ def ablate(
 
     console.result(
         training.ablate(
-            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads
+            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads, other=other
         ).rstrip("\n")
     )  # fmt: skip

@@ -111,6 +111,20 @@ def prepare_data(
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
 
 
+def mix_data(
+    base: Path, other: Path, share: float, output: Path, seed: int, progress: Callable[[int, int], None]
+) -> str:
+    """Mix prepared data, and return a line that describes the mix.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, Conflict: see `marey.training.mixing.mix_with_texts`.
+    """
+    with extra("worker"):
+        from marey.training.mixing import mix_with_texts
+    manifest = mix_with_texts(base, other, share, output, seed=seed, progress=progress)
+    return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
+
+
 @dataclass(frozen=True)
 class ProposedFiles:
     """A proposed `dataset.toml`, and the paths of written files."""
@@ -248,7 +262,7 @@ def _text_spec(choice: TextChoice) -> TextSpec:
         spec = choose_bundle(choice.model).manifest.text
         if spec is None:
             raise InvalidInput(f"{choice.model!r} does not read prompts", where="--model")
-        return spec
+        return spec.model_copy(update={"style": ()})  # that of other data
     encoder = choice.encoder or "minilm"
     if encoder not in WIDTHS:
         raise InvalidInput(f"unknown encoder {encoder!r}", where="--encoder", hint=f"Known: {', '.join(WIDTHS)}.")

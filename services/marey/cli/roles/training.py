@@ -174,11 +174,13 @@ def ablate(
     batch: int | None,
     seeds: int,
     threads: int,
+    other: Path | None = None,
 ) -> str:
     """Train and measure variants of a bundle's model; a Markdown table.
 
     Args:
         name: of the ablation; None = the only one of the model.
+        other: prepared data that the ablation `data` adds.
 
     Raises:
         InvalidInput: the model has no such ablation, or several and none is named.
@@ -198,8 +200,10 @@ def ablate(
             where="--what",
             hint=f"Known: {'; '.join(f'{each.name} ({each.help})' for each in known.values()) or 'none'}.",
         )
+    if other is not None and name != "data":
+        raise InvalidInput(f"the ablation {name!r} adds no data", where="--with", hint="Leave it out.")
     with extra("train"):
         from marey.training.ablation import AblationRequest
 
         run = resolve(known[name].run)
-    return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads))
+    return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads, other))

@@ -10,7 +10,7 @@ Each variant is trained from scratch for the same number of steps, on the same s
 the ways of level and depth by cross-entropy of validation clips, and by the evaluation prompts where the product can
 generate with a variant. `scaling`, `levels` and `codebooks` (Tab. 3 to 5) train both networks, and compare by the
 errors and by the evaluation prompts; their bundles stay beside the numbers, for an evaluator. Finished variants are
-kept: a second call continues.
+kept: a second call continues. `data` (Tab. 6) trains the transformer on the data and on mixes with another set.
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from marey.bundles import Bundle, find_bundle
+from marey.core.errors import InvalidInput
 from marey.models.mogo.assembly import RECIPE, assemble, unpack
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
@@ -31,6 +33,7 @@ from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
 from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
+from marey.training.mixing import mix_with_texts
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions, finish, use_threads
 
@@ -112,6 +115,11 @@ CODEBOOKS: dict[str, Mapping[str, Any]] = {
 """The same of Tab. 5."""
 
 
+SHARES = {"0 % added": 0.0, "50 % added": 0.5, "100 % added": 1.0}
+"""Shares of the training clips of another set, by row of Tab. 6."""
+MIXES = "data-mixes"
+
+
 def train_tokenizer(scale: Scale, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
     """Train one tokenizer; return its errors on captured test clips, in mm, and how many codes it uses."""
     tokenizer = replace(options.config.tokenizer, scale=scale)
@@ -149,6 +157,20 @@ def train_both(fields: Mapping[str, Any], options: TrainOptions[MOGOConfig]) -> 
     return found | judged(assemble(options.prepared, options.run, options.run / "bundle", config), options.threads)
 
 
+def train_on_mix(bundle: str, other: Path, share: float, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    """Train a transformer on the data and a share of another set's training clips, with the bundle's tokenizer; return
+    its validation loss, on clips of the first set alone, and the judged evaluation prompts."""
+    run, prepared = options.run, options.prepared
+    if share:
+        prepared = run.parent / MIXES / f"{100 * share:.0f}"
+        if not prepared.exists():  # an unfinished one has another name
+            mix_with_texts(options.prepared, other, share, prepared)
+    unpack(find_bundle(bundle), run)
+    metrics = train_stage("transformer", replace(options, prepared=prepared))
+    made = assemble(prepared, run, run / "bundle", options.config)
+    return {"validation loss": metrics["loss"]} | judged(made, options.threads)
+
+
 def judged(bundle: Bundle, threads: int) -> dict[str, float]:
     """Judge a bundle on the evaluation prompts."""
     generator = Generator.load(bundle, threads=threads)
@@ -182,6 +204,22 @@ def ablate_levels(request: AblationRequest) -> str:
 def ablate_codebooks(request: AblationRequest) -> str:
     """Compare sizes of codebooks (Tab. 5); see `_ablate`."""
     return _ablate("codebooks", CODEBOOKS, train_both, request)
+
+
+def ablate_data(request: AblationRequest) -> str:
+    """Compare shares of another set that are added to the data (Tab. 6); see `_ablate`.
+
+    Raises:
+        InvalidInput: no other set is named.
+    """
+    other = request.other
+    if other is None:
+        raise InvalidInput("names no data to add", where="--with", hint="Name a prepared folder, such as that of CMP.")
+
+    def train(share: float, run: TrainOptions[MOGOConfig]) -> dict[str, float]:
+        return train_on_mix(request.bundle, other, share, run)
+
+    return _ablate("data", SHARES, train, request)
 
 
 def _ablate(

@@ -214,7 +214,10 @@ class _Drawing:
             self.columns[row] = None
 
     def _start(self, request: Request, lasts: Sequence[int]) -> int:
-        actions, _ = self._generator.actions(request.text)
+        actions, natural = self._generator.actions(request.text)
+        if sum(lasts) > self._generator.config.max_frames:
+            # its clock stops as in a live stream: where training motions end, gaits slow down
+            lasts = [*lasts[:-1], min(lasts[-1], natural[-1])]
         ends_from = NEVER if request.frames is not None else self._generator.config.min_frames
         return self.streams.start(actions, request.seed, ends_from=ends_from, lasts=lasts)
 

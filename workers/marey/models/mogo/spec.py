@@ -57,5 +57,6 @@ The same prompt, seed, settings and bundle give the same motion.""",
         Ablation("scaling", "Learnable scaling at three sizes of codebooks.", f"{ABLATION}:ablate_scaling"),
         Ablation("levels", "One to seven levels of tokens.", f"{ABLATION}:ablate_levels"),
         Ablation("codebooks", "Five sizes of codebooks.", f"{ABLATION}:ablate_codebooks"),
+        Ablation("data", "Shares of another set, named by --with.", f"{ABLATION}:ablate_data"),
     ),
 )
