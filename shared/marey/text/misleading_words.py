@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from marey.text.action_reader import named_actions
 from marey.text.lost_footing import with_falls
+from marey.text.punched_air import with_pumped_fists
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.scope import STANDING
 
@@ -353,7 +354,7 @@ def without_misleading(prompt: str) -> str:
     text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
     text = _TO_KNEES.sub(_kneels, _OVER_KNEES.sub(_falls_over_knees, text))
-    text = _EXITS.sub(_walks_off, text)
+    text = _EXITS.sub(_walks_off, with_pumped_fists(text))
     text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))

@@ -112,6 +112,15 @@ _WITH_HAND = re.compile(
     r",? (?:with|using) (?:(?:his|her|their|its|the|one's|my|your) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
 )
 """Words of the hand that does a gesture, behind its own."""
+_WITH_BOTH = re.compile(
+    r",? (?:with |using )?both (?:of )?(?:(?:his|her|their|its|the) )?(?:arms|hands)\b"
+    r"(?! (?:up|raised|out|on|in|over|behind)\b)"
+)
+"""Words of both hands, behind those of work that both do."""
+_GOES_ON = re.compile(
+    r"\b(?:go|goes|going|comes?|coming) (?:back )?(?:in|inside|out|outside|through|away|upstairs|downstairs)\b"
+)
+"""Words of a way of which every one says nothing alone."""
 _OVER_AND_OVER = re.compile(
     r" (?:(?:from )?side to side|back and forth|up and down|to and fro|left and right|over and over(?: again)?)\b"
 )
@@ -316,12 +325,14 @@ def _tidied(text: str, places: Sequence[int]) -> tuple[str, tuple[int, ...]]:
 
 def _says_more(text: str) -> bool:
     """Return True if a text names more than who acts."""
+    if _GOES_ON.search(text.lower()):
+        return True
     lists = load_word_lists()
     words = set(re.findall(r"[a-z']+", _HANDED.sub("", text.lower())))
     said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
     if len(said) > 1:
         return not (_doers().match(text.lower()) or _DOER.match(text.lower()))
-    return bool(said) and not _DOER.search(text.lower())
+    return bool(said) and not (_doers().match(text.lower()) or _DOER.search(text.lower()))
 
 
 @lru_cache(maxsize=KEPT_READINGS)
@@ -370,7 +381,10 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
     elif kind == "read":
         yield _Words(*match.span(), stated, match[0])
     elif kind == "by":
-        yield _Words(*match.span(_DOES), replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
+        start, end = match.span(_DOES)
+        both = _WITH_BOTH.match(text, end) if stated.bearing.work else None
+        end = end if both is None else both.end()
+        yield _Words(start, end, replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
     elif kind == "beside":
         if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
             yield _Words(*match.span(), stated)
@@ -378,6 +392,8 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
         by_hand = stated.bearing.gesture or stated.bearing.work or len(stated.bearing.arms) == 1
         hand = _WITH_HAND.match(text, match.end()) if not stated.side and by_hand else None
         over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
+        if over is None and stated.bearing.work and len(stated.bearing.arms) > 1:
+            over = _WITH_BOTH.match(text, match.end())
         if hand is None:
             yield _Words(match.start(), match.end() if over is None else over.end(), stated)
         else:

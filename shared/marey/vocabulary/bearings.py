@@ -18,7 +18,18 @@ from marey.core.hashing import sha256_of
 from marey.vocabulary.paces import Pace
 
 Gait = Literal[
-    "limp", "stagger", "high-knees", "skip", "foot-tap", "weight-shift", "stomp", "shuffle", "rope", "tiptoe", ""
+    "limp",
+    "stagger",
+    "high-knees",
+    "skip",
+    "foot-tap",
+    "weight-shift",
+    "stomp",
+    "shuffle",
+    "rope",
+    "tiptoe",
+    "one-line",
+    "",
 ]
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
@@ -78,6 +89,7 @@ class ArmPose:
         shake: metres by which the hand moves to and fro.
         hz: how often it does so in a second.
         path: places of the wrist, as `hand`, at the times of the keys of the bearing.
+        plants: the hand goes along with the foot of the other side, and stands while that does, as on a cane.
     """
 
     at: str = ""
@@ -89,6 +101,7 @@ class ArmPose:
     shake: Vector = (0.0, 0.0, 0.0)
     hz: float = 0.0
     path: tuple[Vector, ...] = ()
+    plants: bool = False
 
 
 @dataclass(frozen=True)

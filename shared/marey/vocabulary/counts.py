@@ -16,7 +16,7 @@ from marey.vocabulary.word_lists import load_word_lists
 
 MOST = 20
 """More repetitions than these are not read."""
-_NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split()[:12], 1)} | {
+_NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split(), 1)} | {
     "single": 1,
     "double": 2,
     "couple": 2,
@@ -48,12 +48,17 @@ _STROKES = re.compile(
     rf"|{_NUMBER} ?(?:(?:more|whole|separate) )?(?:{_STROKE})\b(?! as\b)|(?:\bx|×) ?(?P<by>\d{{1,2}})\b"
 )
 _CLAUSE = re.compile(
-    r"(?: (?!and\b|then\b|while\b|before\b|after\b|as\b)[\w'×-]+){0,4}(?:,? (?:for |exactly |just )?[\w×]+ ?[\w×]+\b)?"
+    r"(?: (?!and\b|then\b|while\b|before\b|after\b|as\b)[\w'×-]+){0,4}"
+    r"(?:,? (?:with |using )?(?:both|alternating|each) (?:arms?|hands?|sides?))?"
+    r"(?:,? (?:for |exactly |just )?[\w×]+ ?[\w×]+\b)?"
 )
 """Words behind what is done that may name a number of strokes: those of its clause, and a number behind a comma."""
 _GIVEN = re.compile(
-    rf"(?:^|\b(?:gives?|makes?|does|do|giving|making|doing|delivers?|lands?) ){_NUMBER} (?:(?!times )[a-z]+ )?$"
+    rf"(?:^|\b(?:gives?|makes?|does|do|giving|making|doing|delivers?|lands?|performs?|performing|completes?) )"
+    rf"(?:(?:[a-z]+|\d+) sets? of )?{_NUMBER} (?:(?!times )[a-z]+ )?$"
 )
+_AT_FIRST = re.compile(rf"^(?:do|does|doing|performs?|performing) {_NUMBER} (?!times\b)[a-z]")
+"""Words that begin with a number of what is done: "does eight bicep curls"."""
 _ADVERBS = {"twice": 2, "thrice": 3}
 _ADVERB = re.compile(r"\b(?:twice|thrice)\b(?! (?:as|the)\b)")
 _ONCE = re.compile(
@@ -179,6 +184,9 @@ def strokes_before(text: str) -> tuple[int, int] | None:
 
 def _strokes_in(words: str) -> Iterator[StatedStrokes]:
     """Yield the numbers of strokes in their order."""
+    at_first = _AT_FIRST.match(words)
+    if at_first is not None and 0 < (number := _value(at_first["number"])) <= MOST:
+        yield StatedStrokes(number, at_first.end("number"))
     for match in _STROKES.finditer(words):
         number = _ADVERBS.get(match["adverb"] or "") or (
             1 if match["adverb"] else _value(match["number"] or match["by"])

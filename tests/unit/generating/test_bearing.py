@@ -608,3 +608,21 @@ def test_both_hands_of_a_conductor_go_round_in_curves() -> None:
         assert np.ptp(way[:, 1]) > 0.25
         assert np.ptp(way[:, 0]) > 0.2
         assert (np.linalg.norm(np.diff(way, axis=0), axis=1) * FPS > 0.05).mean() > 0.95
+
+
+def test_a_hand_on_a_cane_stands_while_the_other_foot_does() -> None:
+    walk = walker(4.0)
+    cane = drawn(walk, named("cane", "right"))
+    wrist, foot = cane[:, 21], cane[:, 7]
+    stands = np.linalg.norm(np.gradient(foot, axis=0), axis=-1) * FPS < 0.15
+    speed = np.linalg.norm(np.gradient(wrist, axis=0)[:, [0, 2]], axis=-1) * FPS
+    assert stands.sum() > 10
+    assert speed[stands].mean() < 0.6 * speed[~stands].mean()
+
+
+def test_feet_on_a_beam_are_on_one_line() -> None:
+    walk = walker(4.0)
+    beam = drawn(walk, named("beam-walk"))
+    across = [np.ptp(each[10:-10, [7, 8], 0].mean(axis=0)) for each in (walk, beam)]
+    assert across[1] < 0.45 * across[0]
+    assert (beam[20:-20, [20, 21], 1] > beam[20:-20, [16, 17], 1] - 0.25).all()

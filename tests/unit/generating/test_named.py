@@ -60,6 +60,11 @@ def test_every_bearing_that_moves_is_drawn() -> None:
         "ties both shoes",
         "curtsies",
         "cowers",
+        "a boxer bounces on his toes",
+        "bounces from foot to foot",
+        "vacuums the rug",
+        "pulls the gate open",
+        "shoves the heavy door open",
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
@@ -323,6 +328,14 @@ def test_a_stagger_goes_its_way_on_crooked_steps_and_ends_upright(
     assert ("nearly" in prompt) == (joints[:, PELVIS, 1].min() < 0.84)
 
 
+@pytest.mark.parametrize(("prompt", "steps"), [("staggers back two steps", 2), ("reels four steps backwards", 4)])
+def test_a_stagger_has_as_many_steps_as_are_said(prompt: str, steps: int) -> None:
+    joints = drawn(prompt)
+    lifted = joints[:, TOES, 1] > joints[:, TOES, 1].min() + 0.04
+    assert (np.diff(lifted.astype(int), axis=0) == 1).sum() in (steps, steps + 1)  # the last closes the feet
+    assert 0.15 * steps < joints[0, PELVIS, 2] - joints[-1, PELVIS, 2] < 0.6 * steps + 0.2
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_foot_that_slips_slides_ahead_as_the_trunk_goes_back_and_the_body_stands_again(seed: int) -> None:
     joints = drawn("slips on a wet leaf but catches herself", seed=seed)
@@ -373,3 +386,63 @@ def test_who_catches_reaches_out_and_gives_way(prompt: str, wrists: list[int]) -
     assert ahead[reached + round(0.4 * FPS)] < ahead[reached] - 0.12
     idle = [wrist for wrist in WRISTS if wrist not in wrists]
     assert all(joints[reached, wrist, 1] < joints[reached, NECK, 1] - 0.25 for wrist in idle)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "guard"), [("a fighter bounces lightly on his toes", True), ("bounces on the balls of her feet", False)]
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_who_bounces_on_the_toes_stays_on_the_floor_with_raised_heels(prompt: str, guard: bool, seed: int) -> None:
+    joints = drawn(prompt, seed=seed)
+    middle = joints[25:-25]
+    assert 0.03 < np.ptp(middle[:, PELVIS, 1]) < 0.08
+    assert middle[:, TOES, 1].max() < 0.03
+    assert (middle[:, ANKLES, 1] > 0.08).mean() > 0.6
+    ups = np.diff((middle[:, PELVIS, 1] > middle[:, PELVIS, 1].mean()).astype(int)) == 1
+    assert 1.7 < ups.sum() / (len(middle) / FPS) < 3.0
+    assert (middle[:, WRISTS, 1].min() > middle[:, SHOULDERS, 1].max() - 0.25) == guard
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_vacuumed_floor_has_strokes_of_half_a_metre_at_the_hips(seed: int) -> None:
+    joints = drawn("hoovers the hall", seed=seed)
+    wrist = joints[:, WRISTS[1]]
+    assert np.ptp(wrist[:, 2]) > 0.45
+    assert 0.7 < wrist[30:-30, 1].min() < wrist[30:-30, 1].max() < 1.05
+    left = drawn("vacuums the stairs with her left hand", seed=seed)
+    assert np.ptp(left[:, WRISTS[0], 2]) > 0.45
+
+
+@pytest.mark.parametrize(
+    ("prompt", "wrist", "sign"),
+    [
+        ("she pulls the front door open", 21, -1.0),
+        ("pulls open the gate with his left hand", 20, -1.0),
+        ("pushes it open", 21, 1.0),
+        ("shoves the door open with her left hand", 20, 1.0),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_hand_goes_to_the_door_and_the_body_steps_with_it(prompt: str, wrist: int, sign: float, seed: int) -> None:
+    joints = drawn(prompt, seed=seed)
+    way = joints[-1, PELVIS, 2] - joints[0, PELVIS, 2]
+    assert 0.3 < sign * way < 1.0
+    hand = joints[:, wrist] - joints[0, PELVIS]
+    reached = int(hand[:, 2].argmax()) if sign < 0 else int(np.flatnonzero(hand[:, 2] > 0.4)[0])
+    assert hand[reached, 2] > 0.4
+    assert 0.9 < joints[reached, wrist, 1] < 1.25
+    assert joints[:, TOES, 1].min(axis=1).max() < 0.04
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "bounces the ball on the spot",
+        "pushes the door shut",
+        "pulls a cart to the gate",
+        "a vacuum cleaner hums",
+        "pushes it",
+    ],
+)
+def test_others_do_not_name_these_movements(prompt: str) -> None:
+    assert not names_movement(prompt)

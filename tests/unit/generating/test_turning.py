@@ -176,3 +176,20 @@ def test_a_pirouette_is_on_the_ball_of_one_foot(prompt: str, seed: int) -> None:
 def test_a_turn_before_a_run_is_quick(after: str) -> None:
     quick, usual = (len(drawn("turn-around", "turns around", beside=("", each))) for each in (after, "walks"))
     assert quick <= usual - 5
+
+
+@pytest.mark.parametrize(
+    ("prompt", "foot", "turn"),
+    [
+        ("pirouettes on her left leg, clockwise", 0, -360),
+        ("a pirouette on the right foot, counterclockwise", 1, 360),
+        ("spins once to the right on the ball of his left foot", 0, -360),
+        ("spins on his right heel", 1, -360),
+        ("pirouette clockwise", 1, -360),
+    ],
+)
+def test_the_foot_of_a_pirouette_is_not_the_side_of_its_turn(prompt: str, foot: int, turn: float) -> None:
+    joints = drawn("spin", prompt)
+    assert on_floor(joints)[:, foot].all()
+    assert not on_floor(joints)[:, 1 - foot].all()
+    assert headings(joints)[-1] == pytest.approx(turn, abs=15)

@@ -572,3 +572,46 @@ def test_other_drawing_falling_and_throwing_is_none_of_them(prompt: str) -> None
 )
 def test_who_walks_against_the_wind_leans_into_it(prompt: str, names: set[str]) -> None:
     assert {each.name for each in stated_bearings(prompt)} == names
+
+
+@pytest.mark.parametrize(
+    ("prompt", "name", "times", "side"),
+    [
+        ("does six hammer curls", "curling", 6, ""),
+        ("performs fifteen barbell curls", "curling", 15, ""),
+        ("dumbbell curls with both arms, 7 reps", "curling", 7, ""),
+        ("arm curls, alternating arms, nine times", "curling", 9, ""),
+        ("does two sets of 10 arm curls", "curling", 10, ""),
+        ("curls a weight with her left arm four times", "curling", 4, "left"),
+        ("does some bicep curls", "curling", None, ""),
+        ("conducts the choir with both hands", "conducting", None, ""),
+        ("hammers a nail with both hands", "hammering", None, ""),
+    ],
+)
+def test_numbers_of_work_and_both_arms_belong_to_it(prompt: str, name: str, times: int | None, side: str) -> None:
+    (stated,) = stated_bearings(prompt)
+    assert (stated.name, stated.times, stated.side) == (name, times, side)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "names"),
+    [
+        ("hobbles along hunched over a cane", {"limp", "stooped", "cane"}),
+        ("walks bent over her walking stick", {"stooped", "cane"}),
+        ("walks hunched over", {"stooped"}),
+        ("bends over the table", set()),
+        ("walks along a narrow wooden beam", {"beam-walk"}),
+        ("walks, arms out to the sides for balance", {"arms-balance"}),
+        ("teeters, holding her arms out to keep her balance", {"arms-balance", "drunk"}),
+        ("walks with arms out to both sides", {"arms-wide"}),
+        ("carries a wooden beam", set()),
+        ("staggers back four steps", {"stagger"}),
+        ("staggers back to his feet", set()),
+    ],
+)
+def test_canes_beams_and_staggers_are_read(prompt: str, names: set[str]) -> None:
+    assert {each.name for each in stated_bearings(prompt)} == names
+
+
+def test_a_doer_alone_does_nothing_else() -> None:
+    assert BarePrompt.of("maestro directing a choir, both arms").text == ""

@@ -32,9 +32,16 @@ _SHIFTS_S = (0.4, 0.5)
 
 
 def pirouette(
-    rng: random.Random, side: str, turns: int = 1, *, arms: str = "", pace: str = "", waits: tuple[float, float]
+    rng: random.Random,
+    side: str,
+    turns: int = 1,
+    *,
+    arms: str = "",
+    pace: str = "",
+    waits: tuple[float, float],
+    foot: str = "",
 ) -> Gesture:
-    """Whole turns on the ball of the foot of the side to which the body turns, the other foot drawn up.
+    """Whole turns on the ball of one foot, the other foot drawn up.
 
     Args:
         rng: decides what is not given.
@@ -43,8 +50,9 @@ def pirouette(
         arms: round, up or in; empty = any.
         pace: slow, fast or empty.
         waits: seconds that the body stands before it and after it.
+        foot: on which it turns, left or right; empty = that of the side to which it turns.
     """
-    foot, form = SIDES.index(side), arms or rng.choice(list(_HANDS))
+    pivot, form = SIDES.index(foot or side), arms or rng.choice(list(_HANDS))
     shift, start, rate = rng.uniform(*_SHIFTS_S), waits[0], rng.uniform(*_RATES[pace])
     lasts = min(450.0 * turns / rate, _LONGEST_S)
     wound, heel, lift = rng.uniform(12, 22), rng.uniform(20, 32), rng.uniform(0.2, 0.3)
@@ -61,7 +69,7 @@ def pirouette(
         x = np.clip((t - start - shift) / lasts, 0.0, 1.0)
         yaw = SIGN[side] * np.radians(360.0 * turns) * (0.6 * eased(x) + 0.4 * ramped(x))
         shoulders = yaw - SIGN[side] * np.radians(wound) * winds
-        body.joints[:] = about_foot(body.joints, foot, yaw, shoulders, on_foot, np.array([heel, lift]))
+        body.joints[:] = about_foot(body.joints, pivot, yaw, shoulders, on_foot, np.array([heel, lift]))
 
     return Gesture(end + shift + waits[1], ("spin", "spin-foot"), change, side, turns)
 

@@ -23,6 +23,8 @@ _APART, _FOLLOWS = 0.11, 0.21  # metres of a foot from the middle, and from the 
 _FLAT, _LIFTED = 0.07, 0.16  # metres of an ankle over the floor
 _STEP_M, _SIDE_STEP_M, _STEP_S = (0.26, 0.52), (0.5, 0.7), (0.4, 0.62)
 _CROSSED = 0.3  # share of the steps ahead that cross the line
+_ENDS = ((7.0, 0.6), (-5.0, 0.7), (2.0, 0.7))  # degrees and seconds of the sways at the end
+_BRIEF_S = (0.05, 0.12)  # seconds of standing before and after a stagger beside other things
 _NEAR_FALL = (0.5, 20.0)  # metres of the step that catches it, and degrees of the trunk
 
 
@@ -36,6 +38,7 @@ class _Stagger:
         strides: metres and seconds of each step, metres by which it leaves the line, degrees by which the trunk sways.
         caught: number of the step that catches a fall; -1 = none.
         starts: seconds of standing before it.
+        brief: it sways once at its end.
     """
 
     way: str
@@ -43,6 +46,7 @@ class _Stagger:
     strides: tuple[tuple[float, float, float, float], ...]
     caught: int
     starts: float
+    brief: bool = False
 
     def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
         """The postures over the feet of an idle."""
@@ -102,7 +106,7 @@ class _Stagger:
         end = {other: at[other], side: (at[other][0] + apart, at[other][1] + 0.02)}
         middle = tuple(0.5 * (a + b) for a, b in zip(end[LEFT], end[RIGHT], strict=True))
         stands = {each: _foot(each, end[each]) for each in SIDES}
-        for sway, seconds in ((7.0, 0.6), (-5.0, 0.7), (2.0, 0.7)):
+        for sway, seconds in _ENDS[:1] if self.brief else _ENDS:
             tilt = SIGN[side] * sway
             hips = (middle[0] + 0.005 * tilt, 0.92, middle[1])
             done.then(seconds, Posture(hips, (2, 0.3 * tilt, 0), (4, 0.7 * tilt, 0), (8, -0.5 * tilt, 0), feet=stands))
@@ -114,18 +118,22 @@ def _foot(side: str, at: tuple[float, float], up: float = _FLAT) -> FootPlace:
     return FootPlace((SIGN[side] * at[0], up, at[1]))
 
 
-def stagger(rng: random.Random, way: str = "", *, nearly_falls: bool = False) -> Gesture:
-    """Six to eight crooked steps of two to three metres.
+def stagger(
+    rng: random.Random, way: str = "", *, nearly_falls: bool = False, steps: int | None = None, brief: bool = False
+) -> Gesture:
+    """Crooked steps of a body that loses its balance.
 
     Args:
         rng: decides everything that is not given.
         way: key of `STAGGER_WAYS`; empty = ahead.
         nearly_falls: one of the steps catches the body.
+        steps: how many; None = as many as go two to three metres.
+        brief: other things are done before or after it: it starts at once and sways once at its end.
     """
     way = way or "ahead"
-    aside, number = way in SIDES, rng.choice((7, 8))
+    aside, number = way in SIDES, steps or (rng.choice((4, 5)) if brief else rng.choice((7, 8)))
     leads = way if aside else rng.choice(SIDES)
-    caught = rng.choice((2, 3, 4)) if nearly_falls else -1
+    caught = min(rng.choice((2, 3, 4)), number - 1) if nearly_falls else -1
     strides = list[tuple[float, float, float, float]]()
     drift = rng.choice((-1.0, 1.0)) * 0.08
     for step in range(number):
@@ -135,5 +143,7 @@ def stagger(rng: random.Random, way: str = "", *, nearly_falls: bool = False) ->
         off = rng.uniform(-0.06, 0.06) + drift * (1 if step % 4 < 2 else -1) - (SIGN[side] * 0.09 if crosses else 0.0)
         metres = _NEAR_FALL[0] if step == caught else metres
         strides.append((metres, rng.uniform(*_STEP_S), off, rng.uniform(7.0, 15.0) * rng.choice((-1.0, 1.0, 1.0))))
-    form = _Stagger(way, leads, tuple(strides), caught, rng.uniform(0.3, 0.5))
-    return on_feet(form.sequel, ["stagger"], rng.uniform(0.3, 0.6), side=way if aside else "")
+    form = _Stagger(way, leads, tuple(strides), caught, rng.uniform(*_BRIEF_S if brief else (0.3, 0.5)), brief)
+    return on_feet(
+        form.sequel, ["stagger"], rng.uniform(*(_BRIEF_S if brief else (0.3, 0.6))), side=way if aside else ""
+    )

@@ -60,6 +60,13 @@ BROUGHT_S = 0.8
 """Seconds before arms are brought to their place, and after they have left it."""
 FACE_S, STANDS = 0.5, frozenset({"idle"})
 """Seconds before hands that are held at the face come there, in a motion of their own, and the actions of such ones."""
+SOBS = 0.5
+"""Degrees by which the head shakes for each one by which sobbing shoulders rise."""
+DOWN_S = 1.1
+"""Seconds in which who sits or kneels down comes there, before hands go to the face."""
+PLANTS, PLANT_UP = (-0.22, 0.3), 0.6
+"""Metres by which a hand on a cane goes back and ahead of its place at most, and share of the height of the foot by
+which it is lifted on its way."""
 SWING_S = 0.5
 """The same of the filter that leaves an arm's way and takes out its swing."""
 LATEST_S = 1.1
@@ -298,6 +305,8 @@ def _held_in(span: BorneSpan, stated: StatedBearing, fps: float, *, goes_on: boo
         begin, end = begin + min(round(FACE_S * fps), frames // 4), end - min(moment, frames // 4)
     elif span.action in MOVES_FIRST and (stated.is_brought or stated.bearing.work):
         begin += round(LATE * frames)
+    elif span.action in MOVES_FIRST and _is_at_face(stated.bearing) and not (stated.whole or goes_on):
+        begin += round(min(LATE * frames, DOWN_S * fps))
     elif stated.is_brought and not goes_on:
         begin += min(moment, frames // 2)
     if stated.times is not None and stated.bearing.gait == "stomp":
@@ -390,6 +399,7 @@ class _Drawing:
             heave = self._swung(bearing.heave_hz)
             body.lean(bearing.heave * way * heave, "left")
             body.shrug(bearing.sob * way * heave)
+            body.turn(NECK, "left", SOBS * bearing.sob * way * heave)
         if bearing.aside:
             body.lean((1.0 if LEFT in self._arms else -1.0) * bearing.aside * legs, "forward")
         if bearing.roll:
@@ -441,6 +451,8 @@ class _Drawing:
             swung = self._strokes(pose.hz)[:, None]
             hand = self._keyed(pose.path) if pose.path else np.array(pose.hand)
             target = body.from_shoulder(side, place) + hand + swung * np.array(pose.shake)
+            if pose.plants:
+                target = target + self._planted(side)
             upper, fore = body.reach(side, target, pose.elbow)
         else:
             upper, fore = (
@@ -452,6 +464,14 @@ class _Drawing:
         folds = FOLDS if self._done is not None and pose.at in AHEAD and self._bearing.stroke_hz else 1.0
         straight = not self._bearing.gesture or folds > 1.0
         body.move_arm(side, pose.share * self._ways.arms, upper, fore, lag=0.0, straight=straight, folds=folds)
+
+    def _planted(self, side: str) -> Array:
+        """Return by how much (T, 3) a hand goes along with the foot of the other side: outward, up and forward."""
+        body = self._body
+        foot = body.joints[:, LEGS[OTHER_SIDE[side]][2]]
+        ahead = np.clip(body.local(foot - body.joints[:, 0], side)[:, 2], *PLANTS)
+        up = PLANT_UP * np.maximum(foot[:, 1] - foot[:, 1].min() - 0.02, 0.0)
+        return smooth(np.stack([np.zeros_like(ahead), up, ahead], axis=-1), 0.05, self._fps)
 
     def _keyed(self, values: Sequence[float] | Sequence[Vector]) -> Array:
         """Return numbers (T,), or points (T, 3), that are `values` at the times of the keys; 0 if there are none."""

@@ -1,6 +1,6 @@
-"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps, steps on the toes and
-feet that are dragged; and, drawn on a body that stands, a foot that taps, weight that goes from one foot to the other,
-and hops over a rope.
+"""Gaits that a network does not know, drawn on walks: limps, staggers, high knees, skips, stomps, steps on the toes,
+feet that are dragged, and feet on one line; and, drawn on a body that stands, a foot that taps, weight that goes from
+one foot to the other, and hops over a rope.
 
 A limp hurries over the leg that hurts, and the body dips towards it; who staggers goes in curves, now faster and now
 slower. Frames are played at other times, so standing feet stay. Knees are lifted while their feet pass the other ones;
@@ -77,6 +77,9 @@ SHIFTS, SHIFTS_HZ, SHIFTS_RESTS = 0.075, (0.17, 0.24), 1.8
 """Metres by which the hips of a restless body go over each foot, how often a second, and how long it rests there."""
 SHIFTS_SINK, SHIFTS_LEAN = 0.012, 3.0
 """Metres by which they sink on the way, and degrees by which the trunk leans back to the middle."""
+ON_LINE, ON_LINE_PASSES = 0.85, 0.6
+"""Share of the distance of each foot from the middle by which who walks on a line is nearer to it, and share of that
+by which it is not while it passes the other."""
 TAPS, TAPS_HZ, TAPS_S = 0.05, 2.6, (1.6, 1.0)
 """Metres by which the toes of a tapping foot rise, how often a second, and seconds of tapping and of rest."""
 
@@ -270,6 +273,21 @@ def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float, hop
     return body.solved()
 
 
+def on_line(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
+    """Return joints (T, 22, 3) of a walk that sets its feet on one line in the frames `begin` to `end`; see
+    `limping`."""
+    del side, rng
+    inside, body = _inside(len(joints), begin, end, layout.fps), StandingBody(joints)
+    natural, passes = natural_course(joints, layout.skeleton, layout.fps), _lifts(joints, layout.fps, inside)
+    left = np.stack([np.cos(natural.headings), 0.0 * natural.headings, -np.sin(natural.headings)], axis=-1)
+    middle = np.stack([natural.places[:, 0], 0.0 * natural.headings, natural.places[:, 1]], axis=-1)
+    for leg, (_, _, ankle, toe) in LEGS.items():
+        off = np.sum((body.joints[:, ankle] - middle) * left, axis=-1)
+        share = ON_LINE * inside * (1.0 - ON_LINE_PASSES * passes[leg])
+        body.joints[:, [ankle, toe]] -= (share * off)[:, None, None] * left[:, None]
+    return body.solved()
+
+
 def tapping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
     """Return joints (T, 22, 3) of a body that stands, and taps a foot in the frames `begin` to `end`; see `limping`."""
     taps = side if side in LEGS else str(rng.choice(list(LEGS)))
@@ -309,6 +327,7 @@ GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Ge
     "shuffle": shuffling,
     "rope": over_rope,
     "tiptoe": on_toes,
+    "one-line": on_line,
 }
 """Gaits of bearings, by their name in `bearings.toml`."""
 

@@ -11,8 +11,10 @@ import random
 import re
 from collections.abc import Callable, Mapping
 
+from marey.drawing.bounces import toe_bounces
 from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
+from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
 from marey.drawing.gesture import Gesture
 from marey.drawing.knee_strikes import knee_strike
@@ -24,10 +26,12 @@ from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
 from marey.drawing.stumbles import stumble
+from marey.drawing.vacuuming import vacuuming
+from marey.generation.dancing import named_dance
 from marey.generation.fine_wish import FineWish
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import StatedBearing
-from marey.vocabulary.counts import stated_number
+from marey.vocabulary.counts import stated_number, stated_things
 from marey.vocabulary.in_place import goes_in_place
 
 MOST = 8
@@ -38,6 +42,7 @@ LUNGE_S = 1.9
 """Seconds of one of several lunges."""
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
 _REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
+_STEPS = frozenset({"step", "steps", "paces"})
 _BACK = re.compile(r"\bback(?:wards?)?\b")
 _SLIPS = re.compile(r"\bslip|\bfooting\b")
 _CROUCHED = re.compile(r"\b(?:crouch|kneel|squat)\w*")
@@ -55,6 +60,11 @@ _HIGH = re.compile(r"\b(?:high|top|upper|overhead|tall)\b|\babove (?:his|her|the
 _LOW = re.compile(r"\b(?:tables?|desks?|counters?|workbench|bench|low(?:er)?|truck|trunk|cart|trolley|conveyor)\b")
 _LIGHT = re.compile(r"\b(?:light|small|little|empty|quickly)\b")
 _POINTS = re.compile(r"\bthree[- ]point\w*")
+_FIGHTS = re.compile(r"\b(?:(?:kick)?box(?:er|ing)s?|fight\w*|spar(?:s|ring)|guard|mma|martial|muay|ring|karate)\b")
+_TO_FEET = re.compile(r"\bfrom (?:one )?foot to\b")
+_HEAVY = re.compile(r"\b(?:heavy|heavily|massive|stuck|jammed|hard|huge|iron|shov\w+|strain\w*|struggl\w*)\b")
+_BOUNCES_S, _BRIEF_BOUNCES_S = (4.0, 5.0), (2.2, 2.8)
+"""Seconds of bounces on the toes alone, and beside other things."""
 _BOTH_SHOES = re.compile(r"\bboth\b|\beach shoe\b")
 
 
@@ -67,8 +77,10 @@ def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) ->
 
 
 def names_movement(prompt: str) -> bool:
-    """Return True if a prompt asks for a movement by name, or for a gait in place: no rule of an action is for it."""
-    return goes_in_place(prompt, "walk") or any(each.bearing.moves for each in stated_bearings(prompt))
+    """Return True if a prompt asks for a movement or a dance by name, or for a gait in place: no rule of an action is
+    for it."""
+    moves = any(each.bearing.moves for each in stated_bearings(prompt))
+    return moves or bool(named_dance(prompt)) or goes_in_place(prompt, "walk")
 
 
 def _times(stated: StatedBearing) -> int | None:
@@ -109,9 +121,11 @@ def _stumble(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds:
 
 
 def _stagger(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    del wish, seconds
+    del seconds
     back = "back" if _BACK.search(stated.words) else ""
-    return stagger(rng, stated.side or back, nearly_falls=bool(_NEARLY.search(stated.words)))
+    steps, brief = stated_things(stated.words, _STEPS), any(wish.beside)
+    near = bool(_NEARLY.search(stated.words))
+    return stagger(rng, stated.side or back, nearly_falls=near, steps=steps, brief=brief)
 
 
 def _side_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -199,6 +213,22 @@ def _rowing(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: 
     return rowing(rng, _times(stated), seconds)
 
 
+def _toe_bounce(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    lasts = seconds or rng.uniform(*(_BRIEF_BOUNCES_S if any(wish.beside) else _BOUNCES_S))
+    text = " ".join((wish.prompt, *wish.beside)).lower()
+    return toe_bounces(rng, seconds=lasts, guard=bool(_FIGHTS.search(text)), sways=bool(_TO_FEET.search(stated.words)))
+
+
+def _vacuuming(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    return vacuuming(rng, _hand(stated, wish), seconds=seconds or (4.8 if any(wish.beside) else None))
+
+
+def _door(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    opens = pulled_door if stated.name == "door-pulled" else pushed_door
+    return opens(rng, _hand(stated, wish), heavy=bool(_HEAVY.search(wish.prompt.lower())), brief=any(wish.beside))
+
+
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
@@ -224,5 +254,9 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "curtsy": _curtsy,
     "cower": _cower,
     "rowing": _rowing,
+    "toe-bounce": _toe_bounce,
+    "vacuuming": _vacuuming,
+    "door-pulled": _door,
+    "door-pushed": _door,
 }
 """Movements by the bearing that names them."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from marey.drawing.holds import KNEES
+
 
 @dataclass(frozen=True)
 class RowPosture:
@@ -52,7 +54,7 @@ class RowPosture:
     def goes_on(self) -> bool:
         """True if a movement that is drawn by itself ends in another posture than the next one begins in."""
         low = self.own if self.falls else self.leaves
-        return bool(low) and self.end != low
+        return bool(low) and (self.end != low or low == KNEES)  # who drops to the knees is slumped
 
     @property
     def carries(self) -> bool:

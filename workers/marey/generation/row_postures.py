@@ -30,6 +30,7 @@ from marey.drawing.holds import (
     UPRIGHT,
 )
 from marey.generation.drawn_sides import drawn_side
+from marey.generation.kneeling import drops
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
 from marey.posing.standing import RIGHT
@@ -145,7 +146,7 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
             own if there else begin,
             own,
             apart=crawled,
-            falls=action == "die" and not begin and not crawled,
+            falls=not (begin or crawled) and (action == "die" or (own == KNEES and not there and drops(said))),
             fires=action == "shoot",
         )
     leaves = FRONT if _crawls_low(row) else LEAVES.get(action, "")

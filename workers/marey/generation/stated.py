@@ -24,9 +24,11 @@ from marey.drawing.gesture import Gesture
 from marey.drawing.kicks import high_kick, spin_kick
 from marey.drawing.seats import sit_legs_crossed
 from marey.generation.carrying import stated_load
+from marey.generation.dancing import dance_asked_for
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
 from marey.generation.hopping import hops_away, jumps_away
+from marey.generation.kneeling import drops_asked_for
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.stairs import stairs_asked_for
@@ -130,6 +132,8 @@ STATED: Mapping[str, Statement] = {
     "cheer": _jumps_for_joy,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
+    "kneel": drops_asked_for,
+    "dance": dance_asked_for,
     "sit": _leg_over(down=False),
     "sit-down": _leg_over(down=True),
     "hop": hops_away,

@@ -44,6 +44,11 @@ _ON_ONE_FOOT = re.compile(
     r"\b(?:pirouett\w*|ballet\w*|ballerina\w*|skat\w*|on (?:the )?(?:tip ?)?toes?|fouett\w*|axel"
     r"|(?:one|a single|his|her|the (?:left|right)) (?:foot|leg|toes?|heel))\b"
 )
+_STANDING_FOOT = re.compile(
+    r"\bon (?:(?:the|his|her|their) )?(?:(?:ball|toes?|tip) of (?:the|his|her|their) )?"
+    r"(left|right) (?:foot|leg|toes?|heel)\b"
+)
+"""Words of the foot on which a body spins, whichever way round it goes."""
 _BALLET = re.compile(r"\b(?:pirouett\w*|ballet\w*|ballerina\w*|fouett\w*|danc\w*)\b")
 _ON_AND_ON = re.compile(
     r"\b(?:around and (?:a)?round|round and round|circles|repeatedly|again and again|several|many|multiple|few|keeps"
@@ -114,8 +119,11 @@ def spin_asked_for(wish: FineWish, rng: random.Random, seconds: float | None) ->
         return turn_on_spot(rng, SIGN[side] * angle.least, pace=pace or "fast", waits=waits)
     on_and_on = not any(wish.beside) and _ON_AND_ON.search(text)
     turns = min(turns or (rng.choice(MORE_SPINS) if on_and_on else 1), MOST_SPINS)
-    one_foot = _ON_ONE_FOOT.search(text) is not None
+    foot = _STANDING_FOOT.search(text)
+    one_foot = foot is not None or _ON_ONE_FOOT.search(text) is not None
     if one_foot or turns > MOST_STEPPED or (turns == 1 and rng.random() < ON_FOOT):
         arms = rng.choice(("round", "up")) if _BALLET.search(text) else "in" if not one_foot else ""
-        return pirouette(rng, side, turns, arms=arms, pace=pace, waits=waits)
+        stated = _CLOCKWISE.search(text) or _NAMED.search(text)
+        side = side if stated or not foot else foot[1]
+        return pirouette(rng, side, turns, arms=arms, pace=pace, waits=waits, foot=foot[1] if foot else "")
     return turn_on_spot(rng, SIGN[side] * WHOLE * turns, pace=pace, spins=True, waits=waits)
