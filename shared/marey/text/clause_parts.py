@@ -29,6 +29,15 @@ CHANGES = frozenset({"slow", "speed", "accelerate", "step"})
 """Verbs of who goes on at another pace or place: "slows to a walk", "steps back"."""
 IN_TURN = frozenset({"turn", "sidestep", "hop", "dodge"})
 """Actions that are done to one side and then to the other: two of them are no single one."""
+BLADES = frozenset({"slash"})
+"""Blows whose ways through the air tell one from the next: "a slash to the right, then one overhead"."""
+_BLADE_WAYS = re.compile(
+    r"\b(?:(?P<across>left to right|right to left|horizontal\w*|sideways|side to side)"
+    r"|(?P<down>overhead|downwards?|down|vertical\w*|from above)"
+    r"|(?P<up>upwards?|uppercut|rising|from below)|(?P<low>low)|(?P<high>high)"
+    r"|(?P<diagonal>diagonal\w*))\b",
+    re.IGNORECASE,
+)
 _SIDE = re.compile(r"\b(left|right)(?:wards?)?\b", re.IGNORECASE)
 _SIGN = re.compile(
     r"\s*(?:;|\.(?=\s)|->|→|,)\s*(?:and\s+)?(?:then\s+|finally\s+|next\s+)?|\s+(?:and\s+)?then\s+|\s+(?P<and>and)\s+",
@@ -77,8 +86,16 @@ def only_named(text: str) -> str | None:
 
 def is_on_other_side(before: str, after: str, action: str) -> bool:
     """Return True if an action is done again, on the other side: "turns left, | turns right"."""
+    if action in BLADES:
+        ways = [_ways_of(text) for text in (before, after)]
+        return all(ways) and not ways[0] & ways[1]
     sides = [{side.lower() for side in _SIDE.findall(text)} for text in (before, after)]
     return action in IN_TURN and len(sides[0]) == 1 == len(sides[1]) and sides[0] != sides[1]
+
+
+def _ways_of(text: str) -> set[str | None]:
+    """Return the ways through the air that the words of a blow name."""
+    return {found.lastgroup for found in _BLADE_WAYS.finditer(text)}
 
 
 def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:

@@ -23,7 +23,8 @@ _FALLS = rf"""(?:{_SO}(?:falls?|falling|fell|lands?|landed|landing|goes\ down|we
 _SLIPS = re.compile(
     rf"""\b(?P<slip>slip)(?P<end>s|ping|ped)?(?:\ (?:up|over|backwards?|badly|suddenly))?
     (?:\ (?:on|in|over|upon|across)\ {_OBJECT}{_UNDERFOOT}\b(?!\ (?:shoes?|slippers?))
-    |(?=\W*$)|(?<=\bslips\ over)|(?=,?\ and\ (?:falls?|lands?)\ (?:flat\ )?(?:on|onto)\b)){_CAUGHT}{_FALLS}""",
+    |(?=\W*$)|(?<=\bslips\ over)|(?=,?\ and\ (?:falls?|lands?)\ (?:flat\ )?(?:on|onto)\b)
+    |(?=,?\ and\ falls?(?:\W*$|[,.;]|\ (?:and|then|down|over|backwards?|hard|flat)\b))){_CAUGHT}{_FALLS}""",
     re.IGNORECASE | re.VERBOSE,
 )
 """Feet that shoot away from under a body. Who slips left, or into a room, does not fall."""

@@ -32,7 +32,8 @@ _RETURN = re.compile(
 """A way to where the person was before: "walks back to his car"."""
 _TURNED_BACK = re.compile(
     rf"""(?P<turn>\b(?:turns?|turning|spins?|spinning|whirls?|swings?|wheels?|pivots?|does\ an\ about[ -]face)
-    (?:\ (?:around|round|about|back))?(?:\ 180(?:\ degrees|°)?)?(?:,|,?\ (?:and(?:\ then)?|then|to)|\ ?(?:->|→|>))\ )
+    (?:\ (?:around|round|about|back))?(?:\ 180(?:\ degrees|°)?)?
+    (?:[,.;]|,?\ (?:and(?:\ then)?|then|to)|\ ?(?:->|→|>))\ )
     (?P<way>(?:{_GAITS}|go)(?:e?s|ing)?)\ back(?!wards?\b|\ (?:and|to|home|into|in|inside)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )

@@ -17,6 +17,7 @@ from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
 from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
+from marey.text.asides import without_asides
 from marey.text.clause_normalization import join_in_order
 from marey.text.elided_words import with_elided
 from marey.text.encoded_texts import EncodedTexts
@@ -31,6 +32,7 @@ from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject
+from marey.text.plain_phrases import with_plain_phrases
 from marey.text.reading_encoder import reading_encoder
 from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
@@ -54,7 +56,8 @@ TOGETHER = 64
 def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""
-    ordered = with_elided(in_time_order(in_usual_order(as_words(prompt))))
+    said = with_plain_phrases(without_asides(as_words(prompt)))
+    ordered = with_elided(in_time_order(in_usual_order(said)))
     return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 
 
@@ -165,7 +168,7 @@ class TextPipeline:
         """Get ready to read these prompts one by one."""
         self.rewriter.prefetch(prompts)
         if self._texts_to_read is not None and self.spec.rewriter == "none":
-            self._texts_to_read.pooled(prompts)  # together, in half the time
+            self._texts_to_read.pooled([_in_known_words(prompt) for prompt in prompts])  # together, in half the time
 
     def _rewritten(self, prompts: Sequence[str]) -> list[Rewrite]:
         if len(prompts) > 1:

@@ -3,6 +3,7 @@ words of what is drawn on the motion."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -38,7 +39,7 @@ from marey.text.sequence_reader import (
 from marey.text.told_apart import told_apart
 from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.gazes import only_gaze, without_gaze
+from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.scope import STANDING
 
@@ -50,8 +51,18 @@ ATTACK = "stab"
 """Action that "lunges" is read as."""
 WHOLE = SERIES | frozenset(BOUND_TO_HANDS)
 """Actions that others are parts of."""
+FALLEN = "die"
+"""Action from whose end alone one who is read surely to get up does so."""
 STAYING = frozenset({STANDING, "sit-down", "sit", "sit-floor", "kneel", "laugh"})
 """Actions at whose end the body stays as it is: what only arms and head do comes in the same movement."""
+
+
+_STOPS = re.compile(
+    r"\W*(?:(?:he|she|they|it|(?:the|an?) (?:[\w-]+ ){0,2}?[\w-]+) )?(?:(?:suddenly|abruptly) )?"
+    r"(?:stops?|halts?|pauses?"
+    r"|freezes?|stands? still)(?: (?:suddenly|abruptly|short|dead|there))?(?:,? and(?: then)?|,? then)?\W*",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +86,11 @@ class ReadPrompt:
         """Return the reading of a text that asks for one action; None = for several or none, or in doubt."""
         plain = "" if action is None else load_vocabulary().need(action).plain_words
         return cls(with_plain_action(text, action, surely=surely), plain=plain)
+
+
+def _stops_and_looks(prompt: str) -> bool:
+    """Return True if a prompt asks for a stop and nothing else but that the head turns: "he stops and looks back"."""
+    return bool(stated_gaze(prompt)) and _STOPS.fullmatch(without_gaze(prompt)) is not None
 
 
 class TrainedReaders:
@@ -115,6 +131,8 @@ class TrainedReaders:
             return reading
         if not reading.movements:
             movements = told_apart(bare.prompt, self._surely_part)
+            if any(each.action in RISING for each in movements) and movements[0].action != FALLEN:
+                movements = ()
             found = tuple(with_held_hand(from_there(movements)))
             return ReadPrompt(bare.prompt, found, drawn=reading.drawn) if found else reading
         movements = tuple(
@@ -151,7 +169,7 @@ class TrainedReaders:
         of them surely."""
         found = self._part(text)
         surely = all(
-            each.action not in (None, *WHOLE, *RISING)
+            each.action not in (None, *WHOLE)
             and (
                 only_named(without_gaze(BarePrompt.of(each.text).text)) == each.action != STANDING
                 or self._is_gesture(each.text)
@@ -184,7 +202,7 @@ class TrainedReaders:
         self._pooled([clause for text in unsure for clause in sequence_reader().clauses(text, self._encodings[text])])
 
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
-        if only_gaze(bare.prompt):
+        if only_gaze(bare.prompt) or _stops_and_looks(bare.prompt):
             return ReadPrompt.of(bare.prompt, STANDING, surely=True)
         if self._movements and (movements := self._by_sides(bare.prompt)):
             return ReadPrompt(bare.prompt, movements)
@@ -283,7 +301,8 @@ class TrainedReaders:
                 continue
             bare = BarePrompt.of(part)
             stays = found and found[-1].action in STAYING and stated_length(found[-1].text).seconds is None
-            if stays and not without_gaze(bare.text):
+            looked = found and len(stated_gaze(found[-1].text)) > 1 and not stated_gaze(part)
+            if stays and not looked and not without_gaze(bare.text):
                 found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
                 continue
             if not without_gaze(bare.text):

@@ -42,10 +42,11 @@ from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.inflection import phrase_in_third_person
+from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 9
+VERSION = 10
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -357,7 +358,9 @@ def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     before = down = climbed = None
     for movement in movements:
         action = movement.action
-        if action == STANDING and before in HELD and not _STANDS.search(movement.text):
+        if action in (STANDING, *HELD) and only_peeks(movement.text):
+            action = STANDING  # out of the posture in which the body is
+        elif action == STANDING and before in HELD and not _STANDS.search(movement.text):
             action = HELD[before]
         elif action in RISING and _WAKES.fullmatch(movement.text) and down in HELD:
             action = HELD[down]
@@ -370,7 +373,7 @@ def _from_there(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
         elif action in JUMPS and before in RUNS and _ACROSS.search(movement.text):
             action = "leap"
         yield replace(movement, action=action)
-        before = action
+        before = before if action == STANDING and only_peeks(movement.text) else action
         climbed = action if action in ("climb-stairs", "climb-ladder") else climbed
         if action in FLOOR | SEAT:
             down = action

@@ -16,6 +16,7 @@ from marey.text.sequence_reader import TURNS, ReadMovement
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.gazes import only_gaze
+from marey.vocabulary.in_place import goes_in_place
 from marey.vocabulary.scope import STANDING
 
 _STRONG = re.compile(
@@ -75,9 +76,10 @@ def told_apart(
             found += movements
     actions = {each.action for each in found}
     turns_back = any(is_on_other_side(a.text, b.text, b.action or "") for a, b in itertools.pairwise(found))
+    in_place = {goes_in_place(each.text, each.action or "") for each in found} == {False, True}
     first = found[0]
     counted = first.action in STEPPING and stated_count(first.text, first.action) is not None
-    if len(found) < 2 or (way and not counted and actions <= TURNS and not turns_back):
+    if len(found) < 2 or (way and not counted and actions <= TURNS and not turns_back and not in_place):
         return ()
     return tuple(found)
 
@@ -89,6 +91,8 @@ def _and(movement: ReadMovement, more: str) -> ReadMovement:
 def _is_one(before: ReadMovement, after: ReadMovement) -> bool:
     """Return True if two movements are one: the same action on the same side, in the same bearing."""
     if before.action != after.action:
+        return False
+    if goes_in_place(before.text, before.action or "") != goes_in_place(after.text, after.action or ""):
         return False
     if before.action == STANDING:
         return _drawn(before.text) == _drawn(after.text)

@@ -46,8 +46,14 @@ _JOINT = re.compile(
     re.IGNORECASE,
 )
 """Words that join these to others."""
-_SAYS_HOW = re.compile(r"(?:(?:an?|the) \w+ ?)?(?:\w+ly)?\W*", re.IGNORECASE)
-_DENIED = re.compile(r"\b(?:without|not|never|no|n't|don't|stops?|avoids?)\s+(?:\w+\s+)?$")
+_MOOD = (
+    r"(?:(?:a bit|a little|very|all|quite) )?"
+    r"(?:embarrassed|nervous|confused|worried|scared|frightened|afraid|puzzled|suspicious"
+    r"|alert|curious|dazed|ashamed|lost|bewildered|angry|happy|sad|tired|bored|amazed|surprised|shocked|anxious|proud"
+    r"|startled|guilty|annoyed|relieved|sheepish)"
+)
+_SAYS_HOW = re.compile(rf"(?:(?:an?|the) \w+ ?)?(?:\w+ly|{_MOOD}(?: and {_MOOD})?)?\W*", re.IGNORECASE)
+_DENIED = re.compile(r"\b(?:without|not|never|no|n't|don't|stops?|avoids?)\s+(?:(?!(?:and|then)\b)\w+\s+)?$")
 
 
 def stated_gaze(prompt: str) -> tuple[Glance, ...]:

@@ -19,6 +19,8 @@ _OTHER = (
 _IN_PLACE = re.compile(
     rf"\b{_GAIT}\b(?: (?!(?:{_OTHER})\b)[\w'-]+){{0,5}}? {_HERE}\b(?! of\b)"
     rf"|\bhigh[ -]knees? {_HERE}\b"
+    r"|(?:^|[,;.] |\bthen |\band )(?:does |do )?high[ -]knees?(?!\w)"
+    r"(?! (?:walk|march|run|jog|skip|kick|step|forward|across|to\b|up\b|down\b))"
     rf"|\b{_HERE},? (?:\w+ ){{0,2}}?{_GAIT}\b"
     rf"|\b(?:in[ -]place|stationary|on[ -]the[ -]spot|treadmill) {_GAIT}\b"
     rf"|\b{_GAIT}\b[^.;]*\b(?:without (?:moving|going|getting|travell?ing|advancing) (?:forwards?|ahead|anywhere)"

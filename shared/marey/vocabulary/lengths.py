@@ -59,6 +59,24 @@ _CLAUSE_BEFORE = re.compile(r"[^\W\d_]{3}.*\bfor\s+(?:(?:about|around|exactly|ro
 _OWN_BEFORE = re.compile(r"(?<!\bfor)(?<!\bin)(?<!\babout)(?<!\bof)(?<=[^\W\d_]{2})\s*$")
 """A clause whose length stands behind it: "balances 2 s, jumps"."""
 _DECADE = re.compile(r"[5-9]0s")
+_SECONDS = rf"(?:\d{{1,3}}(?:[.,]\d+)?|{'|'.join(TO_TWENTY.split())})[ -]?(?:seconds?|secs?|s)\b"
+_SO_LONG = (
+    r"(?:(?:to|at|about|around|exactly|roughly|only|just|max(?:imum)?|no[ ](?:more|longer)[ ]than|up[ ]to)\b\.?[ ]?)*"
+)
+_WHOLE_SHOT = r"the[ ](?:(?:whole|entire)[ ])?(?:thing|clip|motion|animation|shot)"
+WHOLE = re.compile(
+    rf"""[\s,;.(–—-]*(?:\b(?:hmm+|oh|but|and|please|ok(?:ay)?|actually|so|all|everything|{_WHOLE_SHOT})\b[,\s]*)*
+    (?:\b(?:keep|make|hold|get)[ ](?:it|this|that|{_WHOLE_SHOT})[ ](?:all[ ])?(?:last[ ]|be[ ])?{_SO_LONG}
+      (?P<under>(?:under|below|less[ ]than|within)[ ])?(?P<kept>{_SECONDS})
+      (?:[ ](?:long|in[ ]total|total|max(?:imum)?|or[ ](?:so|less)))?
+    |\b(?:(?:total|overall|clip)[ ])?(?:length|duration)(?:[ ](?:is|of)|:|[ ]=)?[ ]?{_SO_LONG}(?P<label>{_SECONDS})
+    |(?P<total>{_SECONDS})[ ](?:in[ ]total|total|overall|altogether)
+    )(?=\s*(?:[).,;!]|$))[\s).,;!]*$""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The length of the whole at the end of a prompt: "keep it to 3 seconds", "length: 4 s", "6 seconds in total"."""
+UNDER = 0.9
+"""Share of a length that a motion stays under."""
 _LABEL = re.compile(r"\b(?:length|duration|total|time|lasting|takes?|overall)\b")
 
 
@@ -87,6 +105,8 @@ def stated_length(prompt: str) -> StatedLength:
     sits down": a length behind the first of several clauses is its own.
     """
     text = " ".join(without_held_pose(prompt).lower().split())
+    if (whole := WHOLE.search(text)) is not None and (said := _LENGTH.search(whole[0])) is not None:
+        return StatedLength(_seconds(said) * (UNDER if whole["under"] else 1.0))
     found = [match for match in _LENGTH.finditer(text) if not _is_moment(text, match)]
     if not found:
         return StatedLength()

@@ -109,3 +109,11 @@ def test_forms_are_kinds_of_their_drawings(action: str) -> None:
     kinds = {kind for seed in range(400) for kind in DRAWINGS[action](random.Random(seed)).kinds}
     assert set(forms.named) | forms.only | forms.usual <= kinds
     assert all(isinstance(words, re.Pattern) for words in forms.named.values())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_who_points_ahead_with_the_right_arm_does_not_point_to_the_right(seed: int) -> None:
+    joints = drawn("guide", seed, "points ahead with his right arm", "right")
+    way = joints[:, 21] - joints[:, 17]
+    out = way[int(np.linalg.norm(way[:, [0, 2]], axis=-1).argmax())]
+    assert out[2] > abs(out[0])

@@ -33,6 +33,7 @@ def moved(action: str, prompt: str, seed: int, side: str = "") -> tuple[np.ndarr
     [
         ("dodge", "hops back", "", (0, -1)),
         ("dodge", "jumps backward", "", (0, -1)),
+        ("dodge", "leaps backward over a crate", "", (0, -1)),
         ("dodge", "quickly jumps to the left", "left", (1, 0)),
         ("jump", "jumps right", "right", (-1, 0)),
         ("hop", "hops to the left", "left", (1, 0)),

@@ -25,6 +25,12 @@ def test_gestures_are_done_where_the_body_is() -> None:
     assert [each.is_drawn for each in rows] == [False, True, False, False]
 
 
+def test_who_peeks_does_so_in_the_posture_in_which_the_body_is() -> None:
+    rows = row_postures([("kneel", "kneels"), ("idle", "peeks to the right"), ("idle", "waits")], 1)
+    assert [each.own for each in rows] == ["knees"] * 3
+    assert [each.gesture for each in rows] == [False, True, False]
+
+
 @pytest.mark.parametrize(
     ("row", "posture"),
     [

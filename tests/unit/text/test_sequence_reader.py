@@ -131,7 +131,7 @@ def test_prompts_beside_each_other_are_encoded_in_few_passes_and_as_if_alone(
     fresh = TextPipeline(reading.spec, rewriter=reading.rewriter, labeller=reading.labeller, encoder=reading.encoder)
     for name in ("pooled", "encodings"):
         monkeypatch.setattr(MiniLMEncoder, name, count(getattr(MiniLMEncoder, name)))
-    prompts = [text for text, _ in sequence_prompts()[:12]]
+    prompts = [text for text, _ in sequence_prompts()[:20] if "→" not in text][:12]  # of "then", parts are encoded
     together = fresh.features(prompts)
     assert sum(bool(each.movements) for each in together) > 6
     assert len(passes) < len(prompts)

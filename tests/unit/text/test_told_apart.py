@@ -6,6 +6,7 @@ import pytest
 
 from marey.text.pipeline import TextPipeline
 from marey.text.told_apart import clauses_apart
+from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_pipeline
 
 
@@ -78,3 +79,30 @@ def test_the_hand_that_has_taken_something_throws_it(reading: TextPipeline, prom
 def test_who_ties_a_shoe_gets_up_from_the_crouch(reading: TextPipeline) -> None:
     (read,) = reading.features(["he crouches to tie his shoe; then he gets up"])
     assert read.movements[-1].graph.text.startswith("a person stands upright")
+
+
+@pytest.mark.parametrize(
+    ("prompt", "actions"),
+    [
+        ("jogs ahead, then marches in place", ["run", "walk"]),
+        ("strolls forward, then treads on the spot", ["walk", "walk"]),
+        ("slips and falls, then stands up", ["die", "get-up"]),
+        ("slash from left to right, then slash upwards", ["slash", "slash"]),
+        ("duck behind the crate, peep to the right, then duck down again", ["crouch", "idle", "crouch"]),
+        ("stops, glances left, glances right, shrugs", ["idle", "idle"]),
+        ("he waves, then strolls up and looks around puzzled", ["wave", "walk", "idle"]),
+    ],
+)
+def test_movements_that_were_read_as_one(reading: TextPipeline, prompt: str, actions: list[str]) -> None:
+    vocabulary = load_vocabulary()
+    (read,) = reading.explain([prompt])
+    assert len(read.movements) == len(actions)
+    for said, action in zip(read.movements, actions, strict=True):
+        assert action == "idle" or said.startswith(vocabulary.need(action).plain_words), (said, action)
+
+
+@pytest.mark.parametrize("prompt", ["a guard halts and looks behind him", "he stops and glances left"])
+def test_a_stop_with_a_gaze_is_standing(reading: TextPipeline, prompt: str) -> None:
+    (read,) = reading.explain([prompt])
+    assert not read.movements
+    assert "stands" in read.graph.text

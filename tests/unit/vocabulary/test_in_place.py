@@ -19,6 +19,7 @@ from marey.vocabulary.in_place import goes_in_place
         ("a nurse walks on a treadmill", "walk"),
         ("he strides without moving forward", "walk"),
         ("high knees on the spot", "run"),
+        ("does high knees for 4 s", "run"),
         ("they sprint in the same spot", "sprint"),
     ],
 )

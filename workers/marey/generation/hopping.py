@@ -15,7 +15,7 @@ _WAY = re.compile(
     r"\b(?P<verb>hop|jump|leap|spring|bound)\w*(?: (?:\w+ly|once|twice|\w+ times|straight|far|a (?:step|little|bit)))*"
     r" (?:(?P<back>back(?:wards?)?)|(?:to (?:the|his|her|their) )?(?P<side>left|right|side(?:ways|wise)?|aside))\b"
     r"(?! (?:and forth|and right|and left|to side|up|down|on(?! (?:one|the|his|her|their) (?:left |right )?"
-    r"(?:leg|foot))|onto|into|over|to (?:his|her|their) (?:feet|seat)))"
+    r"(?:leg|foot))|onto|into|over(?<!backward over)(?<!backwards over)|to (?:his|her|their) (?:feet|seat)))"
 )
 """Words of a jump back or to a side."""
 _AHEAD = re.compile(r"\b(?:forwards?|ahead|across|along|onwards?|over to|to the (?:door|wall|window|other side))\b")

@@ -166,7 +166,7 @@ def _pitch(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: f
 def _peek(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = stated.words
-    low = bool(_CROUCHED.search(text) or _CROUCHED.search(wish.beside[0].lower()))
+    low = bool(_CROUCHED.search(text))
     return peek(rng, stated.side, low=low, looks=not _LEANS.match(text))
 
 

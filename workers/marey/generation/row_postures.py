@@ -34,6 +34,7 @@ from marey.generation.kneeling import drops
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
 from marey.posing.standing import RIGHT
+from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING
 
 Row = tuple[str, str]
@@ -156,7 +157,7 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
         return RowPosture(leaves=leaves)
     if not begin or not stays(row, begin):
         return RowPosture(begin if begin and rises(row) else "")
-    if action == STANDING:
+    if action == STANDING and not only_peeks(said):
         return RowPosture(begin, begin)
     return RowPosture(begin, begin, gesture=True)
 

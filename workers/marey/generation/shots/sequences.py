@@ -95,7 +95,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         for number, (own, movement) in enumerate(zip(stated, movements, strict=True))
     ]
     if request.frames is None:
-        roomy = with_room_back(request.text.said, movements, lengths, generator.limits)
+        roomy = with_room_back(request.text.said, movements, lengths, generator.limits, stated)
         lengths = [own or room for own, room in zip(stated, roomy, strict=True)]
     else:
         lengths = _shared(request.frames, lengths)

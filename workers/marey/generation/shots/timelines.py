@@ -421,8 +421,8 @@ class _Timeline:
         self.back = ways_back(self.said, ways)
         for number, there in self.back.items():
             first, last = self.rows[there], self.rows[number]
-            if first.features is not None and last.features is not None and first.open and last.open:
-                whole = ways[there].metres is not None or first.is_drawn
+            if first.features is not None and last.features is not None and last.open:
+                whole = ways[there].metres is not None or first.is_drawn or not first.open
                 cut = as_long_as(first.features, last.features, layout)
                 first.features, last.features = (first.features if whole else cut[0]), cut[1]
 

@@ -25,6 +25,8 @@ from marey.vocabulary.distances import stated_distance
 
 Float32 = NDArray[np.float32]
 
+STARTS_S = 2.0
+"""Seconds more of a way back than of one whose seconds are stated: it starts from rest, and is cut to its length."""
 AROUND = 150.0
 """Degrees of a turn from which on a way leads back."""
 _BACK = re.compile(
@@ -87,13 +89,20 @@ def metres_between(features: Float32, layout: FeatureLayout, begin: int, end: in
     return float(passed_on(course.at(np.arange(float(begin), end)), layout.fps)[-1])
 
 
-def with_room_back(said: str, movements: Sequence[TextFeatures], lengths: Sequence[int], limits: Limits) -> list[int]:
+def with_room_back(
+    said: str,
+    movements: Sequence[TextFeatures],
+    lengths: Sequence[int],
+    limits: Limits,
+    stated: Sequence[int | None],
+) -> list[int]:
     """Return the frames of movements, of which ways back have as much room as those there.
 
     Args:
         said: the words of the whole prompt.
         movements: in their order.
         lengths: frames of each.
+        stated: those of them that the words state; None = they do not.
         limits: of the model.
     """
     actions = [action_of(each) for each in movements]
@@ -105,5 +114,6 @@ def with_room_back(said: str, movements: Sequence[TextFeatures], lengths: Sequen
     for number, there in ways_back(said, rows).items():
         metres = rows[there].metres
         far = None if metres is None else frames_of_distance(metres, actions[number], limits)
-        found[number] = max(found[number], far or found[there])
+        room = found[there] + round(STARTS_S * limits.fps) * (stated[there] is not None)
+        found[number] = max(found[number], far or room)
     return found
