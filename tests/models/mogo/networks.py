@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 
 from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.streaming import StreamBatch
+
+FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+TOLD_BY_TOKEN = replace(FLAT, transformer=replace(FLAT.transformer, level_token=True))
+"""The level is a token of its own."""
 
 
 def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:
     """In evaluation mode, nothing at zero where training starts."""
     torch.manual_seed(0)
-    made = RQHCTransformer(config).eval()
+    made = build_transformer(config).eval()
     for parameter in made.parameters():
         parameter.data.add_(0.1 * torch.randn_like(parameter))
     made.prompt.mean.normal_()

@@ -1,4 +1,4 @@
-"""Variants differ in what they are about alone; a level token is read by its lane and no other."""
+"""Variants differ in what they are about alone, and each row leaves a bundle that generates."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-import torch
 
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidInput
 from marey.data.manifest import MANIFEST
 from marey.data.prepared import PreparedData
+from marey.generation.port import Request
 from marey.models.mogo import ablation
 from marey.models.mogo.ablation import (
     CODEBOOKS,
@@ -20,28 +21,27 @@ from marey.models.mogo.ablation import (
     SCALES,
     SCALING,
     VARIANTS,
-    LevelToken,
     ablate_data,
     ablate_levels,
     ablate_tokenizer,
     ablate_transformer,
+    train_both,
     train_tokenizer,
     train_transformer,
 )
 from marey.models.mogo.assembly import assemble
 from marey.models.mogo.config import PAPER, TINY, MOGOConfig
-from marey.models.mogo.model import RQHCTransformer
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.level_token import LevelToken
 from marey.models.mogo.train import train_stage
 from marey.training.ablation import AblationRequest
 from marey.training.budget import Budget
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 from tests.support.ablations import judge_by_two_prompts
-from tests.support.prepared import write_prepared
+from tests.support.prepared import text_features, write_prepared
 
-from .networks import columns, prompts
-
-FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+TOLD_BY_TOKEN = "a lane a level, level token, independent levels"
 
 
 @pytest.fixture(scope="module")
@@ -62,17 +62,41 @@ def test_a_quantizer_without_scales_is_trained_and_measured_alike(options: Train
     assert part["config"]["tokenizer"]["scale"] == "none"
 
 
-def test_variants_of_the_transformer_share_tokens_and_steers(options: TrainOptions, tmp_path: Path) -> None:
-    names = ("a lane a level, level token, independent levels", "a lane a level, PnQ, independent levels")
-    variants = [replace(VARIANTS[name], network=LevelToken) for name in names]
+def drawn(bundle: Path) -> np.ndarray:
+    """Tokens (V, 20) of a motion of a bundle."""
+    (made,) = Generator.load(find_bundle(str(bundle)), device="cpu").generate([Request(text_features(0), 1, 20)])
+    assert made is not None
+    assert np.isfinite(made.features).all()
+    return made.tokens
+
+
+def test_variants_of_the_transformer_share_tokens_and_steers(
+    options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge_by_two_prompts(monkeypatch)
     bundle = str(options.run / "bundle")
     found = []
-    for number, variant in enumerate(variants):
+    for number in range(2):
         (tmp_path / str(number)).mkdir()
-        found.append(train_transformer(bundle, variant, replace(options, run=tmp_path / str(number))))
+        mine = replace(options, run=tmp_path / str(number), threads=1)
+        found.append(train_transformer(bundle, VARIANTS[TOLD_BY_TOKEN], mine))
     assert found[0] == found[1]  # the same variant twice: same data, same seed
-    assert set(found[0]) == {"accuracy/0", *(f"loss/{level}" for level in range(TINY.tokenizer.levels))}
     assert (tmp_path / "0" / TOKENS).read_bytes() == (tmp_path / "1" / TOKENS).read_bytes()
+
+
+def test_every_way_of_levels_and_depth_is_judged_and_leaves_a_bundle_that_generates(
+    prepared: PreparedData, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge_by_two_prompts(monkeypatch)
+    request = AblationRequest(prepared.path, str(options.run / "bundle"), tmp_path, steps=1, batch=4, threads=1)
+    head, _, *rows = ablate_transformer(request).splitlines()
+    assert {"loss/0", "foot skate"} <= {cell.strip() for cell in head.split("|")}
+    assert len(rows) == len(VARIANTS)
+    assert all(cell.strip() for row in rows for cell in row.strip("|").split("|"))  # no row lacks a number
+    made = [tmp_path / f"transformer-{number}-0" / "bundle" for number in range(len(VARIANTS))]
+    assert [drawn(bundle).shape for bundle in made] == [(TINY.tokenizer.levels, 20)] * len(VARIANTS)
+    networks = [type(Generator.load(find_bundle(str(bundle)), device="cpu").transformer) for bundle in made]
+    assert [network is LevelToken for network in networks] == [name == TOLD_BY_TOKEN for name in VARIANTS]
 
 
 def test_an_ablation_goes_on_where_it_stopped(
@@ -110,6 +134,7 @@ def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
         made = find_bundle(str(tmp_path / f"levels-{number}-0" / "bundle"))
         wanted = replace(TINY.tokenizer, levels=levels)
         assert MOGOConfig.from_dict(made.manifest.parameters).tokenizer == wanted
+        assert drawn(made.path).shape == (levels, 20)
     assert ablate_levels(request) == shown
 
 
@@ -137,6 +162,17 @@ def test_data_are_mixed_with_shares_of_another_set_and_the_tokenizer_stays(
     before = find_bundle(str(bundle)).manifest.files["tokenizer.safetensors"].sha256
     assert {each.manifest.files["tokenizer.safetensors"].sha256 for each in made} == {before}
     assert [len(each.manifest.data) for each in made] == [1, 2, 2]
+    assert [drawn(each.path).shape for each in made] == [(TINY.tokenizer.levels, 20)] * 3
+
+
+@pytest.mark.parametrize("name", SCALING)
+def test_sizes_and_scales_of_codebooks_leave_bundles_that_generate(
+    name: str, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge_by_two_prompts(monkeypatch)
+    fields = {**SCALING[name], "code_width": 16}  # the published widths take long to train
+    train_both(fields, replace(options, run=tmp_path / "run", threads=1))
+    assert drawn(tmp_path / "run" / "bundle").shape == (TINY.tokenizer.levels, 20)
 
 
 def test_the_sizes_of_the_papers_tables() -> None:
@@ -150,61 +186,26 @@ def test_the_sizes_of_the_papers_tables() -> None:
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-def test_a_variant_changes_lanes_and_depth_alone(name: str) -> None:
+def test_a_variant_changes_lanes_the_level_token_and_depth_alone(name: str) -> None:
     changed = VARIANTS[name].of(TINY)
-    kept = replace(changed, transformer=replace(changed.transformer, joint=False), depth=TINY.depth)
+    plain = replace(changed.transformer, joint=False, level_token=False)
+    kept = replace(changed, transformer=plain, depth=TINY.depth)
     assert kept == TINY
     # without a depth head all frames cover all levels: less would save nothing
     assert changed.depth.share == (TINY.depth.share if changed.depth.layers else 1.0)
 
 
-def test_a_level_token_is_read_by_its_own_lane_from_the_first_frame_on() -> None:
-    torch.manual_seed(0)
-    model = LevelToken(FLAT).eval().requires_grad_(False)
-    told, tokens = prompts(2), columns(5, 2)
-    before = model.states(told, tokens)
-    assert before.shape == (2, 6, TINY.tokenizer.levels, TINY.transformer.width)
-    model.level_token[1] += torch.randn(TINY.transformer.width)
-    changed = (model.states(told, tokens) - before).abs().amax((0, 3))  # (n + 1, L)
-    assert (changed[:, 1] > 1e-4).all()
-    assert (changed[:, [0, 2]] == 0).all()
-
-
-def test_behind_a_level_token_frames_still_read_the_past_alone_and_the_prompt_in_force() -> None:
-    torch.manual_seed(0)
-    model = LevelToken(FLAT).eval().requires_grad_(False)
-    told, tokens = torch.cat([prompts(1), prompts(1) + 1], 1), columns(6)
-    seam = torch.tensor([3])
-    before = model.states(told, tokens, seam=seam)
-    other = tokens.clone()
-    other[:, 4] = (other[:, 4] + 1) % TINY.tokenizer.codes
-    changed = (model.states(told, other, seam=seam) - before).abs().amax((0, 2, 3))
-    assert (changed[:5] == 0).all()
-    assert (changed[5:] > 1e-5).all()
-    second = told.clone()
-    second[:, 1] += 1
-    changed = (model.states(second, tokens, seam=seam) - before).abs().amax((0, 2, 3))
-    assert (changed[:3] == 0).all()  # frames 1 to 3 come before the steer
-    assert (changed[3:] > 1e-5).all()
-
-
 def test_variants_are_named_by_their_lanes_and_their_depth() -> None:
-    named = {name: (variant.joint, variant.depth, variant.network) for name, variant in VARIANTS.items()}
+    named = {name: (variant.joint, variant.depth, variant.level_token) for name, variant in VARIANTS.items()}
     assert named == {
-        "a lane a level, PnQ, independent levels": (False, 0, RQHCTransformer),
-        "a lane a level, level token, independent levels": (False, 0, LevelToken),
-        "a lane a level, PnQ, depth head": (False, 2, RQHCTransformer),
-        "one lane, depth head": (True, 2, RQHCTransformer),
+        "a lane a level, PnQ, independent levels": (False, 0, False),
+        "a lane a level, level token, independent levels": (False, 0, True),
+        "a lane a level, PnQ, depth head": (False, 2, False),
+        "one lane, depth head": (True, 2, False),
     }
 
 
-def test_a_level_token_is_in_place_of_the_embedding_beside_the_prompt() -> None:
-    level = LevelToken(FLAT).prompt.level.weight
-    assert not level.any()
-    assert not level.requires_grad  # it stays so in training
-
-
-def test_a_variant_that_the_product_can_generate_with_is_bundled_and_judged(
+def test_a_variant_is_bundled_and_judged(
     options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged: list[tuple[MOGOConfig, int]] = []

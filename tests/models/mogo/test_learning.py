@@ -8,13 +8,14 @@ import pytest
 import torch
 import torch.nn.functional as F
 
-from marey.models.mogo.config import TINY
+from marey.models.mogo.config import TINY, MOGOConfig
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
-from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from marey.models.mogo.model import NOT_ASKED, next_targets
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.training.tokenizing import tokenizer_loss
 
-from .networks import columns, opened, prompts, transformer
+from .networks import TOLD_BY_TOKEN, columns, opened, prompts, transformer
 
 LEVELS, CODES = TINY.tokenizer.levels, TINY.tokenizer.codes
 
@@ -103,15 +104,16 @@ def test_what_is_asked_ahead_lies_so_far_ahead_and_never_behind_a_steer() -> Non
     assert float(ahead_loss(model, knows[:, :3], targets[..., :3], None, 1.0)) == 0  # too short to ask anything
 
 
-def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
+@pytest.mark.parametrize("base", [TINY, TOLD_BY_TOKEN])
+def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends(base: MOGOConfig) -> None:
     """Two prompts, two clips of different length, learnt by heart: training forward, cache, targets and END agree."""
     certain = replace(TINY.inference, temperature=0.0, upper_temperature=0.0)
-    still = replace(TINY.transformer, dropout=0.0)
+    still = replace(base.transformer, dropout=0.0)
     config = replace(
-        TINY, corruption=0.0, inference=certain, transformer=still, condition=replace(TINY.condition, drop=0.0)
+        base, corruption=0.0, inference=certain, transformer=still, condition=replace(TINY.condition, drop=0.0)
     )
     torch.manual_seed(0)
-    model = RQHCTransformer(config).train()
+    model = build_transformer(config).train()
     tokens, lengths = columns(18, 2), torch.tensor([18, 11])
     tokens[1, 11:] = -1
     targets = next_targets(tokens, lengths, model.end)

@@ -16,9 +16,8 @@ from marey.nn.sampling import guide
 from marey.streams.actions import ActionStart
 from tests.support.processors import PACKED_TYPES
 
-from .networks import columns, opened, prompts, transformer
+from .networks import FLAT, TOLD_BY_TOKEN, columns, opened, prompts, transformer
 
-FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
 JOINT = replace(TINY, transformer=replace(TINY.transformer, joint=True))
 GUIDED = replace(TINY, inference=replace(TINY.inference, guidance=2.0))
 WINDOW = TINY.inference.window
@@ -46,7 +45,7 @@ def logits_of(model: RQHCTransformer, states: torch.Tensor, column: torch.Tensor
     return model.score(model.refine(states, column[None, :-1]))[0]
 
 
-@pytest.mark.parametrize("config", [TINY, FLAT, JOINT])
+@pytest.mark.parametrize("config", [TINY, FLAT, JOINT, TOLD_BY_TOKEN])
 def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(config: MOGOConfig) -> None:
     model, tokens = transformer(config), columns(WINDOW)
     whole = model(prompts(1), tokens)[0]  # (V, n + 1, K + 1)
@@ -58,7 +57,7 @@ def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(confi
         streams.accept(tokens[:, frame])
 
 
-@pytest.mark.parametrize("config", [TINY, JOINT, replace(JOINT, inference=GUIDED.inference)])
+@pytest.mark.parametrize("config", [TINY, JOINT, replace(JOINT, inference=GUIDED.inference), TOLD_BY_TOKEN])
 def test_a_session_draws_the_same_tokens_beside_others(config: MOGOConfig) -> None:
     frames = 2 * WINDOW + 5
     streams = opened(transformer(config), 3)
@@ -151,7 +150,7 @@ def test_a_saved_session_goes_on_with_the_very_same_tokens(frames: int) -> None:
     assert torch.equal(run(other, 20)[resumed], expected)
 
 
-@pytest.mark.parametrize("config", [TINY, GUIDED])
+@pytest.mark.parametrize("config", [TINY, GUIDED, TOLD_BY_TOKEN])
 def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None:
     streams = opened(transformer(config), 2)
     session = streams.start(said(1), 1)
@@ -160,7 +159,7 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
     before, other = streams.save(session), streams.save(beside)
     streams.steer(session, said(3))
     after = streams.save(session)
-    now, then = after["memory"], before["memory"]  # (layers, 2, H, L, 1 + W, w / H)
+    now, then = after["memory"], before["memory"]  # (layers, 2, H, L, m + W, w / H)
     assert torch.equal(now[..., 1:, :], then[..., 1:, :])
     for kind in range(2):
         for level in range(TINY.tokenizer.levels):
@@ -173,8 +172,9 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
     torch.testing.assert_close(now[..., 0, :], expected["memory"][..., 0, :])
 
 
-def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
-    model, tokens, seam = transformer(), columns(WINDOW), 6
+@pytest.mark.parametrize("config", [TINY, TOLD_BY_TOKEN])
+def test_a_steered_stream_equals_the_training_forward_with_a_seam(config: MOGOConfig) -> None:
+    model, tokens, seam = transformer(config), columns(WINDOW), 6
     whole = model(torch.cat([prompts(1), prompts(1, seed=1)], 1), tokens, seam=torch.tensor([seam]))[0]
     streams = opened(model, 1)
     session = streams.start(said(0), 1)
@@ -186,15 +186,18 @@ def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
         streams.accept(tokens[:, frame])
 
 
-def test_a_steer_before_the_first_frame_is_a_start_with_that_prompt() -> None:
-    streams = opened(transformer(), 1)
+@pytest.mark.parametrize("config", [TINY, TOLD_BY_TOKEN])
+def test_a_steer_before_the_first_frame_is_a_start_with_that_prompt(config: MOGOConfig) -> None:
+    model = transformer(config)
+    streams = opened(model, 1)
     session = streams.start(said(1), 7)
     streams.steer(session, said(7))
-    assert torch.equal(run(streams, 10)[session], alone(7, 10))
+    assert torch.equal(run(streams, 10)[session], alone(7, 10, model))
 
 
-def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
-    model, tokens = transformer(), columns(WINDOW)
+@pytest.mark.parametrize("config", [TINY, TOLD_BY_TOKEN])
+def test_a_stream_goes_on_behind_frames_that_were_made_before(config: MOGOConfig) -> None:
+    model, tokens = transformer(config), columns(WINDOW)
     skipped = 3 * WINDOW + 5
     whole = model(prompts(1), tokens, skipped=torch.tensor([skipped]))[0]
     read = WINDOW - 4

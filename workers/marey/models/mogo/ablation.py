@@ -7,10 +7,10 @@ the paper's tables of the quantizer.
 
 Each variant is trained from scratch for the same number of steps, on the same seeds; all other parts are the bundle's.
 `tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer` compares
-the ways of level and depth by cross-entropy of validation clips, and by the evaluation prompts where the product can
-generate with a variant. `scaling`, `levels` and `codebooks` (Tab. 3 to 5) train both networks, and compare by the
-errors and by the evaluation prompts; their bundles stay beside the numbers, for an evaluator. Finished variants are
-kept: a second call continues. `data` (Tab. 6) trains the transformer on the data and on mixes with another set.
+the ways of level and depth (Tab. 7) by cross-entropy of validation clips and by the evaluation prompts. `scaling`,
+`levels` and `codebooks` (Tab. 3 to 5) train both networks, and compare by the errors and by the evaluation prompts.
+`data` (Tab. 6) trains the transformer on the data and on mixes with another set. The bundles of all but `tokenizer`
+stay beside the numbers, for an evaluator. Finished variants are kept: a second call continues.
 """
 
 from __future__ import annotations
@@ -21,15 +21,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import torch
-from torch import Tensor, nn
-
 from marey.bundles import Bundle, find_bundle
 from marey.core.errors import InvalidInput
 from marey.models.mogo.assembly import RECIPE, assemble, unpack
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
 from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
@@ -40,52 +36,27 @@ from marey.training.staging import TrainOptions, finish, use_threads
 V = TypeVar("V")
 
 
-class LevelToken(RQHCTransformer):
-    """The level as a token of its own behind the prompt, in place of its embedding beside the prompt (eq. 7).
-
-    The token takes the place of the first frame: frames are one position further from the prompt, and the token's
-    output predicts the first frame. For comparison alone: streams do not support it.
-    """
-
-    def __init__(self, config: MOGOConfig) -> None:
-        super().__init__(replace(config, max_frames=config.max_frames + 1))
-        self.level_token = nn.Parameter(torch.randn_like(self.prompt.level.weight) * 0.02)
-        nn.init.zeros_(self.prompt.level.weight).requires_grad_(False)
-
-    def states(
-        self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
-    ) -> Tensor:
-        """Return the trunk's states; arguments as in `RQHCTransformer`."""
-        first, frames = self.inputs(prompts, tokens, skipped, seam)
-        token = self.level_token[None, :, None].expand(len(tokens), -1, -1, -1)
-        x = torch.cat([first, token, frames], 2).flatten(0, 1)
-        later = None if seam is None else seam + 1
-        states = self.trunk(x, self.reach(tokens.shape[1] + 1, prompts.shape[1], skipped, later))
-        behind = states[:, prompts.shape[1] :]
-        return behind.view(len(tokens), self.lanes, tokens.shape[1] + 1, -1).transpose(1, 2)
-
-
 @dataclass(frozen=True)
 class Variant:
     """One way to draw levels and depth."""
 
     joint: bool
     depth: int
-    network: type[RQHCTransformer] = RQHCTransformer
+    level_token: bool = False
 
     def of(self, config: MOGOConfig) -> MOGOConfig:
         """Return the configuration with this variant."""
         share = config.depth.share if self.depth else 1.0
         return replace(
             config,
-            transformer=replace(config.transformer, joint=self.joint),
+            transformer=replace(config.transformer, joint=self.joint, level_token=self.level_token),
             depth=replace(config.depth, layers=self.depth, share=share),
         )
 
 
 VARIANTS = {
     "a lane a level, PnQ, independent levels": Variant(joint=False, depth=0),
-    "a lane a level, level token, independent levels": Variant(joint=False, depth=0, network=LevelToken),
+    "a lane a level, level token, independent levels": Variant(joint=False, depth=0, level_token=True),
     "a lane a level, PnQ, depth head": Variant(joint=False, depth=2),
     "one lane, depth head": Variant(joint=True, depth=2),
 }
@@ -128,20 +99,17 @@ def train_tokenizer(scale: Scale, options: TrainOptions[MOGOConfig]) -> dict[str
 
 
 def train_transformer(bundle: str, variant: Variant, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
-    """Train one transformer on the bundle's tokens; return its validation metrics, and the judged evaluation prompts
-    where the product can generate with it."""
+    """Train one transformer on the bundle's tokens; return its validation metrics and the judged evaluation prompts."""
     config, run = variant.of(options.config), options.run
     options = replace(options, config=config)
     unpack(find_bundle(bundle), run)
     for made in run.parent.glob("*.safetensors"):  # tokens and steers, the same for all
         shutil.copy(made, run)
-    stage, sha256 = transformer_stage(options, variant.network)
+    stage, sha256 = transformer_stage(options)
     for made in run.glob("*.safetensors"):
         shutil.copy(made, run.parent)
     metrics = RECIPE.train(stage, options)
     found = {name: value for name, value in metrics.items() if name.startswith("loss/") or name == "accuracy/0"}
-    if variant.network is not RQHCTransformer:
-        return found
     finish(stage.module, options, stage.name, metrics, sha256)
     return found | judged(assemble(options.prepared, run, run / "bundle", config), options.threads)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from marey.bundles import Bundle, TextSpec
 from marey.models.mogo.config import MOGOConfig, named_config
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.tokenizer import Tokenizer
 from marey.nn.bundling import NetworkParts, load_parts, write_random
@@ -24,7 +25,7 @@ class Networks(NetworkParts):
     @classmethod
     def build(cls, config: MOGOConfig) -> Networks:
         """Build freshly initialised networks."""
-        return cls(Tokenizer(config), RQHCTransformer(config))
+        return cls(Tokenizer(config), build_transformer(config))
 
 
 def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Networks]:

@@ -54,6 +54,8 @@ class TransformerConfig:
     level_gain: bool = False
     """Ours: each level has its own gains on the shared embedding. Without them, a sum of embeddings does not show which
     level a code came from."""
+    level_token: bool = field(default=False, metadata=ADDED)
+    """For comparison (Tab. 7): the level is a token of its own behind the prompt, not an embedding beside it (PnQ)."""
     joint: bool = False
     """Ours: one sequence of whole frames for all levels; the depth head, which it needs, separates the levels. A sixth
     of the trunk's work."""
@@ -137,9 +139,12 @@ class MOGOConfig(ModelConfig):
     train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4, ema=0.0)
 
     def __post_init__(self) -> None:
-        """Refuse a joint sequence without a depth head: its levels would be indistinguishable."""
+        """Refuse a joint sequence without a depth head: its levels would be indistinguishable. It has no level that a
+        token could name."""
         if self.transformer.joint and not self.depth.layers:
             raise InvalidInput("one sequence for all levels needs a depth head", where="transformer.joint")
+        if self.transformer.joint and self.transformer.level_token:
+            raise InvalidInput("one sequence for all levels has no level to name", where="transformer.level_token")
 
     @property
     def longest(self) -> int:

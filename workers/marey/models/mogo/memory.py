@@ -7,7 +7,8 @@ from dataclasses import replace
 import torch
 
 from marey.models.mogo.config import MOGOConfig
-from marey.models.mogo.model import RQHCTransformer, lanes
+from marey.models.mogo.level_token import build_transformer
+from marey.models.mogo.model import lanes
 from marey.models.mogo.samples import SequenceSample
 from marey.models.mogo.stage_transformer import piece_losses
 from marey.training.memory import MemoryModel, SavedBytes, count_saved, matrices
@@ -37,8 +38,8 @@ def memory_model(config: MOGOConfig, *, bf16: bool = True) -> MemoryModel:
         bf16: matrices are in bfloat16.
     """
     with torch.device("meta"):
-        module = RQHCTransformer(config)
-    rows = lanes(config) * (PROMPTS + config.max_frames)
+        module = build_transformer(config)
+    rows = lanes(config) * (PROMPTS - 1 + module.leads + config.max_frames)
     return MemoryModel.counted(
         "transformer",
         config.train_transformer,
@@ -51,7 +52,7 @@ def memory_model(config: MOGOConfig, *, bf16: bool = True) -> MemoryModel:
 
 def _saved(config: MOGOConfig, layers: int, count: int, bf16: bool) -> SavedBytes:
     small = replace(config, transformer=replace(config.transformer, layers=layers))
-    model, sample = RQHCTransformer(small).train(), longest_samples(config, count)
+    model, sample = build_transformer(small).train(), longest_samples(config, count)
 
     def forward() -> object:
         with matrices(bf16):

@@ -183,6 +183,8 @@ class Trunk(nn.Module):
 class RQHCTransformer(nn.Module):
     """Prompt and past frames to logits of the next frame's codes on all levels."""
 
+    leads = 1
+    """Positions before the first frame where there is one prompt: position 0 alone."""
     no_end: Tensor  # (V, K + 1) bool: END on the levels that have none
 
     def __init__(self, config: MOGOConfig) -> None:
@@ -191,6 +193,7 @@ class RQHCTransformer(nn.Module):
         self.config = config
         self.levels, self.lanes = levels, lanes(config)
         self.codes = config.tokenizer.codes
+        self.farthest = config.max_frames + self.leads - 1  # largest distance between two positions
         self.prompt = Prompt(config)
         self.pace = DurationRegression(config)
         self.clock = Clock(width, config.max_frames, config.condition.clockless) if config.condition.clock else None
@@ -198,7 +201,7 @@ class RQHCTransformer(nn.Module):
         # residuals get smaller from level to level
         gains = 2.0 ** (-0.5 * torch.arange(levels))[:, None].repeat(1, width)
         self.gains = nn.Parameter(gains) if t.level_gain else None
-        self.trunk = Trunk(t, config.max_frames)
+        self.trunk = Trunk(t, self.farthest)
         self.depth = DepthHead(config.depth, levels, width) if config.depth.layers else None
         self.head = nn.Linear(width, self.codes + 1)  # one for all levels; the last is END
         self.ahead = nn.ModuleList(nn.Linear(width, width) for _ in config.ahead)  # used in training alone
@@ -266,6 +269,10 @@ class RQHCTransformer(nn.Module):
             prompt_term = prompt_term + (time if dropped is None else time.masked_fill(dropped[:, None, None], 0))
         return first, self.columns(inputs).to(first.dtype) + prompt_term[:, None]
 
+    def leading(self, first: Tensor) -> Tensor:
+        """Return the inputs before the frames, from position 0 of each prompt (B, L, P, w): the prompts alone."""
+        return first
+
     def natural_frames(self, actions: Tensor) -> list[int]:
         """Return the usual frames of each action (A, W) of a prompt, with the transition from the one before."""
         first, *others = self.pace(self.prompt.standardised(actions)).tolist()
@@ -290,7 +297,7 @@ class RQHCTransformer(nn.Module):
 
     def reach(self, size: int, prompts: int = 1, skipped: Tensor | None = None, seam: Tensor | None = None) -> Reach:
         """Return the positions that `size` frames may read; see `forward`."""
-        device, farthest = self.trunk.sinusoids.device, self.config.max_frames
+        device, farthest = self.trunk.sinusoids.device, self.farthest
         if size > farthest:
             raise ValueError(f"{size} frames exceed the {farthest} learned distances")
         if (prompts == 2) != (seam is not None):

@@ -85,15 +85,17 @@ class NextFrame:
         return codes.masked_fill(ended[:, None], -1)
 
     def _slots(self, rows: int) -> Slots:
-        """Return the cache positions of the rows. Slot p holds frame p, frame p + W, …; slot 0 the prompt."""
-        window, farthest = self.config.window, self._model.config.max_frames
+        """Return the cache positions of the rows: first those before the frames, whose slot 0 is the prompt, then a
+        window of frames."""
+        window, leads, farthest = self.config.window, self._model.leads, self._model.farthest
         made, skipped = self.state.made[:rows], self.state.skipped[:rows]
         places = torch.arange(1, window + 1, device=made.device)
         back = (made[:, None] - places) % window  # (s, W): frames since the slot was written
-        hidden = F.pad((back >= (made - skipped)[:, None]) * HIDDEN, (1, 0))  # the prompt is always read
-        distance = torch.cat([made.clamp(max=farthest)[:, None], back], 1)  # (s, 1 + W)
+        hidden = F.pad((back >= (made - skipped)[:, None]) * HIDDEN, (leads, 0))  # the prompt is always read
+        before = torch.stack([made + leads - 1, *[made - skipped] * (leads - 1)], 1)  # (s, m)
+        distance = torch.cat([before.clamp(max=farthest), back], 1)  # (s, m + W)
         # Before the first frame nothing is there to feed: the slot then written is overwritten before it is read.
-        newest = 1 + (made - 1) % window
+        newest = leads + (made - 1) % window
         return Slots(torch.arange(rows, device=made.device), newest, distance[:, None, None], hidden[:, None, None])
 
     def _ends(self, logits: Tensor) -> Tensor:

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from marey.core.errors import InvalidInput
 from marey.data.manifest import Clip
 from marey.models.mogo.config import MOGOConfig
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.samples import MIN_FRAMES, Samples, SequenceSample
@@ -35,11 +36,10 @@ class TransformerStage:
         tokens: TokenData,
         captions: SentenceData,
         steers: Steers | None = None,
-        network: type[RQHCTransformer] = RQHCTransformer,
     ) -> None:
         self.config = config
         self.optimisation = config.train_transformer
-        self.module = network(config).to(tokens.tokens.device)
+        self.module = build_transformer(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
         self.samples = Samples(clips, tokens, captions, steers, config.max_frames, split=config.split_actions)
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]

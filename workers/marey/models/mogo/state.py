@@ -15,7 +15,8 @@ NEVER = 2**62
 
 @dataclass(frozen=True)
 class SessionState:
-    """Sessions as rows of tensors: S of them, L lanes, V levels, W frames of window, H heads, w wide."""
+    """Sessions as rows of tensors: S of them, L lanes, V levels, W frames of window, m positions before them, H heads,
+    w wide."""
 
     seeds: Tensor  # (S,) int64
     made: Tensor  # (S,) int64 frames drawn so far
@@ -27,14 +28,14 @@ class SessionState:
     last: Tensor  # (S, V) int64, the newest column; -1 before the first
     opening: Tensor  # (S, L, w) states of position 0, from which frame 1 is drawn
     prompt_term: Tensor  # (S, L, w) term that the current prompt adds to every frame
-    memory: Tensor  # (layers, 2, S, H, L, 1 + W, w / H) keys and values
+    memory: Tensor  # (layers, 2, S, H, L, m + W, w / H) keys and values
 
     @classmethod
     def empty(cls, packed: PackedModel, sessions: int, branches: int, window: int) -> SessionState:
         """Allocate the state of `sessions` sessions."""
         model, device = packed.network, packed.device
         t, lanes = model.config.transformer, branches * model.lanes
-        slots = (t.layers, 2, sessions, t.heads, lanes, 1 + window, t.width // t.heads)
+        slots = (t.layers, 2, sessions, t.heads, lanes, model.leads + window, t.width // t.heads)
         whole = torch.zeros(6, sessions, dtype=torch.long, device=device)
         return cls(
             seeds=whole[0],

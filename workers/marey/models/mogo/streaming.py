@@ -1,8 +1,9 @@
 """Motion drawn frame by frame: cached keys and values, many sessions in one forward pass.
 
 `SessionState` holds the whole state of the sessions as plain tensors; each `StreamBatch.step` draws one frame of all of
-them. A session's cache has 1 + W slots for each layer and lane: slot 0 keeps position 0 (the prompt), frame p is in
-slot 1 + (p - 1) mod W, so an endless motion needs no more memory and no copy. A lane is a level, twice if guidance
+them. A session's cache has m + W slots for each layer and lane: slot 0 keeps position 0 (the prompt), slots up to m
+other positions before the frames (a level token; usually m = 1), and frame p is in slot m + (p - 1) mod W, so an
+endless motion needs no more memory and no copy. A lane is a level, twice if guidance
 needs a second branch. Attention always reads all slots: tokens depend neither on the length nor on the number of the
 other sessions (`marey.nn.sampling.uniform`).
 """
@@ -220,7 +221,10 @@ class StreamBatch:
 
     @torch.no_grad()
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:
-        """Write position 0 and after it frames `past` (n, V) to a row's cache; one pass for all of it."""
+        """Write position 0 and after it frames `past` (n, V) to a row's cache; one pass for all of it.
+
+        A level token is written where the cache begins: under a later prompt it stays what it was, as in training.
+        """
         null = torch.arange(self.branches, device=past.device) > 0
         prompts = sentence.expand(self.branches, -1)
         prompt, prompt_term = self.model.prompt(prompts, null)  # (branches, V, w), (branches, w)
@@ -229,20 +233,24 @@ class StreamBatch:
         frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + prompt_term[:, None, None]
         if self.packed.times is not None:
             frames[0] += self._next.time(1 + position, self.state.began[row], self.state.stops[row])
-        x = torch.cat([prompt[:, :, None], frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
+        first = prompt[:, :, None]
+        if len(past) or not self._made[self.sessions[row]]:
+            first = self.model.leading(first)
+        before = first.shape[2]
+        x = torch.cat([first, frames], 2).flatten(0, 2)  # (L · (m + n), w): one product for all of them
         self.state.prompt_term[row] = prompt_term.repeat_interleave(self.model.lanes, 0)
-        reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
-        slots = torch.cat([position.new_zeros(1), 1 + position % self.window])
+        reach = self.model.reach(before - 1 + len(past), skipped=skipped.expand(self.branches))
+        slots = torch.cat([torch.arange(before, device=past.device), self.model.leads + position % self.window])
         for layer, block in enumerate(self.packed.blocks):
 
             def attend(h: Tensor, i: int = layer, attention: RelativeAttention = block.attention) -> Tensor:
                 query, key, value = (part.unflatten(0, (-1, len(slots))) for part in attention.project(h))
                 for kept, part in zip(self.state.memory[i, :, row], (key, value), strict=True):
-                    kept[:, :, slots] = part.permute(2, 0, 1, 3).to(kept.dtype)  # (L, 1 + n, H, w / H), heads first
+                    kept[:, :, slots] = part.permute(2, 0, 1, 3).to(kept.dtype)  # (L, m + n, H, w / H), heads first
                 return attention.out(attention.mix(query, key, value, self.packed.terms[i], reach).flatten(0, 1))
 
             x = block(x, attend)
-        self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, 0])
+        self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, before - 1])
 
     def _take_row(self) -> int:
         if len(self.sessions) == self.capacity:

@@ -7,9 +7,9 @@ import torch
 
 from marey.models.mogo.assembly import RECIPE
 from marey.models.mogo.config import MOGOConfig
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.losses import scale_penalty
 from marey.models.mogo.memory import memory_model
-from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.rollouts import Rollouts
 from marey.models.mogo.samples import MIN_FRAMES
 from marey.models.mogo.stage_transformer import TransformerStage
@@ -58,9 +58,7 @@ def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
     return metrics
 
 
-def transformer_stage(
-    options: TrainOptions[MOGOConfig], network: type[RQHCTransformer] = RQHCTransformer
-) -> tuple[TransformerStage, str]:
+def transformer_stage(options: TrainOptions[MOGOConfig]) -> tuple[TransformerStage, str]:
     """Return the transformer's stage on the tokens of the run, encoded if missing, and the hash of the data.
 
     Features are read for the tokens alone, and their memory is released afterwards.
@@ -74,7 +72,7 @@ def transformer_stage(
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
     steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES), captions)
-    return TransformerStage(options.config, clips, tokens, captions, steers, network), data.prepared.sha256
+    return TransformerStage(options.config, clips, tokens, captions, steers), data.prepared.sha256
 
 
 def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
@@ -95,6 +93,6 @@ def _steers(
     clips, weights = pairs.train[single].tolist(), pairs.weights[single].tolist()
     rollouts = None
     if options.warm and options.config.rollouts:
-        model = RECIPE.trained("transformer", RQHCTransformer(options.config).to(data.features.device), options)
+        model = RECIPE.trained("transformer", build_transformer(options.config).to(data.features.device), options)
         rollouts = Rollouts(model, tokenizer, captions)
     return load_steers(options.run, options.config, tokenizer, data, clips, weights, rollouts)
