@@ -345,7 +345,15 @@ def _found(prompt: str) -> tuple[_Words, ...]:
     for each in sorted(_matches(text), key=lambda words: (words.start, -words.end, not words.instead)):
         if (not spans or each.start >= spans[-1].end) and not _DENIED.search(text[: each.start]):
             spans.append(each)
-    return tuple(spans)
+    return tuple(_of_zombies(spans))
+
+
+def _of_zombies(spans: Sequence[_Words]) -> Iterator[_Words]:
+    """Yield words, of zombies with arms that are "out" ahead, not at the sides."""
+    ahead = any(each.stated.name == "zombie" for each in spans)
+    for each in spans:
+        out = ahead and each.stated.name == "arms-wide" and each.stated.words.endswith(" out")
+        yield replace(each, stated=replace(each.stated, name="arms-ahead")) if out else each
 
 
 def _matches(text: str) -> Iterator[_Words]:

@@ -626,3 +626,14 @@ def test_feet_on_a_beam_are_on_one_line() -> None:
     across = [np.ptp(each[10:-10, [7, 8], 0].mean(axis=0)) for each in (walk, beam)]
     assert across[1] < 0.45 * across[0]
     assert (beam[20:-20, [20, 21], 1] > beam[20:-20, [16, 17], 1] - 0.25).all()
+
+
+def test_arms_that_are_out_to_the_sides_stay_there_in_a_spin() -> None:
+    stated = stated_bearings("she spins around with both arms out")
+    assert [each.name for each in stated] == ["arms-wide"]
+    assert stated[0].shown_in("spin") == "body"
+    joints = drawn(standing(), *stated)
+    for wrist, shoulder in zip(WRISTS, SHOULDERS, strict=True):
+        away = joints[20:-20, wrist] - joints[20:-20, shoulder]
+        assert np.abs(away[:, 0]).min() > 0.4
+        assert np.abs(away[:, 1:]).max() < 0.2

@@ -21,6 +21,7 @@ LAYOUT = HUMANML3D_263
 FPS = LAYOUT.fps
 BEFORE = LAYOUT.decode(LAYOUT.encode(Body(6.0).joints())).astype(np.float64)
 LEGS = [HUMANML3D.index(f"{side}_{joint}") for side in "LR" for joint in ("ankle", "foot")]
+TOES = [10, 11]
 SHOULDERS, WRISTS = [16, 17], [20, 21]
 
 
@@ -89,13 +90,24 @@ def test_the_feet_of_a_body_that_punches_on_and_on_stay() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_stated_row_is_punched_from_a_stance_and_ends_soon(seed: int) -> None:
     turning = drawn_on(BEFORE, "punch", "boxing combo: left jab, right cross, left hook", seed=seed)
-    assert np.abs(turning - turning[0])[:, LEGS].max() < 0.01
+    assert np.abs(turning - turning[0])[:, TOES].max() < 0.01, "feet pivot on their toes"
     assert turning[0, LEGS[0], 2] - turning[0, LEGS[2], 2] > 0.12, "the left foot is ahead"
     last = np.flatnonzero(hands(turning)[..., 2].max(axis=1) > 0.34)[-1]
     assert 0.5 < (len(turning) - last) / FPS < 1.6
     fixed = drawn_features(LAYOUT.encode(BEFORE), LAYOUT, "punch", FineWish(None, "", "a jab and a cross", True), seed)
     assert fixed is not None
     assert len(fixed) == len(LAYOUT.encode(BEFORE))
+
+
+@pytest.mark.parametrize(("prompt", "foot", "hand"), [("a left hook", 7, 20), ("a hard right hook", 8, 21)])
+def test_hips_and_heel_turn_into_a_hook(prompt: str, foot: int, hand: int) -> None:
+    hooked = drawn_on(BEFORE, "punch", prompt, seed=2)
+    across = hooked[:, 1] - hooked[:, 2]
+    assert np.ptp(np.degrees(np.arctan2(-across[:, 2], across[:, 0]))) > 20
+    assert np.ptp(hooked[:, foot, 1]) > 0.02
+    assert np.linalg.norm(np.diff(hooked[:, hand], axis=0), axis=-1).max() * FPS > 5.2
+    jabbed = drawn_on(BEFORE, "punch", "a jab and a cross", seed=2)
+    assert np.abs(jabbed - jabbed[0])[:, LEGS].max() < 0.01
 
 
 def test_feet_that_are_to_move_are_those_of_the_network() -> None:

@@ -85,6 +85,36 @@ _LONGEST = 8.0
 """Seconds of all repetitions."""
 _TRUNK = 0.545
 """Metres from the hips to the shoulders of a straight body, along it."""
+_ON_KNEES, _ON_TOES = (0.06, 0.39), (0.155, 0.795)
+"""Metres of what it stands on over the floor, and from there to its hips."""
+
+
+def straight_body(shoulders: float, look: float, foot: float, hand: HandPlace, *, knees: bool = False) -> Posture:
+    """A straight body, face down, on its hands.
+
+    Args:
+        shoulders: metres of the shoulders over the floor.
+        look: degrees of the neck, forward.
+        foot: metres ahead of the ankles, or of the knees.
+        hand: where both hands are.
+        knees: it is on its knees, not on its toes.
+    """
+    base, leg = _ON_KNEES if knees else _ON_TOES
+    slope = math.asin((shoulders - base) / (leg + _TRUNK))
+    far = leg + 0.08
+    pelvis = (0.0, base + far * math.sin(slope), foot + far * math.cos(slope))
+    shank = 0.41 if knees else 0.0
+    toes = (0, -0.95, 0.3) if not knees else (0, -0.3, -0.9)
+    ankle = FootPlace((0.08, base + 0.4 * shank, foot - 0.9 * shank), toes)
+    down_pole: dict[str, Point] = dict.fromkeys(SIDES, (0.0, -1.0, 0.1))
+    tilt = (90 - math.degrees(slope), 0.0, 0.0)
+    return Posture(pelvis, tilt, (0, 0, 0), (look, 0, 0), 0.0, both(hand), dict.fromkeys(SIDES, ankle), down_pole)
+
+
+def reach_of(shoulders: float, *, knees: bool = False) -> float:
+    """Metres by which the shoulders of a straight body are ahead of its ankles, or of its knees."""
+    base, leg = _ON_KNEES if knees else _ON_TOES
+    return (leg + _TRUNK) * math.cos(math.asin((shoulders - base) / (leg + _TRUNK)))
 
 
 def push_ups(rng: random.Random, *, times: int | None = None) -> Gesture:
@@ -93,26 +123,14 @@ def push_ups(rng: random.Random, *, times: int | None = None) -> Gesture:
     half = {"quick": (0.4, 0.55), "": (0.6, 0.9), "slow": (1.1, 1.6)}[tempo]
     down = rng.uniform(*half)
     times = times or rng.randint(1, min(5, int(_LONGEST / (2 * down + 0.3))))
-    base, leg = (0.06, 0.39) if knees else (0.155, 0.795)
     top, bottom = rng.uniform(0.49, 0.52), rng.uniform(0.2, 0.29)
     wide, ahead = rng.uniform(0.22, 0.34), rng.uniform(-0.03, 0.06)
     elbow: Point = (rng.uniform(0.4, 1.0), 0.3, -0.8)
     foot = -rng.uniform(0.65, 0.8)
-    reach = (leg + _TRUNK) * math.cos(math.asin((top - base) / (leg + _TRUNK)))
-    hand = HandPlace((wide, 0.05, foot + reach + ahead), "floor", elbow)
+    hand = HandPlace((wide, 0.05, foot + reach_of(top, knees=knees) + ahead), "floor", elbow)
 
     def at(shoulders: float, look: float) -> Posture:
-        """The straight body with its shoulders at a height over the floor, metres."""
-        slope = math.asin((shoulders - base) / (leg + _TRUNK))
-        far = leg + 0.08
-        pelvis = (0.0, base + far * math.sin(slope), foot + far * math.cos(slope))
-        shank = 0.41 if knees else 0.0
-        ankle = FootPlace(
-            (0.08, base + 0.4 * shank, foot - 0.9 * shank), (0, -0.95, 0.3) if not knees else (0, -0.3, -0.9)
-        )
-        down_pole: dict[str, Point] = dict.fromkeys(SIDES, (0.0, -1.0, 0.1))
-        tilt = (90 - math.degrees(slope), 0.0, 0.0)
-        return Posture(pelvis, tilt, (0, 0, 0), (look, 0, 0), 0.0, both(hand), dict.fromkeys(SIDES, ankle), down_pole)
+        return straight_body(shoulders, look, foot, hand, knees=knees)
 
     look = rng.uniform(-30, -8)
     done = Sequel([rng.uniform(0.2, 0.8)], [at(top, look)])

@@ -26,6 +26,46 @@ _FIFTH = {
 """Arms of dancers: out to the sides, and one ahead."""
 
 
+def running(
+    pelvis: float, feet: dict[str, FootPlace], ahead: str, swing: float = 0.4, hands: dict[str, HandPlace] | None = None
+) -> Posture:
+    """A run with the hips so many metres ahead, and the hand of a side before the body, unless `hands` are given."""
+    far = 0.26 * swing
+    swung = {
+        ahead: HandPlace((0.1, -0.3, 0.08 + far), "shoulder", (0.5, -0.5, -0.8)),
+        OTHER_SIDE[ahead]: HandPlace((0.16, -0.36, 0.04 - far), "shoulder", (0.5, -0.3, -0.9)),
+    }
+    return Posture((0.0, _RUNS, pelvis), (9, 0, 0), (5, 0, 0), (-8, 0, 0), hands=hands or swung, feet=feet)
+
+
+def running_step(
+    done: Sequel,
+    feet: dict[str, StandingFoot],
+    at: Mapping[str, float],
+    side: str,
+    step: tuple[float, float],
+    hands: dict[str, HandPlace] | None = None,
+) -> dict[str, float]:
+    """Add a step of a run-up; return where both feet are, metres ahead by side.
+
+    Args:
+        done: the postures up to here.
+        feet: of the idle, by side.
+        at: where both feet are.
+        side: of the foot that steps.
+        step: its metres and seconds.
+        hands: where they are held; None = they swing.
+    """
+    other, (stride, seconds) = OTHER_SIDE[side], step
+    there = at[other] + stride
+    passing = FootPlace((feet[side].out, 0.26 + 0.1 * stride, at[other] - 0.12), (0.1, -0.8, -0.2))
+    places = {other: feet[other].tiptoe(12, at[other]), side: passing}
+    done.then(0.5 * seconds, running(at[other] + 0.04, places, side, hands=hands))
+    places = {other: feet[other].tiptoe(55, at[other]), side: feet[side].flat(there)}
+    done.then(0.5 * seconds, running(there - 0.42 * stride, places, other, 1.0, hands))
+    return {other: at[other], side: there}
+
+
 @dataclass(frozen=True)
 class _Leap:
     """A leap off the left foot onto the right one, in metres, degrees and seconds.
@@ -54,46 +94,25 @@ class _Leap:
         at: Mapping[str, float] = dict.fromkeys(SIDES, 0.0)
         side = LEFT if self.steps % 2 else RIGHT
         for stride, seconds in _STEPS[-self.steps :]:
-            at = self._step(done, feet, at, side, (stride, seconds))
+            at = running_step(done, feet, at, side, (stride, seconds), hands=self._arms)
             side = OTHER_SIDE[side]
         self._flight(done, feet, at[LEFT])
         self._runs_out(done, feet, at[LEFT] + self.far)
         return done
 
-    def _step(
-        self,
-        done: Sequel,
-        feet: dict[str, StandingFoot],
-        at: Mapping[str, float],
-        side: str,
-        step: tuple[float, float],
-    ) -> dict[str, float]:
-        """Add a step with the foot of a side, of a length and a time; return where both feet are."""
-        other, (stride, seconds) = OTHER_SIDE[side], step
-        there = at[other] + stride
-        passing = FootPlace((feet[side].out, 0.26 + 0.1 * stride, at[other] - 0.12), (0.1, -0.8, -0.2))
-        places = {other: feet[other].tiptoe(12, at[other]), side: passing}
-        done.then(0.5 * seconds, self._runs(at[other] + 0.04, places, side))
-        places = {other: feet[other].tiptoe(55, at[other]), side: feet[side].flat(there)}
-        done.then(0.5 * seconds, self._runs(there - 0.42 * stride, places, other, swing=1.0))
-        return {other: at[other], side: there}
+    @property
+    def _arms(self) -> dict[str, HandPlace] | None:
+        """Those of a dancer; None for those of a runner."""
+        return _OUT if self.dances else None
 
-    def _runs(self, pelvis: float, feet: dict[str, FootPlace], ahead: str, swing: float = 0.4) -> Posture:
-        """A run with the hips so far ahead, and the hand of a side before the body."""
-        far = 0.26 * swing
-        hands = {
-            ahead: HandPlace((0.1, -0.3, 0.08 + far), "shoulder", (0.5, -0.5, -0.8)),
-            OTHER_SIDE[ahead]: HandPlace((0.16, -0.36, 0.04 - far), "shoulder", (0.5, -0.3, -0.9)),
-        }
-        return Posture(
-            (0.0, _RUNS, pelvis), (9, 0, 0), (5, 0, 0), (-8, 0, 0), hands=_OUT if self.dances else hands, feet=feet
-        )
+    def _running(self, pelvis: float, feet: dict[str, FootPlace], ahead: str, swing: float = 0.4) -> Posture:
+        return running(pelvis, feet, ahead, swing, self._arms)
 
     def _flight(self, done: Sequel, feet: dict[str, StandingFoot], here: float) -> None:
         """Add the step onto the left foot and off it, the flight, and the landing on the right foot."""
         there = here + self.far
         drives = FootPlace((0.09, 0.42, here + 0.2), (0, -0.7, 0.7))
-        over = self._runs(here + 0.02, {LEFT: feet[LEFT].flat(here), RIGHT: drives}, LEFT)
+        over = self._running(here + 0.02, {LEFT: feet[LEFT].flat(here), RIGHT: drives}, LEFT)
         done.then(0.16, replace(over, pelvis=(0.02, 0.86, here + 0.02)))
         leaving = self._flies((here + 0.3, 1.0), 0.1)
         leaving = replace(leaving, feet={**leaving.feet, LEFT: feet[LEFT].tiptoe(62, here)})
@@ -136,16 +155,17 @@ class _Leap:
     def _runs_out(self, done: Sequel, feet: dict[str, StandingFoot], there: float) -> None:
         """Sink over the foot that landed, step on twice, and stand."""
         passing = FootPlace((0.1, 0.34, there - 0.2), (0.1, -0.8, -0.3))
-        sunk = self._runs(there, {RIGHT: feet[RIGHT].flat(there), LEFT: passing}, RIGHT)
+        sunk = self._running(there, {RIGHT: feet[RIGHT].flat(there), LEFT: passing}, RIGHT)
         done.then(0.16, replace(sunk, pelvis=(-0.02, 0.84, there)))
         at = {RIGHT: there, LEFT: there + 0.66}
         lands = {RIGHT: feet[RIGHT].tiptoe(50, there), LEFT: feet[LEFT].flat(at[LEFT])}
-        done.then(0.24, self._runs(there + 0.38, lands, RIGHT, 0.8))
-        at = self._step(done, feet, at, RIGHT, (0.36, 0.4))
+        done.then(0.24, self._running(there + 0.38, lands, RIGHT, 0.8))
+        at = running_step(done, feet, at, RIGHT, (0.36, 0.4), hands=self._arms)
         end = at[RIGHT]
         passing = {RIGHT: feet[RIGHT].flat(end), LEFT: feet[LEFT].flat(end - 0.15, 0.08)}
         done.then(
-            0.24, replace(self._runs(end - 0.04, passing, LEFT, 0.2), pelvis=(-0.02, 0.93, end - 0.03), tilt=(1, 0, 0))
+            0.24,
+            replace(self._running(end - 0.04, passing, LEFT, 0.2), pelvis=(-0.02, 0.93, end - 0.03), tilt=(1, 0, 0)),
         )
         stood = {side: foot.flat(end) for side, foot in feet.items()}
         done.then(0.24, Posture((0.0, 0.94, end), feet=stood))

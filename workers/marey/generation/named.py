@@ -11,6 +11,7 @@ import random
 import re
 from collections.abc import Callable, Mapping
 
+from marey.drawing.bat_swings import bat_swing
 from marey.drawing.bounces import toe_bounces
 from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
@@ -22,6 +23,7 @@ from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
 from marey.drawing.peeks import catch, peek
 from marey.drawing.pitches import pitch
+from marey.drawing.planks import plank
 from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
@@ -65,6 +67,10 @@ _TO_FEET = re.compile(r"\bfrom (?:one )?foot to\b")
 _HEAVY = re.compile(r"\b(?:heavy|heavily|massive|stuck|jammed|hard|huge|iron|shov\w+|strain\w*|struggl\w*)\b")
 _BOUNCES_S, _BRIEF_BOUNCES_S = (4.0, 5.0), (2.2, 2.8)
 """Seconds of bounces on the toes alone, and beside other things."""
+_ON_HANDS = re.compile(r"\bhigh\b|\b(?:straight|extended)[- ]arm|\bhands\b|\bpalms\b|\bfull\b")
+_GETS_DOWN = re.compile(
+    r"^(?:gets?|getting|goes|go|going|drops?|dropping|moves?|comes?|lowers?|lowering|takes?|assum\w+)\b"
+)
 _BOTH_SHOES = re.compile(r"\bboth\b|\beach shoe\b")
 
 
@@ -229,6 +235,20 @@ def _door(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: fl
     return opens(rng, _hand(stated, wish), heavy=bool(_HEAVY.search(wish.prompt.lower())), brief=any(wish.beside))
 
 
+def _bat_swing(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return bat_swing(rng, _hand(stated, wish))
+
+
+def _plank(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    words = stated.words
+    form = "side" if re.search(r"\bside\b(?! by)", words) else "hands" if _ON_HANDS.search(words) else ""
+    enters = bool(wish.beside[0]) or _GETS_DOWN.search(words) is not None
+    leaves = bool(wish.beside[1])
+    lasts = seconds or rng.uniform(4.0, 5.5) + 1.5 * enters + 1.5 * leaves
+    return plank(rng, form, stated.side, seconds=lasts, enters=enters, leaves=leaves)
+
+
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
@@ -258,5 +278,7 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "vacuuming": _vacuuming,
     "door-pulled": _door,
     "door-pushed": _door,
+    "plank": _plank,
+    "bat-swing": _bat_swing,
 }
 """Movements by the bearing that names them."""

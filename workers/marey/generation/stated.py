@@ -21,13 +21,14 @@ from marey.drawing.arms import clap_times, wave_overhead
 from marey.drawing.cheers import joy_jump
 from marey.drawing.floor import sit_floor
 from marey.drawing.gesture import Gesture
-from marey.drawing.kicks import high_kick, spin_kick
 from marey.drawing.seats import sit_legs_crossed
+from marey.generation.blocking import block_asked_for
 from marey.generation.carrying import stated_load
 from marey.generation.dancing import dance_asked_for
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
 from marey.generation.hopping import hops_away, jumps_away
+from marey.generation.kicking import ball_kick_asked_for, kick_asked_for
 from marey.generation.kneeling import drops_asked_for
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
@@ -54,13 +55,6 @@ _BOTH = re.compile(r"\b(?:both|arms|hands)\b")
 _WILD = re.compile(r"\b(?:wild\w*|frantic\w*|desperate\w*|franticly|attention|for help)\b")
 _GOES = re.compile(r"\b(?:walk|run|jog|sit|kneel|jump|turn|danc)\w*")
 """Words of what else a body does that waves."""
-_SPINS = re.compile(r"\b(?:spin\w*|spun|tornado|turning|360|whirl\w*|wheel[ -]kick|back[ -]?hook)\b")
-_HIGH_KICK = re.compile(
-    r"\bhigh[ -]kick\w*|\bhigh (?:\w+ )?kicks?\b|\bkick(?:s|ing|ed)? (?:(?!low|not)\w+ ){0,4}?high\b(?! (?:up )?in)"
-    r"|\bkick\w* .*\b(?:head|face|eye|shoulder)[ -](?:high|height|level)\b"
-    r"|\bkick\w* .*\b(?:over|above) (?:his|her|their) head\b"
-)
-_NO_FRONT_KICK = re.compile(r"\b(?:ball|football|round\w*|side|crescent|axe|back|bicycle|knees?|can|stone|door)\b")
 _JUMPS = re.compile(r"\b(?:jump|leap|bounc|hop)\w*\b")
 MOST_JUMPS = 8
 """Jumps for joy at most."""
@@ -77,16 +71,6 @@ _DOWN = re.compile(r"\bdown\b|\btakes? a seat\b|\bfrom standing\b")
 def _claps(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
     del seconds  # the hands rest at the end
     return clap_times(rng, wish.count, high=bool(_HIGH.search(wish.prompt.lower()))) if wish.count else None
-
-
-def _formed_kick(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
-    del seconds
-    text = wish.prompt.lower()
-    if (wish.count or 1) != 1:
-        return None
-    if _SPINS.search(text):
-        return spin_kick(rng, wish.side)
-    return high_kick(rng, wish.side) if _HIGH_KICK.search(text) and not _NO_FRONT_KICK.search(text) else None
 
 
 def _jumps_for_joy(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
@@ -128,7 +112,9 @@ STATED: Mapping[str, Statement] = {
     "sidestep": steps_aside,
     "idle": named_movement,
     "flinch": stated_hit,
-    "kick": _formed_kick,
+    "kick": kick_asked_for,
+    "kick-ball": ball_kick_asked_for,
+    "block": block_asked_for,
     "cheer": _jumps_for_joy,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.drawing.guards import drawn_stance
-from marey.drawing.stances import settle
+from marey.drawing.stances import settle, turn_hips
 from marey.generation.fine_wish import FineWish
-from marey.posing.standing import ARMS, LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
+from marey.motion.rotations import from_rotvec, rotate
+from marey.posing.standing import ARMS, LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
 from marey.posing.still import standing_still
 from marey.vocabulary.blows import stated_blows
 
@@ -55,6 +56,8 @@ class _Strike:
     way: tuple[Point, ...]
     twist: tuple[float, ...]
     elbow: Point = ELBOW
+    hips: float = 0.0
+    """Share of the twist that the hips have, on feet that pivot with them."""
 
     @property
     def seconds(self) -> float:
@@ -64,10 +67,11 @@ class _Strike:
 
 _STRAIGHT = _Strike((0.0, 0.12, 0.19, 0.44), ((-0.02, 0.0, 0.66), (-0.02, 0.0, 0.66)), (0.0, 24.0, 24.0, 0.0))
 _HOOK = _Strike(
-    (0.0, 0.22, 0.32, 0.4, 0.48, 0.8),
-    ((0.34, 0.0, 0.04), (0.42, 0.16, 0.32), (0.06, 0.18, 0.52), (-0.12, 0.14, 0.40)),
-    (0.0, -22.0, 10.0, 42.0, 48.0, 0.0),
+    (0.0, 0.22, 0.31, 0.37, 0.45, 0.8),
+    ((0.34, -0.04, 0.0), (0.46, 0.14, 0.28), (0.06, 0.18, 0.53), (-0.16, 0.14, 0.38)),
+    (0.0, -30.0, 4.0, 52.0, 62.0, 0.0),
     (1.0, 0.35, -0.2),
+    0.45,
 )
 _UPPERCUT = _Strike(
     (0.0, 0.24, 0.4, 0.5, 0.8),
@@ -91,6 +95,8 @@ _FOOTWORK = re.compile(
 """Words of feet that move."""
 STRIDE_M = 0.04
 """Metres by which the hips go ahead in a blow."""
+PIVOTS, LIFTS_M = 1.3, 0.04
+"""Degrees by which a foot pivots for each of the hips, and metres by which its heel rises."""
 AFTER_S = (0.6, 0.9)
 """Seconds in guard after the last one of a stated number."""
 _ONE = re.compile(
@@ -127,7 +133,8 @@ def stands(wish: FineWish) -> bool:
 def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, str]], *, drives: bool) -> Array:
     """Draw the guard and the strikes; the hips go ahead with these if it `drives` them."""
     frames = len(body.joints)
-    time, twist = np.arange(frames) / fps, np.zeros(frames)
+    time, twist, hips = np.arange(frames) / fps, np.zeros(frames), np.zeros(frames)
+    pivots = {side: np.zeros(frames) for side in ARMS}
     ways = {side: np.tile(GUARD[side], (frames, 1)) for side in ARMS}
     elbows = {side: np.tile(ELBOW, (frames, 1)) for side in ARMS}
     for start, strike, side in strikes:
@@ -135,18 +142,34 @@ def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, 
         points = [GUARD[side], *strike.way, GUARD[side]]
         since = time[inside] - start
         ways[side][inside] = way_through(since, strike.times, points)
-        twist[inside] -= SIGN[side] * way_through(since, strike.times, strike.twist)
+        turned = way_through(since, strike.times, strike.twist)
+        twist[inside] -= SIGN[side] * turned
+        hips[inside] -= SIGN[side] * strike.hips * turned
+        pivots[side][inside] += strike.hips * np.maximum(turned, 0.0)
         lifted = eased(np.minimum(since, strike.seconds - since) / 0.12)[:, None]
         elbows[side][inside] = (1 - lifted) * np.array(ELBOW) + lifted * np.array(strike.elbow)
     twist = smooth(twist, SMOOTH_S, fps)
     if drives:
         ahead = smooth(np.abs(twist) / 36.0, 0.05, fps)
         body.shift(-0.3 * STRIDE_M * ahead, STRIDE_M * ahead)
+        hips = smooth(hips, SMOOTH_S, fps)
+        turn_hips(body, hips)
+        for side in ARMS:
+            _pivot(body, side, smooth(pivots[side], SMOOTH_S, fps))
         settle(body)
-    body.lean(twist, "up")
+    body.lean(twist - hips if drives else twist, "up")
     for side in ARMS:
         body.hold(side, np.ones(frames), smooth(ways[side], SMOOTH_S, fps), pole=smooth(elbows[side], 0.05, fps))
     return body.solved()
+
+
+def _pivot(body: StandingBody, side: str, degrees: Array) -> None:
+    """Turn the foot of the hand that strikes inward about its toes, (T,) degrees, its heel lifted a little."""
+    _, _, ankle, toe = LEGS[side]
+    about = np.array([0.0, 1.0, 0.0]) * np.radians(-SIGN[side] * PIVOTS * degrees)[:, None]
+    heel = rotate(from_rotvec(about), body.joints[:, ankle] - body.joints[:, toe])
+    heel[:, 1] += LIFTS_M * np.clip(degrees / 25.0, 0.0, 1.0)
+    body.joints[:, ankle] = body.joints[:, toe] + heel
 
 
 def _in_stance(frames: int, rng: random.Random) -> StandingBody:

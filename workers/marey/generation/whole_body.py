@@ -24,6 +24,7 @@ from marey.drawing.leaps import leap
 from marey.drawing.rolls import flip, roll
 from marey.drawing.slips import slip
 from marey.drawing.swims import swim
+from marey.drawing.vaults import vault
 from marey.generation.fine_wish import FineWish
 from marey.generation.holding import climb, drives, hangs
 from marey.posing.limbs import FPS
@@ -61,6 +62,14 @@ _JUMPS, _LEAPS = re.compile(r"\bjump\w*\b"), re.compile(r"\b(?:leap\w*|bound\w*)
 """Words of a jump out of a run, and of a leap, in which the legs are far apart."""
 _RUNS_FIRST = re.compile(r"\b(?:runs?|sprints?|jogs?|races?)\b[^.;]*\b(?:and|then|before)\b")
 """Words of a run that is as much of a motion as the leap behind it."""
+_VAULTS = re.compile(
+    r"\bvault(?:s|ed|ing)?\b(?! (?:up )?(?:onto|on top|door|into the saddle)| up\b)"
+    r"|\b(?:jump|spring|leap|hop|swing)\w* over .*\b(?:using|with|on) (?:his|her|their|one|both|a) (?:hands?|arms?)\b"
+)
+_POLE = re.compile(r"\bpole\b|\bgymnast\w*|\bvaulting (?:horse|table)\b")
+"""Words of what is passed over with the hands on it, and of vaults of other kinds."""
+_LOW_VAULT = re.compile(r"\b(?:low|tables?|desks?|bench|counter|crate|box|bonnet|hood|car)\b")
+_LEGS_SIDE = re.compile(r"\b(?:legs?|feet) (?:\w+ ){0,4}(left|right)\b|\bto (?:the|his|her) (left|right)\b")
 _KNEES = re.compile(r"\bknees?\b")
 _SPINS = re.compile(r"\b(?:spins?|spinning|whirls?|twists?)\b")
 _HIT = re.compile(
@@ -159,6 +168,14 @@ def _leap(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     return leap(rng, form, wish.side)
 
 
+def _vault(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    high = rng.uniform(0.74, 0.8) if _LOW_VAULT.search(text) else 0.0
+    named = _LEGS_SIDE.search(text)
+    return vault(rng, (named[1] or named[2]) if named else "", high)
+
+
 def _crawl(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     text = wish.prompt.lower()
     back = bool(re.search(r"\b(?:backwards?|in reverse)\b", text))
@@ -232,6 +249,7 @@ CHOICES: Mapping[str, Choice] = {
     "flip": _flip,
     "cartwheel": _cartwheel,
     "leap": _leap,
+    "climb-onto": _vault,
     "crawl": _crawl,
     "lie-down": _lie_down,
     "lie": _lie,
@@ -289,6 +307,9 @@ def goes_out_of_a_run(action: str, wish: FineWish) -> bool:
 
 
 def _is_networks(action: str, wish: FineWish) -> bool:
+    if action == "climb-onto":
+        text = wish.prompt.lower()
+        return not _VAULTS.search(text) or _POLE.search(text) is not None
     others = LEFT_TO_NETWORKS.get(action)
     return others is not None and others.search(wish.prompt.lower()) is not None
 
