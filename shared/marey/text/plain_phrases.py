@@ -115,6 +115,14 @@ _SPINS_AND_FREEZES = re.compile(
 )
 
 
+_PATROLS = re.compile(
+    r"\b(?P<subject>(?:a|an|the|two|one) (?:\w+ ){0,3}|^|he |she |they |and |then )patrol(?P<end>s|ling)?\b"
+    r"(?! (?:cars?|officers?|duty|route|vehicle)\b)(?P<along> (?=(?:the|an?|his|her|their) ))?",
+    re.IGNORECASE,
+)
+"""A walk of which the readers make a signal of the guard who takes it."""
+
+
 def with_plain_phrases(prompt: str) -> str:
     """Return a prompt in which such phrases are told in words that the readers know.
 
@@ -122,6 +130,7 @@ def with_plain_phrases(prompt: str) -> str:
         prompt: without asides (`marey.text.asides`).
     """
     text = _TRIPS_AND_CATCHES.sub(_stumbles, prompt)
+    text = _PATROLS.sub(_walks_along, text)
     text = _GOES_ON.sub(r"\g<stumbles>, then ", text)
     if _HIDES.search(text):
         text = _DROPS_BACK.sub(lambda it: f"crouch{'es' if it['s'] else ''} down", text)
@@ -137,6 +146,11 @@ def with_plain_phrases(prompt: str) -> str:
     text = _PUTS_IT.sub(_puts_box, text)
     text = _INTO_GUARD.sub(_steps_into_guard, text)
     return _SPINS_AND_FREEZES.sub(lambda it: f"{it['spins']}, then stand{(it['s'] and 's') or ''} still", text)
+
+
+def _walks_along(found: re.Match[str]) -> str:
+    walks = {"s": "walks", "ling": "walking"}.get((found["end"] or "").lower(), "walk")
+    return f"{found['subject']}{walks}{' along ' if found['along'] else ''}"
 
 
 def _stumbles(found: re.Match[str]) -> str:

@@ -15,12 +15,20 @@ _FIGHTS = re.compile(
     r"|stance|martial|karate|kicks?|training|trains?|practi[cs]\w*|left and right|times|throws?)\b",
     re.IGNORECASE,
 )
+_JOY = re.compile(
+    r"\b(?:joy\w*|triumph\w*|victor\w*|celebrat\w*|w[io]ns?|winn\w*|won|goals?|scor\w*|happ\w*|excite\w*|excitement|cheer\w*"
+    r"|jump\w*|leap\w*|success\w*|yes|thrill\w*|delight\w*|ecstatic\w*|elat\w*|overjoyed|proud\w*|champion\w*|medal\w*|trophy"
+    r"|fans?|footballers?|strikers?|players?|golfers?|runners?|athletes?|both)\b",
+    re.IGNORECASE,
+)
+"""Words of joy, of what there is joy about, and of who has it."""
 _ENDS = {"es": "s", "ing": "ing", "ed": "ed"}
 
 
 def with_pumped_fists(text: str) -> str:
-    """Return a text in which a fist that punches the air for joy is pumped; one of a fight stays."""
-    return text if _FIGHTS.search(text) else _PUNCHES.sub(_pumps, text)
+    """Return a text in which a fist that punches the air for joy is pumped; one of a fight stays, and one without
+    a word of joy."""
+    return text if _FIGHTS.search(text) or not _JOY.search(text) else _PUNCHES.sub(_pumps, text)
 
 
 def _pumps(found: re.Match[str]) -> str:

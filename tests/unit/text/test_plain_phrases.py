@@ -60,6 +60,10 @@ def test_what_a_clause_leaves_out_is_said_again(prompt: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("prompt", "said"),
     [
+        ("a night watchman patrols", "a night watchman walks"),
+        ("the sentry patrols the corridor, then waves", "the sentry walks along the corridor, then waves"),
+        ("patrolling the yard", "walking along the yard"),
+        ("a patrol officer waves", "a patrol officer waves"),
         ("peeks out, drops back down", "peeks out, crouches down"),
         ("is shot and drops back down", "is shot and drops back down"),
         ("folds over, then comes up and waves at us", "folds over, then waves at us"),

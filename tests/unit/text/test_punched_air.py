@@ -10,10 +10,10 @@ from marey.text.punched_air import with_pumped_fists
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("she punches the air", "she pumps a fist in the air"),
+        ("she punches the air in triumph", "she pumps a fist in the air in triumph"),
         ("leaping up and punching the air", "leaping up and pumping a fist in the air"),
         ("they punch the sky with both fists", "they pump both fists in the air"),
-        ("He punched the air with his left hand.", "He pumped a left fist in the air."),
+        ("The striker punched the air with his left hand.", "The striker pumped a left fist in the air."),
         ("punches at the air after the goal", "pumps a fist in the air after the goal"),
     ],
 )
@@ -25,6 +25,7 @@ def test_a_fist_is_pumped(text: str, told: str) -> None:
     "text",
     [
         "a boxer punches the air",
+        "she punches the air",
         "punches the air in front of her",
         "punches the air with jabs and hooks",
         "punches the airbag",

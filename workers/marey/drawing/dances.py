@@ -72,7 +72,7 @@ DANCES: Mapping[str, _Dance] = {
         (0.012, 0.025),
         0.045,
         _WAIST,
-        0.11,
+        0.2,
     ),
     "cha-cha": _Dance(
         (0.46, 0.5),
@@ -94,7 +94,7 @@ DANCES: Mapping[str, _Dance] = {
         (0.01, 0.02),
         0.04,
         _WAIST,
-        0.09,
+        0.2,
     ),
     "bachata": _Dance(
         (0.44, 0.48),
@@ -112,7 +112,7 @@ DANCES: Mapping[str, _Dance] = {
         (0.012, 0.03),
         0.045,
         _WAIST,
-        0.07,
+        0.18,
     ),
     "waltz": _Dance(
         (0.56, 0.64),
@@ -142,7 +142,7 @@ DANCES: Mapping[str, _Dance] = {
         (0.06, 0.05),
         0.06,
         _LOW,
-        0.12,
+        0.18,
     ),
 }
 """Dances by name."""

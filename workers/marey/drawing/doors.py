@@ -56,18 +56,21 @@ def pulled_door(rng: random.Random, side: str = "", *, heavy: bool = False, brie
     return on_feet(sequel, ["door-pull"], 0.12 if brief else rng.uniform(0.4, 0.7), mirror=side == LEFT)
 
 
-def pushed_door(rng: random.Random, side: str = "", *, heavy: bool = False, brief: bool = False) -> Gesture:
-    """A hand goes flat against a door and pushes it ahead on two steps.
+def pushed_door(
+    rng: random.Random, side: str = "", *, both: bool = False, heavy: bool = False, brief: bool = False
+) -> Gesture:
+    """A hand, or both, go flat against a door and push it ahead on two steps.
 
     Args:
         rng: decides sizes and times.
         side: of the hand; empty = the right.
-        heavy: both hands push, the trunk leans in.
+        both: both hands push.
+        heavy: both hands push for longer, and the trunk leans in.
         brief: other things are done before or after it.
     """
     pace, starts = rng.uniform(0.95, 1.08) * (1.4 if heavy else 1.0), 0.08 if brief else rng.uniform(0.25, 0.45)
-    stride, leans = rng.uniform(0.46, 0.54), 16.0 if heavy else 5.0
-    sides = (LEFT, RIGHT) if heavy else (RIGHT,)
+    stride, leans = rng.uniform(0.46, 0.54), 16.0 if heavy or both else 5.0
+    sides = (LEFT, RIGHT) if heavy or both else (RIGHT,)
 
     def sequel(feet: _Feet) -> Sequel:
         rests = {one: foot.flat() for one, foot in feet.items()}

@@ -27,7 +27,7 @@ _FOLLOWS_S = 0.2
 
 _FORMS: Mapping[str, Mapping[str, float]] = {
     "waddle": {"lift": 0.05, "heel": 8.0, "sway": 0.06},
-    "shuffle": {"lift": 0.014, "heel": 3.0, "sway": 0.02},
+    "shuffle": {"lift": 0.026, "heel": 6.0, "sway": 0.02},
 }
 _ROCKS = 7.0
 """Degrees by which a waddling trunk leans over the foot that stands."""

@@ -27,6 +27,7 @@ from marey.generation.hits import hit_part
 from marey.generation.leans import trunk_shares
 from marey.generation.marching import marches_straight
 from marey.generation.port import MotionFeatures, Request
+from marey.generation.strides import drags_feet
 from marey.generation.timed import TimedText
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
@@ -191,6 +192,8 @@ def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list
         stated = [each for each in stated if each.bearing.gait not in ("high-knees", "skip", "stagger")]
     if marches_straight(said):  # its knees are drawn as high as they are said to be
         stated = [each for each in stated if each.bearing.gait != "high-knees"]
+    if action == "walk" and drags_feet(said):
+        stated = [each for each in stated if each.bearing.gait != "shuffle"]
     return [*stated, *([] if names_load else _drawn_as(action, said))]
 
 

@@ -63,6 +63,7 @@ _LOW = re.compile(r"\b(?:tables?|desks?|counters?|workbench|bench|low(?:er)?|tru
 _LIGHT = re.compile(r"\b(?:light|small|little|empty|quickly)\b")
 _POINTS = re.compile(r"\bthree[- ]point\w*")
 _FIGHTS = re.compile(r"\b(?:(?:kick)?box(?:er|ing)s?|fight\w*|spar(?:s|ring)|guard|mma|martial|muay|ring|karate)\b")
+_ONE_HAND = re.compile(r"\b(?:one|a|his|her|their) (?:hand|arm|shoulder|elbow|finger)\b")
 _TO_FEET = re.compile(r"\bfrom (?:one )?foot to\b")
 _HEAVY = re.compile(r"\b(?:heavy|heavily|massive|stuck|jammed|hard|huge|iron|shov\w+|strain\w*|struggl\w*)\b")
 _BOUNCES_S, _BRIEF_BOUNCES_S = (4.0, 5.0), (2.2, 2.8)
@@ -231,8 +232,11 @@ def _vacuuming(stated: StatedBearing, wish: FineWish, rng: random.Random, second
 
 def _door(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
-    opens = pulled_door if stated.name == "door-pulled" else pushed_door
-    return opens(rng, _hand(stated, wish), heavy=bool(_HEAVY.search(wish.prompt.lower())), brief=any(wish.beside))
+    hand, heavy, brief = _hand(stated, wish), bool(_HEAVY.search(wish.prompt.lower())), any(wish.beside)
+    if stated.name == "door-pulled":
+        return pulled_door(rng, hand, heavy=heavy, brief=brief)
+    both = not hand and _ONE_HAND.search(wish.prompt.lower()) is None
+    return pushed_door(rng, hand, both=both, heavy=heavy, brief=brief)
 
 
 def _bat_swing(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:

@@ -82,6 +82,12 @@ def strides_asked_for(wish: FineWish, rng: random.Random, seconds: float | None,
     return strides(rng, count, back=back, pace=pace, waits=waits_of(wish, rng), metres=metres, size=size)
 
 
+def drags_feet(said: str) -> bool:
+    """Return True if a prompt asks for dragged feet, which are drawn as they drag."""
+    text = said.lower()
+    return bool(_TINY.search(text) and _DRAGS.search(text) and not _OTHERS.search(_TINY.sub(" ", text)))
+
+
 def _tiny_steps(wish: FineWish, rng: random.Random, seconds: float | None, *, back: bool) -> Gesture | None:
     """Return the way of tiny steps that a prompt asks for, of a small child or with dragged feet; None for others."""
     text, pace = wish.prompt.lower(), stated_pace(wish.prompt)
