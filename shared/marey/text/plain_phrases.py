@@ -115,6 +115,12 @@ _SPINS_AND_FREEZES = re.compile(
 )
 
 
+_PICKS_SELF_UP = re.compile(
+    r"\bpick(?P<end>s|ing|ed)? (?:him|her|it|them|my|your)sel(?:f|ves) (?:right |back )?up\b"
+    r"(?: off (?:of )?the (?:floor|ground))?",
+    re.IGNORECASE,
+)
+"""Who gets up after a fall, of which the readers make a thing that is picked up."""
 _PATROLS = re.compile(
     r"\b(?P<subject>(?:a|an|the|two|one) (?:\w+ ){0,3}|^|he |she |they |and |then )patrol(?P<end>s|ling)?\b"
     r"(?! (?:cars?|officers?|duty|route|vehicle)\b)(?P<along> (?=(?:the|an?|his|her|their) ))?",
@@ -130,7 +136,7 @@ def with_plain_phrases(prompt: str) -> str:
         prompt: without asides (`marey.text.asides`).
     """
     text = _TRIPS_AND_CATCHES.sub(_stumbles, prompt)
-    text = _PATROLS.sub(_walks_along, text)
+    text = _PICKS_SELF_UP.sub(_gets_up, _PATROLS.sub(_walks_along, text))
     text = _GOES_ON.sub(r"\g<stumbles>, then ", text)
     if _HIDES.search(text):
         text = _DROPS_BACK.sub(lambda it: f"crouch{'es' if it['s'] else ''} down", text)
@@ -146,6 +152,11 @@ def with_plain_phrases(prompt: str) -> str:
     text = _PUTS_IT.sub(_puts_box, text)
     text = _INTO_GUARD.sub(_steps_into_guard, text)
     return _SPINS_AND_FREEZES.sub(lambda it: f"{it['spins']}, then stand{(it['s'] and 's') or ''} still", text)
+
+
+def _gets_up(found: re.Match[str]) -> str:
+    gets = {"s": "gets", "ing": "getting", "ed": "got"}.get((found["end"] or "").lower(), "get")
+    return f"{gets} up from the floor"
 
 
 def _walks_along(found: re.Match[str]) -> str:

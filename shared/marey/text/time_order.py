@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
+from marey.text.told_later import told_in_order
 from marey.vocabulary.bearings import bearing_words
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import gerund, phrase_in_third_person, third_person
@@ -87,6 +88,7 @@ _IN_TURN = re.compile(
     re.IGNORECASE,
 )
 """An action on one side before the same on the other: "turns left, turns right"."""
+_AS_SOON_AS = re.compile(r"\bas soon as ", re.IGNORECASE)
 _NUMBER = re.compile(r"(?:^|(?<=[\s,;.]))\(?(?P<number>\d{1,2})[.):]\s+(?=[^\W\d])")
 LEAST_NUMBERS = 2
 """Numbers from 1 on that make a prompt a list."""
@@ -113,7 +115,8 @@ _DOER = re.compile(
 def in_time_order(prompt: str) -> str:
     """Return a prompt with its actions in the order of time, and with the words of those that it leaves out: "claps,
     then sits down" of "before she sits down, she claps". Any other prompt is returned as it is."""
-    text = _AFTER.sub(_after, _BEFORE.sub(_before, _without_numbers(prompt)))
+    text = told_in_order(_AS_SOON_AS.sub("once ", _without_numbers(prompt)), _does_so)
+    text = _AFTER.sub(_after, _BEFORE.sub(_before, text))
     text = _BACK_UP.sub(r"\g<rise> up", _TRIPS.sub(_trips, text))
     text = _FALLS_AND_CLIMBS.sub(lambda up: f"{up['falls']}get{up['s'] or ''} up", text)
     text = text if _COLD.search(text) else _FREEZES.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", text)
@@ -123,25 +126,28 @@ def in_time_order(prompt: str) -> str:
     return _OPPOSITE.sub(_turned, _DOER.sub(_does, text))
 
 
+def _does_so(phrase: str) -> str | None:
+    """Return a phrase that begins with a verb in -ing in the third person; None if the verb is not known."""
+    verb, _, rest = phrase.partition(" ")
+    known = _verbs_of_gerunds().get(verb.lower())
+    return None if known is None else " ".join(filter(None, (phrase_in_third_person(known), rest)))
+
+
 def _before(found: re.Match[str]) -> str:
     """Return what is done first, and then what comes later."""
     later = found["later"]
     if found["who"] is None:
-        verb, _, rest = later.partition(" ")
-        known = _verbs_of_gerunds().get(verb.lower())
-        if known is None:
+        said = _does_so(later)
+        if said is None:
             return found[0]
-        later = f"{phrase_in_third_person(known)} {rest}".strip()
+        later = said
     return f"{found['first']}, then {later}{found['end']}"
 
 
 def _after(found: re.Match[str]) -> str:
     """Return what is done first with its subject, and then what comes later."""
-    verb, _, rest = found["first"].partition(" ")
-    known = _verbs_of_gerunds().get(verb.lower())
-    if known is None:
-        return found[0]
-    return f"{found['who']} {' '.join(filter(None, (phrase_in_third_person(known), rest)))}, then {found['later']}"
+    first = _does_so(found["first"])
+    return found[0] if first is None else f"{found['who']} {first}, then {found['later']}"
 
 
 @lru_cache(maxsize=1)

@@ -60,6 +60,9 @@ def test_what_a_clause_leaves_out_is_said_again(prompt: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("prompt", "said"),
     [
+        ("A fallen skater picks herself up.", "A fallen skater gets up from the floor."),
+        ("falls, picks himself back up off the ground", "falls, gets up from the floor"),
+        ("she picks the cup up herself", "she picks the cup up herself"),
         ("a night watchman patrols", "a night watchman walks"),
         ("the sentry patrols the corridor, then waves", "the sentry walks along the corridor, then waves"),
         ("patrolling the yard", "walking along the yard"),
