@@ -120,7 +120,7 @@ _PICKS_SELF_UP = re.compile(
     r"(?: off (?:of )?the (?:floor|ground))?",
     re.IGNORECASE,
 )
-"""Who gets up after a fall, of which the readers make a thing that is picked up."""
+"""A rise after a fall, of which the readers make a thing that is picked up."""
 _PATROLS = re.compile(
     r"\b(?P<subject>(?:a|an|the|two|one) (?:\w+ ){0,3}|^|he |she |they |and |then )patrol(?P<end>s|ling)?\b"
     r"(?! (?:cars?|officers?|duty|route|vehicle)\b)(?P<along> (?=(?:the|an?|his|her|their) ))?",
