@@ -10,13 +10,13 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
-from marey.text.told_later import told_in_order
+from marey.text.told_later import WHO, told_in_order
 from marey.vocabulary.bearings import bearing_words
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import gerund, phrase_in_third_person, third_person
 from marey.vocabulary.word_lists import load_word_lists
 
-_WHO = r"(?:he|she|they|it|(?:the|a|an|his|her|their|our|my)\ (?:[\w-]+\ ){0,2}?[\w-]+)"
+_WHO = WHO.replace(" ", r"\ ")
 _BEFORE = re.compile(
     rf"""^(?:right\ |just\ |shortly\ )?before\ (?:(?P<who>{_WHO})\ (?=\w+s\b)|(?=\w+ing\b))
     (?P<later>[^,.;]+),\ (?!and\b|then\b)(?P<first>(?:(?!\bthen\b)[^.;])+?)(?P<end>\W*)$""",
@@ -24,7 +24,7 @@ _BEFORE = re.compile(
 )
 """A prompt whose first clause is done last: "before she sits down, the nurse stretches"."""
 _AFTER = re.compile(
-    rf"^(?:right |just |shortly )?after (?P<first>\w+ing\b[^,.;]*), (?P<who>{_WHO.replace(chr(92) + ' ', ' ')})"
+    rf"^(?:right |just |shortly )?after (?P<first>\w+ing\b[^,.;]*), (?P<who>{WHO})"
     r" (?P<later>(?:\w+ly )?[a-z]+s\b.*)$",
     re.IGNORECASE,
 )

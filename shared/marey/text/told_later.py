@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-_WHO = r"(?:he|she|they|it|(?:the|a|an|his|her|their|our|my) (?:[\w-]+ ){0,2}?[\w-]+)"
+WHO = r"(?:he|she|they|it|(?:the|a|an|his|her|their|our|my) (?:[\w-]+ ){0,2}?[\w-]+)"
+"""Words of who does something."""
 _ENDS = r"(?P<end>[.!]?)$"
 _AFTER_BOTH = re.compile(
-    rf"^(?P<who>{_WHO}) (?P<later>[a-z]+s\b(?:(?!\bthen\b)[^,.;])* and (?:(?!\bthen\b)[^,.;])+?) (?:right |just )?after"
+    rf"^(?P<who>{WHO}) (?P<later>[a-z]+s\b(?:(?!\bthen\b)[^,.;])* and (?:(?!\bthen\b)[^,.;])+?) (?:right |just )?after"
     rf" (?P<first>[a-z]+ing\b[^,.;]*?){_ENDS}",
     re.IGNORECASE,
 )
@@ -23,7 +24,7 @@ _BEFORE_DOING = re.compile(
     re.IGNORECASE,
 )
 _WHEN_FINISHED = re.compile(
-    rf"^(?P<who>{_WHO}) (?P<later>[^,.;]+?) (?:when|once|as soon as|after) (?:he|she|they|it)(?:'s| is| has| have)?"
+    rf"^(?P<who>{WHO}) (?P<later>[^,.;]+?) (?:when|once|as soon as|after) (?:he|she|they|it)(?:'s| is| has| have)?"
     rf" (?:finish(?:es|ed)?|done|stops|stopped) (?P<first>[a-z]+ing\b[^,.;]*?){_ENDS}",
     re.IGNORECASE,
 )

@@ -85,14 +85,19 @@ def strides_asked_for(wish: FineWish, rng: random.Random, seconds: float | None,
 def drags_feet(said: str) -> bool:
     """Return True if a prompt asks for dragged feet, which are drawn as they drag."""
     text = said.lower()
-    return bool(_TINY.search(text) and _DRAGS.search(text) and not _OTHERS.search(_TINY.sub(" ", text)))
+    return _is_tiny(text) and _DRAGS.search(text) is not None
+
+
+def _is_tiny(text: str) -> bool:
+    """Return True if a text in small letters asks for tiny or dragged steps ahead or back, and no other way."""
+    return _TINY.search(text) is not None and _OTHERS.search(_TINY.sub(" ", text)) is None
 
 
 def _tiny_steps(wish: FineWish, rng: random.Random, seconds: float | None, *, back: bool) -> Gesture | None:
     """Return the way of tiny steps that a prompt asks for, of a small child or with dragged feet; None for others."""
     text, pace = wish.prompt.lower(), stated_pace(wish.prompt)
     gaits = {each.bearing.gait for each in stated_bearings(wish.prompt)} - {""}
-    if not _TINY.search(text) or gaits - {"shuffle"} or _OTHERS.search(_TINY.sub(" ", text)):
+    if not _is_tiny(text) or gaits - {"shuffle"}:
         return None
     waits, form = waits_of(wish, rng), "waddle" if _WADDLES.search(text) else "shuffle" if _DRAGS.search(text) else ""
     room = None if seconds is None else round((seconds - sum(waits)) / TINY_S[pace])
