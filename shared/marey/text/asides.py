@@ -12,7 +12,7 @@ import re
 from marey.text.action_reader import named_actions
 from marey.text.clause_parts import begins_with_verb
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.lengths import WHOLE, verb_forms
+from marey.vocabulary.lengths import TO_TEN, WHOLE, verb_forms
 from marey.vocabulary.scope import STANDING
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -76,7 +76,7 @@ _HOW = (
 )
 _FAR = (
     r"(?:(?:for|about|around|roughly|approximately|approx\.?|over|some|maybe|ca\.?|~) ?)*"
-    r"(?:\d{1,3}(?:[.,]\d+)?|one|two|three|four|five|six|seven|eight|nine|ten) ?"
+    rf"(?:\d{{1,3}}(?:[.,]\d+)?|{TO_TEN}) ?"
     r"(?:m|metres?|meters?|feet|ft|yards?|s|secs?|seconds?)(?: (?:forwards?|ahead|long))?"
 )
 _BELONGS = re.compile(rf",\s+(?=(?:{_HOW}|{_FAR})(?=\s*(?:[,;.]|$|and\b|then\b)))", re.IGNORECASE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from marey.vocabulary.inflection import third_person
+from marey.vocabulary.lengths import TO_TEN
 
 _WHO = r"(?:(?:he|she|they|it)\ )?"
 _JOINT = r"(?:,?\ and\ then|,?\ and|,?\ then|,?\ but|[,;.])\ (?:(?:then|but|quickly|just|barely)\ )?"
@@ -49,15 +50,15 @@ _HIGH_KNEES = re.compile(
     re.IGNORECASE,
 )
 _MORE = re.compile(
-    r"(?P<before>\b(?P<verb>[a-z]+?)(?:s|es)? (?:(?:\w+ly|up|down) )*(?:\d{1,2}|one|two|three|four|five|six|seven|eight"
-    r"|nine|ten) (?P<what>(?:more )?(?:stairs|steps|rungs|push-?ups|sit-?ups|squats|jumps|hops|kicks|punches|laps)\b)"
-    r"[^;]*?\b(?P=verb)(?:s|es)? (?:(?:\w+ly|up|down) )*(?:another )?(?:\d{1,2}|one|two|three|four|five|six|seven|eight"
-    r"|nine|ten)(?: more)?)(?=\W*$|[,.;]| (?:and|then)\b)",
+    rf"(?P<before>\b(?P<verb>[a-z]+?)(?:s|es)? (?:(?:\w+ly|up|down) )*(?:\d{{1,2}}|{TO_TEN})"
+    r" (?P<what>(?:more )?(?:stairs|steps|rungs|push-?ups|sit-?ups|squats|jumps|hops|kicks|punches|laps)\b)"
+    rf"[^;]*?\b(?P=verb)(?:s|es)? (?:(?:\w+ly|up|down) )*(?:another )?(?:\d{{1,2}}|{TO_TEN})"
+    r"(?: more)?)(?=\W*$|[,.;]| (?:and|then)\b)",
     re.IGNORECASE,
 )
 """A number of what the clause before has named: "climbs three stairs, rests, climbs two more"."""
 _FAR = (
-    r"(?:\d{1,2}(?:[.,]\d+)?|one|two|three|four|five|six|seven|eight|nine|ten|an?|another)"
+    rf"(?:\d{{1,2}}(?:[.,]\d+)?|{TO_TEN}|an?|another)"
     r"(?: more)? (?:m|metres?|meters?|steps?|paces?|feet|yards?)"
 )
 _ALONG = r"(?:forwards?|backwards?|back|ahead|(?:to (?:the|his|her) )?(?:left|right)|sideways)"

@@ -19,6 +19,8 @@ from marey.vocabulary.word_lists import load_word_lists
 TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
 seventeen eighteen nineteen twenty"""
 """The numbers from 1 on in words, with blanks between them."""
+TO_TEN = "|".join(TO_TWENTY.split()[:10])
+"""Words of the numbers from 1 to 10, for patterns."""
 _NUMBERS = {
     **{name: float(value) for value, name in enumerate(TO_TWENTY.split(), 1)},
     "thirty": 30.0,
